@@ -1,0 +1,1 @@
+"""One robot's controller: what moves onto the robot."""

@@ -1,0 +1,1 @@
+"""The wires: CAN buses, drive protocols, Zenoh links, messages, clocks."""

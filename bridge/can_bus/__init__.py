@@ -1,0 +1,1 @@
+"""The emulated CAN bus: packets, hub and the python-can interface `fleetloop`."""

@@ -1,0 +1,324 @@
+"""Briefs: the resolved scenario as plain values, cut down to what one process may know.
+
+A scenario file is read and checked once, by `configs.scenario`; every process then gets its brief: frozen
+dataclasses of floats, ints, strings and tuples, with all defaults filled in and nothing left to check. This
+module imports nothing but the standard library, so a controller process starts in a fraction of a second, and
+the pure core (paths, laws, plant) takes its parameters as these types.
+
+An `AgentBrief` holds no plant parameter: the controller knows r and b of its robot (Assumption 2.3) and learns
+the rest. Angles are radians, wheel order is (right, left), times are integer nanoseconds.
+"""
+
+from dataclasses import dataclass, field
+
+Settings = tuple[tuple[str, str | int | float | bool], ...]
+"""Keyword arguments as sorted pairs, so that a brief stays hashable and immutable."""
+
+
+# --- reference paths: Γ_0(s) of equation (1) ---------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class LinePath:
+    """Γ_0(s) = start + s (cos heading, sin heading)."""
+
+    start_x_m: float
+    start_y_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class CosinePath:
+    """Γ_0(s) = (start_x + s, start_y + amplitude cos(wavenumber s)), the shape of the paper's section 4."""
+
+    start_x_m: float
+    start_y_m: float
+    amplitude_m: float
+    wavenumber_rad_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class CirclePath:
+    """Γ_0(s) = centre + radius (cos φ, sin φ), φ = start_angle ± s / radius; + is counter-clockwise."""
+
+    centre_x_m: float
+    centre_y_m: float
+    radius_m: float
+    start_angle_rad: float
+    clockwise: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FigureEightPath:
+    """Γ_0(s) = centre + (half_length sin φ, half_width sin 2φ), φ = s / half_length (lemniscate of Gerono)."""
+
+    centre_x_m: float
+    centre_y_m: float
+    half_length_m: float
+    half_width_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class SplinePath:
+    """Piecewise quintic polynomials: in segment n, x = Σ_m x_coefficients[n][m] (s − knots[n])^m, same for y.
+
+    Continuous up to the fourth derivative. `closed`: s is taken modulo the length; else the end segments' tangents
+    go on straight outside [knots[0], knots[-1]].
+    """
+
+    knots_m: tuple[float, ...]
+    x_coefficients: tuple[tuple[float, ...], ...]
+    y_coefficients: tuple[tuple[float, ...], ...]
+    closed: bool
+
+
+ReferencePath = LinePath | CosinePath | CirclePath | FigureEightPath | SplinePath
+
+
+# --- formation offsets: R(θ_d0(s)) l_i(s) of equation (1) --------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class WorldOffset:
+    """R(θ_d0) l_i = (x, y), constant in world axes: the paper's section 4 has (0, o_i)."""
+
+    x_m: float
+    y_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class StructureOffset:
+    """l_i = (ahead, left), constant in the axes of the virtual structure, which turn with the path."""
+
+    ahead_m: float
+    left_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class VaryingOffset:
+    """l_i(s) in the axes of the virtual structure: a quintic spline in s, as in `SplinePath`.
+
+    Constant outside [knots[0], knots[-1]]; its first two derivatives are 0 at both ends.
+    """
+
+    knots_m: tuple[float, ...]
+    ahead_coefficients: tuple[tuple[float, ...], ...]
+    left_coefficients: tuple[tuple[float, ...], ...]
+
+
+FormationOffset = WorldOffset | StructureOffset | VaryingOffset
+
+
+# --- the controller ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Wheels:
+    """What the controller knows of its robot: r and b (Assumption 2.3)."""
+
+    radius_m: float
+    half_track_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """Gains of equations (15)-(36); see `agents.path_following` and `agents.wheel_torque`."""
+
+    k1: float  # [1/s]
+    k2: float  # [1/m]
+    k3: float  # [1/s]
+    k4: float  # [N·m·s/m, N·m·s/rad]
+    gamma_1_s: float
+    gamma_2_s: float
+    gamma_3_s: float
+    k5: tuple[float, float, float, float, float, float, float, float]  # diagonal of K_5
+    sigma_max: float  # bound σ_M of every element of Θ
+    sigma_margin: float  # k of the projection
+    eta: float  # [1/s] of (36)
+    rho: float
+    sgn_width: float  # sgn(e) is tanh(e / sgn_width)
+    theta_hat_0: tuple[float, float, float, float, float, float, float, float]
+    kappa_hat_0: float
+
+
+@dataclass(frozen=True, slots=True)
+class Coordination:
+    """Equations (38), (40), (45): gains, start values, and how long a silent neighbour counts."""
+
+    p: float  # [1/s]
+    q: float  # [1/s²]
+    s_0: float
+    mu_0: float
+    v_hat_0: float
+    age_limit_s: float  # a neighbour's value is extrapolated at most this far
+    silence_limit_s: float  # after this long a silent neighbour leaves the sums
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """The ticks of a run. Tick k is scenario time k × period; ticks below 0 are the countdown (arming)."""
+
+    period_ns: int
+    ticks: int  # control ticks 0 .. ticks − 1; tick `ticks` closes the run
+    countdown_ticks: int  # the run's first tick is −countdown_ticks
+    share_every: int  # path states are shared at ticks k ≥ 0 with k % share_every == 0
+    localise_every: int  # poses are sent at ticks k ≥ 0 with k % localise_every == 0
+    tick_deadline_s: float  # how long anybody waits for anybody within one tick [wall s]
+    start_deadline_s: float  # how long everybody has to become ready [wall s]
+
+    @property
+    def period_s(self) -> float:
+        """The control period h."""
+        return self.period_ns * 1e-9
+
+    def shares(self, tick: int) -> bool:
+        """Whether path states are exchanged at this tick."""
+        return tick >= 0 and tick % self.share_every == 0
+
+    def localises(self, tick: int) -> bool:
+        """Whether the localisation system sends poses at this tick."""
+        return tick >= 0 and tick % self.localise_every == 0
+
+    def bus_time_ns(self, tick: int) -> int:
+        """Bus time of a tick: nanoseconds since power-up, 0 at the first tick of the countdown."""
+        return (tick + self.countdown_ticks) * self.period_ns
+
+    def tick_of(self, bus_time_ns: int) -> int:
+        """The tick at or before a bus time."""
+        return bus_time_ns // self.period_ns - self.countdown_ticks
+
+
+@dataclass(frozen=True, slots=True)
+class DriveLink:
+    """How a controller reaches the two drives of its robot."""
+
+    protocol: str  # a key of bridge.drives.DRIVES
+    right_node: int
+    left_node: int
+    encoder_period_ns: int
+    velocity_limit_rev_s: float
+    current_limit_A: float
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A pose in the world: x forward, y left, θ counter-clockwise from world x."""
+
+    x_m: float
+    y_m: float
+    theta_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkLink:
+    """How one process reaches the router, and as whom."""
+
+    run: str  # the run's name in every key: fleetloop/<run>/...
+    endpoint: str  # e.g. tcp/127.0.0.1:40001
+    user: str
+    password: str = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class AgentBrief:
+    """Everything that one robot's controller process is told at its start."""
+
+    robot: str
+    law: str  # a key of agents.laws.LAWS
+    wheels: Wheels
+    gains: Gains
+    coordination: Coordination
+    path: ReferencePath
+    offset: FormationOffset
+    hears: tuple[str, ...]  # in-neighbours, sorted: a_ij = 1
+    hears_leader: bool  # h_i = 1
+    localisation: str  # "fused" | "external" | "odometry"
+    schedule: Schedule
+    drives: DriveLink
+    bus: Settings  # keyword arguments of can.Bus, verbatim
+    network: NetworkLink
+
+
+# --- the plant ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """Physical parameters of one robot, equations (2)-(4)."""
+
+    wheel_radius_m: float
+    half_track_m: float  # b
+    com_offset_m: float  # a
+    body_mass_kg: float
+    wheel_mass_kg: float
+    body_inertia_kg_m2: float  # I_c, about the vertical through the centre of mass
+    wheel_axle_inertia_kg_m2: float  # I_w
+    wheel_diameter_inertia_kg_m2: float  # I_m
+    damping_right_N_m_s: float  # d_11
+    damping_left_N_m_s: float  # d_22
+    wheels_in_mass: int  # m = m_c + n m_w: 1 as printed in the paper, 2 physically
+
+
+@dataclass(frozen=True, slots=True)
+class Disturbance:
+    """Δ_i(t) = amplitude [sin(rate t + phase), cos(rate t + phase)] on (right, left) for t ≥ 0."""
+
+    amplitude_N_m: float
+    rate_rad_s: float
+    phase_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class DriveModel:
+    """The emulated drive behind each wheel: limits and cyclic messages of an ODrive axis."""
+
+    protocol: str
+    torque_constant_N_m_A: float
+    current_limit_A: float
+    velocity_limit_rev_s: float
+    velocity_gain_N_m_s_rev: float
+    overspeed_ratio: float
+    torque_limiters: bool  # False: torque reaches the wheel as commanded (ideal drive)
+    heartbeat_period_ns: int
+    encoder_period_ns: int
+    torques_period_ns: int  # 0: only on request
+    watchdog_ns: int  # 0: off
+    zero_torque_on_disarm: bool
+    serial_number: int  # of the right drive; the left one has the next number
+
+
+@dataclass(frozen=True, slots=True)
+class RobotBrief:
+    """One robot as the plant sees it."""
+
+    robot: str
+    bus: str
+    body: Body
+    disturbance: Disturbance
+    drive: DriveModel
+    right_node: int
+    left_node: int
+    pose: Pose
+    v_m_s: float
+    omega_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class PlantBrief:
+    """Everything that the plant process is told at its start."""
+
+    robots: tuple[RobotBrief, ...]
+    schedule: Schedule
+    substeps: int  # RK4 steps per control period
+    speed: float  # real-time factor that the run is held to; 0: as fast as possible
+    seed: int
+    bitrate_bit_s: int
+    runtime_folder: str  # holds one listening socket per bus
+    network: NetworkLink
+
+
+@dataclass(frozen=True, slots=True)
+class LeaderBrief:
+    """The virtual leader: v_r(t) as steps (from scenario time [ns], speed [m/s]), in order of time."""
+
+    speed_steps: tuple[tuple[int, float], ...]

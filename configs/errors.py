@@ -1,0 +1,23 @@
+"""What a user can cause: one line, and the exit status that the process ends with.
+
+Exit statuses of every command: 0 held, 1 an expectation failed (or a difference was found),
+2 usage or scenario, 3 infrastructure, 130 interrupted. Anything else is a bug and keeps its traceback.
+"""
+
+
+class FleetloopError(Exception):
+    """An error that a user can cause or mend; its text is the whole message."""
+
+    exit_code = 3
+
+
+class ScenarioError(FleetloopError):
+    """A file or an option says something that can't be run; nothing was started."""
+
+    exit_code = 2
+
+
+class InfrastructureError(FleetloopError):
+    """The machine, a process, a bus or a network failed; the text names which and when."""
+
+    exit_code = 3

@@ -1,0 +1,1 @@
+"""The operator's tools: command line, launch, record, report, diff."""

@@ -1,0 +1,1 @@
+"""What reality replaces: bodies, motors, encoders, localisation."""
