@@ -1,6 +1,7 @@
 """One CAN frame as a value, the same for buses, drives and controllers.
 
-`can_id` is SocketCAN's: the identifier with flag bits on top, so an 11-bit data frame is its plain number.
+`can_id` is SocketCAN's: the identifier with flag bits on top, so an 11-bit data frame is its
+plain number.
 
     bit 31  EFF  29-bit identifier
     bit 30  RTR  remote frame; only the length of `data` counts, its bytes are zero

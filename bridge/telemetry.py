@@ -1,8 +1,9 @@
 """What is recorded of every robot at every tick: two tables of signals and their packing.
 
-A row is a fixed number of float64; rows of consecutive ticks make a block, the unit that travels over Zenoh.
-The plant tells the truth about the robot; the controller tells what it used and commanded. Both tables are the
-only place that knows the order of the signals: record, export, figures and diff go by name.
+A row is a fixed number of float64; rows of consecutive ticks make a block, the unit that travels
+over Zenoh. The plant tells the truth about the robot; the controller tells what it used and
+commanded. Both tables are the only place that knows the order of the signals: record, export,
+figures and diff go by name.
 """
 
 import struct
@@ -24,8 +25,8 @@ PLANT_SIGNALS: tuple[Signal, ...] = (
     Signal("theta_rad", "rad", "true heading, not wrapped"),
     Signal("v_m_s", "m/s", "true forward speed"),
     Signal("omega_rad_s", "rad/s", "true turn rate"),
-    Signal("demand_right_Nm", "N·m", "torque that the right drive was commanded during the last period"),
-    Signal("demand_left_Nm", "N·m", "torque that the left drive was commanded during the last period"),
+    Signal("demand_right_Nm", "N·m", "torque asked of the right motor during the last period"),
+    Signal("demand_left_Nm", "N·m", "torque asked of the left motor during the last period"),
     Signal("motor_right_Nm", "N·m", "torque that the right wheel felt during the last period"),
     Signal("motor_left_Nm", "N·m", "torque that the left wheel felt during the last period"),
 )

@@ -1,12 +1,13 @@
 """Briefs: the resolved scenario as plain values, cut down to what one process may know.
 
-A scenario file is read and checked once, by `configs.scenario`; every process then gets its brief: frozen
-dataclasses of floats, ints, strings and tuples, with all defaults filled in and nothing left to check. This
-module imports nothing but the standard library, so a controller process starts in a fraction of a second, and
-the pure core (paths, laws, plant) takes its parameters as these types.
+A scenario file is read and checked once, by `configs.scenario`; every process then gets its brief:
+frozen dataclasses of floats, ints, strings and tuples, with all defaults filled in and nothing left
+to check. This module imports nothing but the standard library, so a controller process starts in a
+fraction of a second, and the pure core (paths, laws, plant) takes its parameters as these types.
 
-An `AgentBrief` holds no plant parameter: the controller knows r and b of its robot (Assumption 2.3) and learns
-the rest. Angles are radians, wheel order is (right, left), times are integer nanoseconds.
+An `AgentBrief` holds no plant parameter: the controller knows r and b of its robot (Assumption 2.3)
+and learns the rest. Angles are
+radians, wheel order is (right, left), times are integer nanoseconds.
 """
 
 from dataclasses import dataclass, field
@@ -15,7 +16,7 @@ Settings = tuple[tuple[str, str | int | float | bool], ...]
 """Keyword arguments as sorted pairs, so that a brief stays hashable and immutable."""
 
 
-# --- reference paths: Γ_0(s) of equation (1) ---------------------------------------------------------------
+# --- reference paths: Γ_0(s) of equation (1) ------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +30,10 @@ class LinePath:
 
 @dataclass(frozen=True, slots=True)
 class CosinePath:
-    """Γ_0(s) = (start_x + s, start_y + amplitude cos(wavenumber s)), the shape of the paper's section 4."""
+    """Γ_0(s) = (start_x + s.
+
+    Start_y + amplitude cos(wavenumber s)), the shape of the paper's section 4.
+    """
 
     start_x_m: float
     start_y_m: float
@@ -39,7 +43,10 @@ class CosinePath:
 
 @dataclass(frozen=True, slots=True)
 class CirclePath:
-    """Γ_0(s) = centre + radius (cos φ, sin φ), φ = start_angle ± s / radius; + is counter-clockwise."""
+    """Γ_0(s) = centre + radius (cos φ.
+
+    Sin φ), φ = start_angle ± s / radius; + is counter-clockwise.
+    """
 
     centre_x_m: float
     centre_y_m: float
@@ -50,7 +57,10 @@ class CirclePath:
 
 @dataclass(frozen=True, slots=True)
 class FigureEightPath:
-    """Γ_0(s) = centre + (half_length sin φ, half_width sin 2φ), φ = s / half_length (lemniscate of Gerono)."""
+    """Γ_0(s) = centre + (half_length sin φ.
+
+    Half_width sin 2φ), φ = s / half_length (lemniscate of Gerono).
+    """
 
     centre_x_m: float
     centre_y_m: float
@@ -60,10 +70,10 @@ class FigureEightPath:
 
 @dataclass(frozen=True, slots=True)
 class SplinePath:
-    """Piecewise quintic polynomials: in segment n, x = Σ_m x_coefficients[n][m] (s − knots[n])^m, same for y.
+    """Piecewise quintic polynomials, continuous up to the fourth derivative.
 
-    Continuous up to the fourth derivative. `closed`: s is taken modulo the length; else the end segments' tangents
-    go on straight outside [knots[0], knots[-1]].
+    In segment n, x = Σ_m x_coefficients[n][m] (s − knots[n])^m, same for y. `closed`: s is taken
+    modulo the length; else the tangents at both ends go on straight outside the knots.
     """
 
     knots_m: tuple[float, ...]
@@ -75,7 +85,7 @@ class SplinePath:
 ReferencePath = LinePath | CosinePath | CirclePath | FigureEightPath | SplinePath
 
 
-# --- formation offsets: R(θ_d0(s)) l_i(s) of equation (1) --------------------------------------------------
+# --- formation offsets: R(θ_d0(s)) l_i(s) of equation (1) -----------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +98,10 @@ class WorldOffset:
 
 @dataclass(frozen=True, slots=True)
 class StructureOffset:
-    """l_i = (ahead, left), constant in the axes of the virtual structure, which turn with the path."""
+    """l_i = (ahead.
+
+    Left), constant in the axes of the virtual structure, which turn with the path.
+    """
 
     ahead_m: float
     left_m: float
@@ -109,7 +122,7 @@ class VaryingOffset:
 FormationOffset = WorldOffset | StructureOffset | VaryingOffset
 
 
-# --- the controller ----------------------------------------------------------------------------------------
+# --- the controller -------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +169,10 @@ class Coordination:
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """The ticks of a run. Tick k is scenario time k × period; ticks below 0 are the countdown (arming)."""
+    """The ticks of a run.
+
+    Tick k is scenario time k × period; ticks below 0 are the countdown (arming).
+    """
 
     period_ns: int
     ticks: int  # control ticks 0 .. ticks − 1; tick `ticks` closes the run
@@ -239,7 +255,7 @@ class AgentBrief:
     network: NetworkLink
 
 
-# --- the plant ---------------------------------------------------------------------------------------------
+# --- the plant ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -319,6 +335,9 @@ class PlantBrief:
 
 @dataclass(frozen=True, slots=True)
 class LeaderBrief:
-    """The virtual leader: v_r(t) as steps (from scenario time [ns], speed [m/s]), in order of time."""
+    """The virtual leader.
+
+    V_r(t) as steps (from scenario time [ns], speed [m/s]), in order of time.
+    """
 
     speed_steps: tuple[tuple[int, float], ...]
