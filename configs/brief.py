@@ -30,9 +30,9 @@ class LinePath:
 
 @dataclass(frozen=True, slots=True)
 class CosinePath:
-    """Γ_0(s) = (start_x + s.
+    """A cosine along world x, the shape of the paper's section 4.
 
-    Start_y + amplitude cos(wavenumber s)), the shape of the paper's section 4.
+    Γ_0(s) = (start_x + s, start_y + amplitude cos(wavenumber s)).
     """
 
     start_x_m: float
@@ -43,9 +43,9 @@ class CosinePath:
 
 @dataclass(frozen=True, slots=True)
 class CirclePath:
-    """Γ_0(s) = centre + radius (cos φ.
+    """A circle, s in metres of arc.
 
-    Sin φ), φ = start_angle ± s / radius; + is counter-clockwise.
+    Γ_0(s) = centre + radius (cos φ, sin φ), φ = start_angle ± s / radius; + is counter-clockwise.
     """
 
     centre_x_m: float
@@ -57,9 +57,9 @@ class CirclePath:
 
 @dataclass(frozen=True, slots=True)
 class FigureEightPath:
-    """Γ_0(s) = centre + (half_length sin φ.
+    """The lemniscate of Gerono.
 
-    Half_width sin 2φ), φ = s / half_length (lemniscate of Gerono).
+    Γ_0(s) = centre + (half_length sin φ, half_width sin 2φ), φ = s / half_length.
     """
 
     centre_x_m: float
@@ -98,9 +98,9 @@ class WorldOffset:
 
 @dataclass(frozen=True, slots=True)
 class StructureOffset:
-    """l_i = (ahead.
+    """l_i = (ahead, left), constant in the axes of the virtual structure.
 
-    Left), constant in the axes of the virtual structure, which turn with the path.
+    Those axes turn with the path: `ahead` is along its tangent.
     """
 
     ahead_m: float
