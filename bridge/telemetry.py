@@ -7,6 +7,8 @@ figures and diff go by name.
 """
 
 import struct
+from array import array
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 
@@ -74,3 +76,38 @@ AGENT_ROW = struct.Struct(f"<{len(AGENT_SIGNALS)}d")
 
 BLOCK_TICKS = 128
 """Rows that are gathered before a block is sent."""
+
+
+class RowBuffer:
+    """Gathers the rows of consecutive ticks and hands them on as blocks.
+
+    `hand_on(first_tick, count, rows, final)` gets a block whenever `BLOCK_TICKS` rows are there,
+    and a last, perhaps empty one from `finish`.
+    """
+
+    __slots__ = ("_count", "_first_tick", "_hand_on", "_rows")
+
+    def __init__(self, hand_on: Callable[[int, int, bytes, bool], None]) -> None:
+        self._hand_on = hand_on
+        self._rows = array("d")
+        self._first_tick = 0
+        self._count = 0
+
+    def add(self, tick: int, row: Iterable[float]) -> None:
+        """Add the row of one tick."""
+        if self._count == 0:
+            self._first_tick = tick
+        self._rows.extend(row)
+        self._count += 1
+        if self._count == BLOCK_TICKS:
+            self._flush(final=False)
+
+    def finish(self) -> None:
+        """Hand on what is left and say that nothing follows."""
+        self._flush(final=True)
+
+    def _flush(self, *, final: bool) -> None:
+        self._hand_on(self._first_tick, self._count, self._rows.tobytes(), final)
+        self._first_tick += self._count
+        self._count = 0
+        self._rows = array("d")

@@ -329,8 +329,9 @@ class PlantBrief:
     speed: float  # real-time factor that the run is held to; 0: as fast as possible
     seed: int
     bitrate_bit_s: int
-    runtime_folder: str  # holds one listening socket per bus
+    runtime_folder: str  # holds the buses' sockets; removed when the run ends
     network: NetworkLink
+    listeners: tuple[tuple[str, int], ...] = ()  # bus, inherited file descriptor of its socket
 
 
 @dataclass(frozen=True, slots=True)
@@ -341,3 +342,15 @@ class LeaderBrief:
     """
 
     speed_steps: tuple[tuple[int, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderBrief:
+    """Everything that the recorder is told at its start."""
+
+    path: str  # of the record
+    robots: tuple[str, ...]
+    scenario_toml: str
+    period_ns: int
+    start_deadline_s: float
+    network: NetworkLink

@@ -22,3 +22,7 @@ class InfrastructureError(FleetloopError):
     """The machine, a process, a bus or a network failed; the text names which and when."""
 
     exit_code = 3
+
+
+class PeerLostError(InfrastructureError):
+    """Another process went away; it is the cause, this is only how it was noticed."""

@@ -1,1 +1,75 @@
-"""Drive protocols: each a folder with frames, client (controller's end) and node (the drive's end)."""
+"""Drive protocols: a folder each, with frames, client (host) and node (drive).
+
+`DRIVES` lists what exists: the name in the scenario, the controller's end of a robot's two drives,
+and the emulated drive of one wheel. Both ends are pure: frames in, frames out, told the time.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+from bridge.drives.odrive.client import OdriveClient, WheelReading
+from bridge.drives.odrive.node import OdriveNode
+from bridge.frame import Frame
+from configs.brief import DriveLink, DriveModel
+
+
+class DriveClient(Protocol):
+    """The controller's end of the two drives of a robot."""
+
+    armed: bool
+    sent: tuple[float, float]
+
+    @property
+    def right(self) -> WheelReading | None:
+        """What the right wheel's drive last said."""
+
+    @property
+    def left(self) -> WheelReading | None:
+        """What the left wheel's drive last said."""
+
+    def hear(self, frame: Frame, now_ns: int) -> None:
+        """Take any frame from the bus."""
+
+    def complete(self, now_ns: int) -> bool:
+        """Whether both wheels' encoder frames of this instant are here."""
+
+    def arm(self, now_ns: int) -> Sequence[Frame]:
+        """What to send next on the way to `armed`; call once per period."""
+
+    def fault(self, now_ns: int) -> str | None:
+        """Why the wheels can't be driven now, None if they can."""
+
+    def torque(self, right_Nm: float, left_Nm: float) -> tuple[Frame, Frame]:
+        """Set-points for both wheels [N·m]; `sent` then says what the bus carries of them."""
+
+    def disarm(self) -> Sequence[Frame]:
+        """Torque 0 and idle for both wheels."""
+
+    def estop(self) -> Sequence[Frame]:
+        """Emergency stop for both wheels."""
+
+
+class DriveNode(Protocol):
+    """The emulated drive of one wheel."""
+
+    def feed(self, revolutions: float, rev_s: float) -> None:
+        """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
+
+    def due(self, now_ns: int) -> Sequence[Frame]:
+        """Cyclic frames due at this instant."""
+
+    def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
+        """Take one frame from the bus; return the replies."""
+
+    def torque_demand(self) -> float:
+        """Torque that the drive asks of its motor now [N·m]; always finite."""
+
+
+class DriveProtocol(NamedTuple):
+    """Both ends of one protocol."""
+
+    client: Callable[[DriveLink], DriveClient]
+    node: Callable[[DriveModel, int, int], DriveNode]  # model, node id, serial number
+
+
+DRIVES: Mapping[str, DriveProtocol] = {"odrive": DriveProtocol(OdriveClient, OdriveNode)}

@@ -1,0 +1,213 @@
+"""One robot's controller, one period at a time: sense, decide, act, share.
+
+    phase      on                                          to        torque
+    ARMING     both drives in closed loop without error    READY     0
+    READY      tick 0                                      DRIVING   0
+    ARMING     tick 0                                      error     -
+    DRIVING    a drive drops out or falls silent           STOPPED   the law's
+    DRIVING    the closing tick                            DONE      the law's
+    STOPPED    the closing tick                            DONE      0, drives disarmed
+    DONE       -                                           -         -
+
+A stopped robot goes on sharing its path variable, so that its neighbours aren't cut off. An agent
+knows only what arrived as a CAN frame or as a message; it never reads a clock.
+"""
+
+from collections.abc import Sequence
+from enum import Enum, auto
+
+from agents.coordination import CoordinationState, Coordinator
+from agents.laws import LAWS, LawOutput, LawState, Sense
+from agents.localisation import Localiser
+from agents.neighbours import Neighbours
+from agents.paths import robot_path
+from bridge.drives import DRIVES
+from bridge.frame import Frame
+from bridge.messages import LeaderSpeed, PathState, PoseFix
+from bridge.telemetry import RowBuffer
+from configs.brief import AgentBrief
+from configs.errors import InfrastructureError
+
+
+class Phase(Enum):
+    """What a controller is about."""
+
+    ARMING = auto()
+    READY = auto()
+    DRIVING = auto()
+    STOPPED = auto()
+    DONE = auto()
+
+
+class Agent:
+    """The controller of one robot. Told everything, asks nothing."""
+
+    def __init__(self, brief: AgentBrief, rows: RowBuffer) -> None:
+        self.brief = brief
+        self.phase = Phase.ARMING
+        self.stopped_because = ""
+        self._rows = rows
+        self._schedule = brief.schedule
+        self._h = brief.schedule.period_s
+        self._drives = DRIVES[brief.drives.protocol].client(brief.drives)
+        self._path = robot_path(brief.path, brief.offset)
+        self._law = LAWS[brief.law](brief.gains, brief.wheels, self._h)
+        self._law_state: LawState | None = None
+        self._localiser = Localiser(brief.localisation, brief.wheels)
+        self._neighbours = Neighbours(
+            brief.hears, brief.coordination, self._h, brief.schedule.share_every * self._h
+        )
+        self._coordinator = Coordinator(brief.coordination, self._h, brief.hears_leader)
+        start = brief.coordination
+        self._coordination = CoordinationState(start.v_hat_0, start.mu_0, start.s_0)
+        self._leader: LeaderSpeed | None = None
+        self._fix: PoseFix | None = None
+        self._heard_at = dict.fromkeys(brief.hears, -2)
+
+    # --- what arrives ------------------------------------------------------------------------
+
+    def hear(self, frame: Frame, now_ns: int) -> None:
+        """Take one frame from the bus, received at bus time `now_ns`."""
+        self._drives.hear(frame, now_ns)
+
+    def complete(self, now_ns: int) -> bool:
+        """Whether both encoder frames of bus time `now_ns` are here: the tick may be computed."""
+        return self._drives.complete(now_ns)
+
+    def take_pose(self, fix: PoseFix) -> None:
+        """Take a pose from the localisation system."""
+        self._fix = fix
+
+    def take_path(self, robot: str, state: PathState) -> None:
+        """Take what an in-neighbour says of its path variable."""
+        self._heard_at[robot] = state.tick
+        self._neighbours.hear(robot, state.t_ns, state.s, state.v_hat)
+
+    def take_leader(self, speed: LeaderSpeed) -> None:
+        """Take the virtual leader's speed, now and to come."""
+        self._leader = speed
+
+    def missing_to_start(self) -> list[str]:
+        """Whom the robot has to hear before the run, and has not yet."""
+        missing = [f"the path variable of {r}" for r, tick in self._heard_at.items() if tick < -1]
+        if self._fix is None:
+            missing.append("the localisation system")
+        if self._leader is None and self.brief.hears_leader:
+            missing.append("the leader")
+        return missing
+
+    def missing(self, tick: int) -> list[str]:
+        """What the schedule says is due at this tick and has not arrived."""
+        missing = []
+        if self._schedule.localises(tick) and (self._fix is None or self._fix.tick < tick):
+            missing.append("pose")
+        if self._schedule.shares(tick):
+            late = (robot for robot, heard in self._heard_at.items() if heard < tick)
+            missing += [f"path state of {robot}" for robot in late]
+        return missing
+
+    # --- one period --------------------------------------------------------------------------
+
+    def share(self, tick: int) -> PathState:
+        """What the out-neighbours hear at this tick."""
+        v_hat, _, s = self._coordination
+        return PathState(tick, tick * self._schedule.period_ns, s, v_hat)
+
+    def step(self, tick: int) -> Sequence[Frame]:
+        """Compute one tick; return the frames for the bus.
+
+        Raises:
+            InfrastructureError: the drives were not armed when control had to start.
+        """
+        right, left = self._drives.right, self._drives.left
+        if right is None or left is None:
+            return self._arm(tick)
+        sense = self._localiser.wheels(
+            right.angle_rad, left.angle_rad, right.speed_rad_s, left.speed_rad_s
+        )
+        fix = self._fix
+        if fix is not None and (fix.tick == tick or tick <= 0):
+            sense = self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad)
+        if tick < 0:
+            return self._arm(tick)
+        if tick >= self._schedule.ticks:
+            self.phase = Phase.DONE
+            return self._drives.disarm()
+        if self.phase is not Phase.DRIVING:
+            self._begin(tick)
+        return self._control(tick, sense)
+
+    def _arm(self, tick: int) -> Sequence[Frame]:
+        bus_ns = self._schedule.bus_time_ns(tick)
+        if self._drives.armed:
+            self.phase = Phase.READY
+            return self._drives.torque(0.0, 0.0)
+        return self._drives.arm(bus_ns)
+
+    def _begin(self, tick: int) -> None:
+        if self.phase is Phase.STOPPED:
+            return
+        if self.phase is not Phase.READY or not self._drives.armed:
+            fault = self._drives.fault(self._schedule.bus_time_ns(tick))
+            raise InfrastructureError(
+                f"{self.brief.robot}: drives not armed when control had to start:"
+                f" {fault or 'no closed loop reported yet; a longer clock.countdown_s helps'}"
+            )
+        self.phase = Phase.DRIVING
+
+    def _control(self, tick: int, sense: Sense) -> Sequence[Frame]:
+        """Steps 1 to 11 of the law at one tick."""
+        t_ns = tick * self._schedule.period_ns
+        v_hat, mu, s = coordination = self._coordination
+        s_dot = mu + v_hat
+        reference = self._path(s)
+        out = self._law(self._law_state, sense, reference, s_dot)
+        frames = self._act(tick, out)
+        n, sum_s, sum_v = self._neighbours.sums(t_ns)
+        v_r = self._leader.at(t_ns) if self._leader is not None else 0.0
+        self._coordination = self._coordinator.advance(coordination, n, sum_s, sum_v, v_r)
+        used = out.used
+        self._rows.add(
+            tick,
+            (
+                t_ns * 1e-9,
+                *sense,
+                s,
+                s_dot,
+                mu,
+                v_hat,
+                float(n),
+                reference.x,
+                reference.y,
+                reference.theta,
+                out.x_e,
+                out.y_e,
+                out.theta_e,
+                used.alpha_theta,
+                used.alpha_v,
+                used.alpha_omega,
+                out.xi_e1,
+                out.xi_e2,
+                *used.theta_1,
+                *used.theta_2,
+                used.kappa,
+                *self._drives.sent,
+            ),
+        )
+        return frames
+
+    def _act(self, tick: int, out: LawOutput) -> Sequence[Frame]:
+        """Torques while the drives are well; once one isn't, both wheels are stopped for good."""
+        if self.phase is Phase.DRIVING:
+            fault = self._drives.fault(self._schedule.bus_time_ns(tick))
+            if fault is None:
+                self._law_state = out.state
+                return self._drives.torque(out.tau_right, out.tau_left)
+            self.phase = Phase.STOPPED
+            self.stopped_because = f"tick {tick}: {fault}"
+        return self._drives.disarm()
+
+    def leave(self) -> Sequence[Frame]:
+        """Disarm for good: told to stop before the closing tick."""
+        self.phase = Phase.DONE
+        return self._drives.disarm()

@@ -1,0 +1,163 @@
+"""One controller in lockstep: the bus is the clock.
+
+Both encoder frames of an instant are the tick; then come the pose and the in-neighbours' path
+states that the schedule says are due. A robot speaks before it listens, so a graph with cycles
+can't deadlock. The torque frames are the answer.
+"""
+
+import time
+from dataclasses import dataclass
+
+import can
+
+from agents.agent import Agent, Phase
+from bridge.barrier import Hellos
+from bridge.frame import EFF, ERR, RTR, Frame
+from bridge.link import Arrival, Link, Publisher
+from bridge.messages import LeaderSpeed, PathState, PoseFix
+from bridge.process import Stop
+from configs.errors import InfrastructureError, PeerLostError
+
+LISTEN_SHARE = 0.75
+"""Part of the tick deadline that a controller waits for messages: it names who is silent before the
+plant names the controller itself."""
+BUS_SHARE = 2.0
+"""Multiple of the tick deadline that a controller waits for its bus: the plant has its own word
+first."""
+
+
+@dataclass(slots=True)
+class Counters:
+    """Where a controller's time went [ns of wall time], and what arrived that nobody understood."""
+
+    ticks: int = 0
+    bus_ns: int = 0
+    listen_ns: int = 0
+    compute_ns: int = 0
+    undecodable: int = 0
+
+
+class LockstepLoop:
+    """Runs one agent on its bus and its link."""
+
+    def __init__(
+        self, agent: Agent, bus: can.BusABC, link: Link, path: Publisher, hellos: Hellos
+    ) -> None:
+        self._agent = agent
+        self._schedule = agent.brief.schedule
+        self._robot = agent.brief.robot
+        self._bus = bus
+        self._link = link
+        self._path = path
+        self._hellos = hellos
+        self.counters = Counters()
+
+    def take(self, arrival: Arrival) -> None:
+        """Give one message to the agent; the tag says what it is."""
+        kind, _, robot = arrival.tag.partition("/")
+        if kind == "path":
+            state = PathState.decode(arrival.payload)
+            if state is not None:
+                self._agent.take_path(robot, state)
+                return
+        elif kind == "pose":
+            fix = PoseFix.decode(arrival.payload)
+            if fix is not None:
+                self._agent.take_pose(fix)
+                return
+        elif kind == "leader":
+            speed = LeaderSpeed.decode(arrival.payload)
+            if speed is not None:
+                self._agent.take_leader(speed)
+                return
+        self.counters.undecodable += 1
+
+    def await_first_frame(self, stop: Stop) -> can.Message | None:
+        """Say hello until the plant's first frame comes; None when told to stop."""
+        deadline = time.monotonic() + self._schedule.start_deadline_s
+        while not stop.requested:
+            self._hellos.say()
+            message = self._receive(0.02)
+            if message is not None:
+                return message
+            if time.monotonic() > deadline:
+                raise InfrastructureError(
+                    f"{self._robot}: the run did not start within"
+                    f" {self._schedule.start_deadline_s:g} s"
+                )
+        return None
+
+    def run(self, first: can.Message, stop: Stop) -> None:
+        """Run from the first frame to the closing tick, or until told to stop.
+
+        Raises:
+            InfrastructureError: bus, pose or a neighbour was silent beyond the tick deadline.
+            PeerLostError: the bus closed.
+        """
+        agent = self._agent
+        counters = self.counters
+        message: can.Message | None = first
+        asked_ns = time.monotonic_ns()
+        while message is not None:
+            now_ns = round(message.timestamp * 1e9)
+            agent.hear(_frame(message), now_ns)
+            if agent.complete(now_ns):
+                came_ns = time.monotonic_ns()
+                tick = self._schedule.tick_of(now_ns)
+                self._listen(tick)
+                heard_ns = time.monotonic_ns()
+                for frame in agent.step(tick) if not stop.requested else agent.leave():
+                    self._bus.send(_message(frame))
+                counters.bus_ns += came_ns - asked_ns
+                counters.listen_ns += heard_ns - came_ns
+                asked_ns = time.monotonic_ns()
+                counters.compute_ns += asked_ns - heard_ns
+                counters.ticks += 1
+                if agent.phase is Phase.DONE:
+                    return
+            message = self._receive(BUS_SHARE * self._schedule.tick_deadline_s)
+        raise InfrastructureError(
+            f"{self._robot}: no encoder frames within"
+            f" {BUS_SHARE * self._schedule.tick_deadline_s:g} s after {counters.ticks} ticks"
+        )
+
+    def _listen(self, tick: int) -> None:
+        """Share when due, then wait for what the schedule owes this tick."""
+        agent = self._agent
+        if self._schedule.shares(tick):
+            self._path.put(agent.share(tick).encode())
+        elif not self._schedule.localises(tick):
+            return
+        deadline = time.monotonic() + LISTEN_SHARE * self._schedule.tick_deadline_s
+        while missing := agent.missing(tick):
+            arrival = self._link.receive(max(0.0, deadline - time.monotonic()))
+            if arrival is None:
+                raise InfrastructureError(
+                    f"{self._robot}: tick {tick}: no {', no '.join(missing)} within"
+                    f" {LISTEN_SHARE * self._schedule.tick_deadline_s:g} s"
+                )
+            self.take(arrival)
+
+    def _receive(self, timeout_s: float) -> can.Message | None:
+        try:
+            return self._bus.recv(timeout_s)
+        except can.CanOperationError as error:
+            raise PeerLostError(
+                f"{self._robot}: lost its bus after {self.counters.ticks} ticks: {error}"
+            ) from error
+
+
+def _frame(message: can.Message) -> Frame:
+    can_id = message.arbitration_id
+    if message.is_extended_id:
+        can_id |= EFF
+    if message.is_error_frame:
+        can_id |= ERR
+    if message.is_remote_frame:
+        return Frame(can_id | RTR, bytes(message.dlc))
+    return Frame(can_id, bytes(message.data))
+
+
+def _message(frame: Frame) -> can.Message:
+    can_id, data = frame
+    return can.Message(arbitration_id=can_id, data=data, is_extended_id=False)

@@ -1,0 +1,275 @@
+"""Reference paths: where a robot should be for a path variable s, equations (1), (10), (11).
+
+    Γ_i(s) = Γ_0(s) + R(θ_d0(s)) l_i(s)                                          (1)
+    θ_d(s) = atan2(y', x')          in (−π, π]
+    v̄_d(s) = √(x'² + y'²)           speed along the path per unit of ṡ           (10)
+    ω̄_d(s) = (x' y'' − x'' y') / (x'² + y'²)    turn rate per unit of ṡ          (11)
+
+Γ_0 is the path of the formation's centre, l_i the robot's offset in axes that turn with it, and
+primes are derivatives by s. A shape gives a point and its first three derivatives (a `Jet`): an
+offset that turns with the path needs θ_d0''. A new shape is one function s ↦ two jets and one line
+in `_centre_path`.
+"""
+
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from math import atan2, cos, sin, sqrt
+from typing import NamedTuple
+
+from configs.brief import (
+    CirclePath,
+    CosinePath,
+    FigureEightPath,
+    FormationOffset,
+    LinePath,
+    ReferencePath,
+    SplinePath,
+    StructureOffset,
+    VaryingOffset,
+    WorldOffset,
+)
+
+
+class Reference(NamedTuple):
+    """What the path asks for at one s."""
+
+    x: float  # [m], world
+    y: float  # [m], world
+    theta: float  # [rad], in (−π, π]
+    v_bar: float  # (10) [m per unit of s]
+    omega_bar: float  # (11) [rad per unit of s]
+
+
+class Jet(NamedTuple):
+    """A value and its first three derivatives by s."""
+
+    value: float
+    d1: float
+    d2: float
+    d3: float
+
+
+class PlanarJet(NamedTuple):
+    """Two coordinates as jets."""
+
+    x: Jet
+    y: Jet
+
+
+RobotPath = Callable[[float], Reference]
+_Curve = Callable[[float], PlanarJet]
+
+
+def robot_path(path: ReferencePath, offset: FormationOffset) -> RobotPath:
+    """The path Γ_i of one robot as a function of its path variable."""
+    if isinstance(path, CosinePath) and isinstance(offset, WorldOffset):
+        return _shifted_cosine(path, offset)
+    centre = _centre_path(path)
+    match offset:
+        case WorldOffset(x_m, y_m):
+            return _shifted(centre, x_m, y_m)
+        case StructureOffset(ahead_m, left_m):
+            rest = PlanarJet(Jet(ahead_m, 0.0, 0.0, 0.0), Jet(left_m, 0.0, 0.0, 0.0))
+            return _turning(centre, lambda _: rest)
+        case VaryingOffset():
+            return _turning(centre, _varying(offset))
+
+
+def _reference(x: Jet, y: Jet) -> Reference:
+    square = x.d1 * x.d1 + y.d1 * y.d1
+    omega_bar = (x.d1 * y.d2 - x.d2 * y.d1) / square
+    return Reference(x.value, y.value, atan2(y.d1, x.d1), sqrt(square), omega_bar)
+
+
+# --- offsets --------------------------------------------------------------------------------------
+
+
+def _shifted_cosine(path: CosinePath, offset: WorldOffset) -> RobotPath:
+    """The paper's case, written out: it is evaluated at every tick."""
+    x_0, y_0 = path.start_x_m + offset.x_m, path.start_y_m + offset.y_m
+    a, k = path.amplitude_m, path.wavenumber_rad_m
+    ak, akk = a * k, a * k * k
+
+    def at(s: float) -> Reference:
+        c = cos(k * s)
+        dy = -ak * sin(k * s)
+        square = 1.0 + dy * dy
+        return Reference(x_0 + s, y_0 + a * c, atan2(dy, 1.0), sqrt(square), -akk * c / square)
+
+    return at
+
+
+def _shifted(centre: _Curve, x_m: float, y_m: float) -> RobotPath:
+    def at(s: float) -> Reference:
+        x, y, theta, v_bar, omega_bar = _reference(*centre(s))
+        return Reference(x + x_m, y + y_m, theta, v_bar, omega_bar)
+
+    return at
+
+
+def _turning(centre: _Curve, offset: _Curve) -> RobotPath:
+    """Γ_0 + R(θ) l with θ = θ_d0(s), differentiated twice; R' = θ' R J, J a quarter turn."""
+
+    def at(s: float) -> Reference:
+        x, y = centre(s)
+        l_x, l_y = offset(s)
+        square = x.d1 * x.d1 + y.d1 * y.d1
+        cross = x.d1 * y.d2 - x.d2 * y.d1
+        turn = cross / square  # θ'
+        turn_rate = (  # θ''
+            x.d1 * y.d3 - x.d3 * y.d1 - 2.0 * turn * (x.d1 * x.d2 + y.d1 * y.d2)
+        ) / square
+        norm = sqrt(square)
+        c, n = x.d1 / norm, y.d1 / norm
+        # In the turning axes: l, l' + θ' J l, l'' + 2 θ' J l' + θ'' J l − θ'² l.
+        u1 = l_x.d1 - turn * l_y.value
+        w1 = l_y.d1 + turn * l_x.value
+        u2 = l_x.d2 - 2.0 * turn * l_y.d1 - turn_rate * l_y.value - turn * turn * l_x.value
+        w2 = l_y.d2 + 2.0 * turn * l_x.d1 + turn_rate * l_x.value - turn * turn * l_y.value
+        return _reference(
+            Jet(
+                x.value + c * l_x.value - n * l_y.value,
+                x.d1 + c * u1 - n * w1,
+                x.d2 + c * u2 - n * w2,
+                0.0,
+            ),
+            Jet(
+                y.value + n * l_x.value + c * l_y.value,
+                y.d1 + n * u1 + c * w1,
+                y.d2 + n * u2 + c * w2,
+                0.0,
+            ),
+        )
+
+    return at
+
+
+def _varying(offset: VaryingOffset) -> _Curve:
+    knots = offset.knots_m
+    ahead, left = offset.ahead_coefficients, offset.left_coefficients
+    first, last = knots[0], knots[-1]
+
+    def at(s: float) -> PlanarJet:
+        inside = min(max(s, first), last)
+        n = min(bisect_right(knots, inside), len(ahead)) - 1
+        u = inside - knots[n]
+        x, y = _polynomial(ahead[n], u), _polynomial(left[n], u)
+        if inside != s:
+            return PlanarJet(Jet(x.value, 0.0, 0.0, 0.0), Jet(y.value, 0.0, 0.0, 0.0))
+        return PlanarJet(x, y)
+
+    return at
+
+
+# --- paths of the centre --------------------------------------------------------------------------
+
+
+def _centre_path(path: ReferencePath) -> _Curve:
+    match path:
+        case LinePath():
+            return _line(path)
+        case CosinePath():
+            return _cosine(path)
+        case CirclePath():
+            return _circle(path)
+        case FigureEightPath():
+            return _figure_eight(path)
+        case SplinePath():
+            return _spline(path)
+
+
+def _line(path: LinePath) -> _Curve:
+    c, n = cos(path.heading_rad), sin(path.heading_rad)
+
+    def at(s: float) -> PlanarJet:
+        return PlanarJet(
+            Jet(path.start_x_m + s * c, c, 0.0, 0.0), Jet(path.start_y_m + s * n, n, 0.0, 0.0)
+        )
+
+    return at
+
+
+def _cosine(path: CosinePath) -> _Curve:
+    def at(s: float) -> PlanarJet:
+        return PlanarJet(
+            Jet(path.start_x_m + s, 1.0, 0.0, 0.0),
+            _add(path.start_y_m, _wave(path.amplitude_m, path.wavenumber_rad_m, s, 1)),
+        )
+
+    return at
+
+
+def _circle(path: CirclePath) -> _Curve:
+    rate = (-1.0 if path.clockwise else 1.0) / path.radius_m
+
+    def at(s: float) -> PlanarJet:
+        turned = s + path.start_angle_rad / rate
+        return PlanarJet(
+            _add(path.centre_x_m, _wave(path.radius_m, rate, turned, 1)),
+            _add(path.centre_y_m, _wave(path.radius_m, rate, turned, 0)),
+        )
+
+    return at
+
+
+def _figure_eight(path: FigureEightPath) -> _Curve:
+    rate = 1.0 / path.half_length_m
+
+    def at(s: float) -> PlanarJet:
+        return PlanarJet(
+            _add(path.centre_x_m, _wave(path.half_length_m, rate, s, 0)),
+            _add(path.centre_y_m, _wave(path.half_width_m, 2.0 * rate, s, 0)),
+        )
+
+    return at
+
+
+def _spline(path: SplinePath) -> _Curve:
+    knots = path.knots_m
+    first, last = knots[0], knots[-1]
+
+    def at(s: float) -> PlanarJet:
+        if path.closed:
+            inside = first + (s - first) % (last - first)
+        else:
+            inside = min(max(s, first), last)
+        n = min(bisect_right(knots, inside), len(knots) - 1) - 1
+        u = inside - knots[n]
+        x = _polynomial(path.x_coefficients[n], u)
+        y = _polynomial(path.y_coefficients[n], u)
+        if path.closed or inside == s:
+            return PlanarJet(x, y)
+        beyond = s - inside
+        return PlanarJet(
+            Jet(x.value + beyond * x.d1, x.d1, 0.0, 0.0),
+            Jet(y.value + beyond * y.d1, y.d1, 0.0, 0.0),
+        )
+
+    return at
+
+
+def _wave(amplitude: float, k: float, s: float, quarters: int) -> Jet:
+    """The jet of amplitude sin(k s + quarters π/2)."""
+    waves = (sin(k * s), cos(k * s), -sin(k * s), -cos(k * s))
+    a = amplitude
+    return Jet(
+        a * waves[quarters % 4],
+        a * k * waves[(quarters + 1) % 4],
+        a * k * k * waves[(quarters + 2) % 4],
+        a * k * k * k * waves[(quarters + 3) % 4],
+    )
+
+
+def _add(constant: float, jet: Jet) -> Jet:
+    return Jet(constant + jet.value, jet.d1, jet.d2, jet.d3)
+
+
+def _polynomial(coefficients: Sequence[float], u: float) -> Jet:
+    """Horner's rule for Σ c_m u^m and its first three derivatives."""
+    value = d1 = d2 = d3 = 0.0
+    for c in reversed(coefficients):
+        d3 = d3 * u + 3.0 * d2
+        d2 = d2 * u + 2.0 * d1
+        d1 = d1 * u + value
+        value = value * u + c
+    return Jet(value, d1, d2, d3)

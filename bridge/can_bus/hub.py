@@ -1,0 +1,310 @@
+"""The hub: all buses of the plant's process, between the emulated drives and their clients.
+
+    deliver    frames of the drives, at one instant, to every client of a bus
+    collect    wait until every paced client has said all it had to say until that instant
+    take       what the clients of a bus sent since the last take
+
+A *paced* client (a controller in lockstep) owes an answer to every packet; bus time stands still
+until it has answered. All others (loggers, host code under test) come, go, crash or stop reading as
+they like: what they send is taken at the next instant, what they don't read is kept for them up to
+`BACKLOG` frames and then dropped and counted. A client's frames go to all other clients of its bus,
+and back to itself only if it asked for that. One thread, one epoll, no clock but for the bound.
+"""
+
+import contextlib
+import select
+import socket
+import time
+from collections import deque
+from collections.abc import Collection, Mapping, Sequence
+
+from bridge.can_bus import packet as wire
+from bridge.frame import Frame
+
+BACKLOG = 100_000
+MAX_CLIENTS = 64
+_READ, _WRITE = select.EPOLLIN, select.EPOLLOUT
+
+
+class Counters:
+    """What went over one bus."""
+
+    __slots__ = ("dropped", "from_clients", "from_drives", "garbage", "joins")
+
+    def __init__(self) -> None:
+        self.from_drives = 0
+        self.from_clients = 0
+        self.dropped = 0
+        self.garbage = 0
+        self.joins = 0
+
+
+class _Client:
+    __slots__ = ("backlog", "bus", "joined", "name", "owes", "own", "paced", "sock")
+
+    def __init__(self, sock: socket.socket, bus: "_Bus") -> None:
+        self.sock = sock
+        self.bus = bus
+        self.name = ""
+        self.joined = self.paced = self.own = self.owes = False
+        self.backlog: deque[bytes] = deque()
+
+
+class _Bus:
+    __slots__ = ("clients", "counters", "listener", "name", "stamp_ns", "taken")
+
+    def __init__(self, name: str, listener: socket.socket) -> None:
+        self.name = name
+        self.listener = listener
+        self.stamp_ns = -1  # not powered up yet
+        self.clients: list[_Client] = []
+        self.taken: list[Frame] = []
+        self.counters = Counters()
+
+
+class Hub:
+    """All buses of one process; `listeners` are bound, listening sockets by bus name."""
+
+    def __init__(self, listeners: Mapping[str, socket.socket], wake_fd: int | None = None) -> None:
+        self._buses = {name: _Bus(name, sock) for name, sock in listeners.items()}
+        self._epoll = select.epoll()
+        self._readers: dict[int, _Client | _Bus | None] = {}
+        self._owing = 0
+        self._left: list[str] = []
+        for bus in self._buses.values():
+            bus.listener.setblocking(False)
+            self._register(bus.listener.fileno(), bus)
+        if wake_fd is not None:
+            self._register(wake_fd, None)
+
+    # --- the drives' end -------------------------------------------------------------------------
+
+    def deliver(self, name: str, stamp_ns: int, frames: Sequence[Frame]) -> None:
+        """Send frames of the drives, in order, to all clients of a bus at bus time `stamp_ns`."""
+        bus = self._buses[name]
+        bus.stamp_ns = stamp_ns
+        bus.counters.from_drives += len(frames)
+        clients = bus.clients
+        if not clients:
+            return
+        together = wire.encode_frames(0, stamp_ns, frames)
+        for client in tuple(clients) if len(clients) > 1 else clients:
+            if client.paced:
+                if not client.owes:
+                    client.owes = True
+                    self._owing += 1
+                self._send(client, together)
+            else:
+                # One frame a packet: a readable descriptor must mean one more frame.
+                for frame in frames:
+                    self._send(client, wire.encode_frames(0, stamp_ns, (frame,)))
+
+    def collect(self, timeout_s: float) -> tuple[str, ...]:
+        """Wait until no paced client owes an answer; return the buses that still owe one.
+
+        Everything else that happens on the buses is handled meanwhile. Returns early when a paced
+        client leaves or the wake-up descriptor is readable.
+        """
+        if not self._owing:
+            self._handle(0.0)
+            return ()
+        deadline = None
+        leavers = len(self._left)
+        while self._owing:
+            woken = self._handle(timeout_s)
+            if not self._owing:
+                break
+            if woken or len(self._left) > leavers:
+                return self._debtors()
+            now = time.monotonic()
+            if deadline is None:
+                deadline = now + timeout_s
+            elif now >= deadline:
+                return self._debtors()
+        return ()
+
+    def take(self, name: str) -> list[Frame]:
+        """What the clients of a bus sent since the last take, in order."""
+        bus = self._buses[name]
+        taken = bus.taken
+        if taken:
+            bus.taken = []
+        return taken
+
+    def await_paced(self, names: Collection[str], timeout_s: float) -> tuple[str, ...]:
+        """Wait until each of these buses has a paced client; return those that have none."""
+        deadline = time.monotonic() + timeout_s
+        while missing := tuple(name for name in names if not self._has_paced(name)):
+            left_s = deadline - time.monotonic()
+            if left_s <= 0:
+                return missing
+            self._handle(left_s)
+        return ()
+
+    def left(self) -> tuple[str, ...]:
+        """Buses whose paced client has gone, in the order in which they went."""
+        return tuple(self._left)
+
+    def counters(self, name: str) -> Counters:
+        """What went over a bus so far."""
+        return self._buses[name].counters
+
+    def close(self, reason: str) -> None:
+        """Say goodbye to all clients and close everything. Idempotent."""
+        goodbye = wire.encode_text(wire.BYE, reason)
+        for bus in self._buses.values():
+            for client in bus.clients:
+                with contextlib.suppress(OSError):
+                    client.sock.send(goodbye)
+            bus.listener.close()
+        for reader in self._readers.values():
+            if isinstance(reader, _Client):
+                reader.sock.close()
+        self._readers.clear()
+        self._epoll.close()
+
+    # --- the clients' end ------------------------------------------------------------------------
+
+    def _handle(self, timeout_s: float) -> bool:
+        """Handle what is ready; return whether the wake-up descriptor was."""
+        woken = False
+        for fd, event in self._epoll.poll(timeout_s):
+            reader = self._readers.get(fd)
+            if isinstance(reader, _Client):
+                if event & _WRITE:
+                    self._drain(reader)
+                if event & ~_WRITE:
+                    self._read(reader)
+            elif reader is not None:
+                self._accept(reader)
+            else:
+                woken = True
+        return woken
+
+    def _read(self, client: _Client) -> None:
+        try:
+            data = client.sock.recv(wire.MAX_BYTES)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self._drop(client)
+            return
+        packet = wire.decode(data)
+        if packet is None or (packet.kind == wire.FRAMES) != client.joined:
+            client.bus.counters.garbage += 1
+        elif packet.kind == wire.FRAMES:
+            self._take_frames(client, packet)
+        elif packet.kind == wire.HELLO:
+            self._welcome(client, packet)
+        else:
+            client.bus.counters.garbage += 1
+
+    def _take_frames(self, client: _Client, packet: wire.Packet) -> None:
+        bus = client.bus
+        frames = packet.frames
+        if frames:
+            bus.taken += frames
+            bus.counters.from_clients += len(frames)
+            if client.own or len(bus.clients) > 1:
+                self._forward(client, frames)
+        if client.owes and packet.flags & wire.DONE and packet.stamp_ns == bus.stamp_ns:
+            client.owes = False
+            self._owing -= 1
+
+    def _forward(self, sender: _Client, frames: Sequence[Frame]) -> None:
+        bus = sender.bus
+        for frame in frames:
+            data = wire.encode_frames(0, bus.stamp_ns, (frame,))
+            for client in tuple(bus.clients):
+                if client is not sender:
+                    self._send(client, data)
+            if sender.own:
+                self._send(sender, wire.encode_frames(wire.OWN, bus.stamp_ns, (frame,)))
+
+    def _accept(self, bus: _Bus) -> None:
+        try:
+            sock, _ = bus.listener.accept()
+        except OSError:
+            return
+        sock.setblocking(False)
+        self._register(sock.fileno(), _Client(sock, bus))
+
+    def _welcome(self, client: _Client, hello: wire.Packet) -> None:
+        bus = client.bus
+        refusal = ""
+        if hello.number != wire.VERSION:
+            refusal = f"it speaks version {hello.number} of the bus's packets, not {wire.VERSION}"
+        elif len(bus.clients) >= MAX_CLIENTS:
+            refusal = f"it has {MAX_CLIENTS} clients already"
+        if refusal:
+            self._send(client, wire.encode_text(wire.REFUSED, refusal))
+            self._drop(client)
+            return
+        client.name = hello.text
+        client.paced = bool(hello.flags & wire.PACED)
+        client.own = bool(hello.flags & wire.OWN)
+        client.joined = True
+        bus.clients.append(client)
+        bus.counters.joins += 1
+        self._send(
+            client, wire.encode_text(wire.WELCOME, count=wire.VERSION, stamp_ns=bus.stamp_ns)
+        )
+
+    def _send(self, client: _Client, data: bytes) -> None:
+        if client.backlog:
+            self._keep(client, data)
+            return
+        try:
+            client.sock.send(data)
+        except BlockingIOError:
+            self._keep(client, data)
+            self._epoll.modify(client.sock.fileno(), _READ | _WRITE)
+        except OSError:
+            self._drop(client)
+
+    def _keep(self, client: _Client, data: bytes) -> None:
+        if len(client.backlog) < BACKLOG:
+            client.backlog.append(data)
+        else:
+            client.bus.counters.dropped += 1
+
+    def _drain(self, client: _Client) -> None:
+        backlog = client.backlog
+        try:
+            while backlog:
+                client.sock.send(backlog[0])
+                backlog.popleft()
+        except BlockingIOError:
+            return
+        except OSError:
+            self._drop(client)
+            return
+        self._epoll.modify(client.sock.fileno(), _READ)
+
+    def _drop(self, client: _Client) -> None:
+        fd = client.sock.fileno()
+        if self._readers.pop(fd, None) is None:
+            return
+        self._epoll.unregister(fd)
+        client.sock.close()
+        if client in client.bus.clients:
+            client.bus.clients.remove(client)
+        if client.owes:
+            client.owes = False
+            self._owing -= 1
+        if client.paced:
+            self._left.append(client.bus.name)
+
+    def _register(self, fd: int, reader: _Client | _Bus | None) -> None:
+        self._readers[fd] = reader
+        self._epoll.register(fd, _READ)
+
+    def _has_paced(self, name: str) -> bool:
+        return any(client.paced for client in self._buses[name].clients)
+
+    def _debtors(self) -> tuple[str, ...]:
+        return tuple(
+            bus.name for bus in self._buses.values() if any(client.owes for client in bus.clients)
+        )

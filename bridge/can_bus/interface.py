@@ -1,0 +1,254 @@
+"""The python-can interface `fleetloop`: an emulated bus that any python-can program opens by name.
+
+    can.Bus(interface="fleetloop", channel="r1")
+
+Works between processes, without kernel module or root; lossless and in order for who reads; no echo
+of own frames unless asked; classic CAN only. `Message.timestamp` is bus time: seconds since the bus
+was powered up. Linux.
+
+`paced=True` is for a controller in lockstep: the bus waits for it. What it sends is gathered and
+goes out when it next waits in `recv` with nothing left to read, which says: that was all until now.
+"""
+
+import select
+import socket
+import struct
+import time
+from collections import deque
+from typing import Any
+
+import can
+from can.typechecking import AutoDetectedConfig, CanFilters
+
+from bridge.can_bus import packet as wire
+from bridge.can_bus import places
+from bridge.frame import EFF, ERR, ID_MASK_11, ID_MASK_29, RTR, Frame
+
+_TIMEVAL = struct.Struct("ll")
+_IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ignore_config"})
+
+
+class FleetloopBus(can.BusABC):
+    """One client of an emulated bus.
+
+    Args:
+        channel: bus name ("r1"), run and bus ("<run>/r1"), or the path of the bus's socket.
+        can_filters: see `can.BusABC.set_filters`.
+        paced: bus time waits for this client.
+        receive_own_messages: frames sent come back, with `is_rx` False.
+        connect_timeout: how long to wait for the bus to answer [s].
+        fd: must be False; the bus is classic CAN.
+
+    Raises:
+        can.CanInitializationError: no such bus, or it refused; the text names what there is.
+    """
+
+    def __init__(
+        self,
+        channel: str,
+        can_filters: CanFilters | None = None,
+        *,
+        paced: bool = False,
+        receive_own_messages: bool = False,
+        connect_timeout: float = 10.0,
+        fd: bool = False,
+        **kwargs: Any,
+    ) -> None:
+        if unknown := sorted(kwargs.keys() - _IGNORED):
+            raise TypeError(f"the fleetloop interface has no option {', '.join(unknown)}")
+        if fd:
+            raise can.CanInitializationError(f"bus {channel!r} is classic CAN: fd must be False")
+        self._paced = paced
+        self._inbox: deque[can.Message] = deque()
+        self._outbox: list[Frame] = []
+        self._stamp_ns = -1
+        self._owes = False
+        self._closed_because: str | None = None
+        self._timeout: float | None = None
+        self.channel = str(channel)
+        self._socket = self._connect(receive_own_messages, connect_timeout)
+        self._send_now = self._socket.send
+        self.channel_info = f"fleetloop bus {self.channel}"
+        self._can_protocol = can.CanProtocol.CAN_20
+        super().__init__(channel=self.channel, can_filters=can_filters)
+
+    def _connect(self, own: bool, timeout_s: float) -> socket.socket:
+        sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        try:
+            path = places.find(self.channel)
+            sock.settimeout(timeout_s)
+            sock.connect(str(path))
+            flags = (wire.PACED if self._paced else 0) | (wire.OWN if own else 0)
+            name = socket.gethostname()
+            sock.send(wire.encode_text(wire.HELLO, name, flags=flags, count=wire.VERSION))
+            answer = wire.decode(sock.recv(wire.MAX_BYTES))
+        except (OSError, places.NoSuchBusError) as error:
+            sock.close()
+            reason = "no answer in time" if isinstance(error, TimeoutError) else str(error)
+            raise can.CanInitializationError(f"bus {self.channel!r}: {reason}") from error
+        if answer is None or answer.kind != wire.WELCOME:
+            sock.close()
+            reason = answer.text if answer is not None else "it closed without a word"
+            raise can.CanInitializationError(f"bus {self.channel!r} refused: {reason}")
+        self._stamp_ns = answer.stamp_ns
+        sock.settimeout(None)
+        return sock
+
+    # --- python-can's contract -------------------------------------------------------------------
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        """The next message, None if none came within `timeout` seconds (None: wait for ever).
+
+        Raises:
+            can.CanOperationError: the bus is gone; everything received before was handed out.
+        """
+        inbox = self._inbox
+        deadline = None
+        while True:
+            while inbox:
+                message = inbox.popleft()
+                if self._filters is None or self._matches_filters(message):
+                    return message
+            if deadline is None:
+                wait_s = timeout
+                if timeout is not None:
+                    deadline = time.monotonic() + timeout
+            else:
+                wait_s = max(0.0, deadline - time.monotonic())
+            if not self._receive(wait_s):
+                return None
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        """Send one classic frame.
+
+        Raises:
+            can.CanOperationError: FD frame, the bus is gone, or no room within `timeout`.
+        """
+        frame = _to_frame(msg)
+        if self._paced:
+            self._outbox.append(frame)
+            return
+        data = wire.encode_frames(0, self._stamp_ns, (frame,))
+        try:
+            self._send_now(data, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            self._send_late(data, timeout)
+        except OSError as error:
+            raise can.CanOperationError(f"bus {self.channel!r} is gone: {error}") from error
+
+    def fileno(self) -> int:
+        """The descriptor that becomes readable with the next frame."""
+        return self._socket.fileno()
+
+    def shutdown(self) -> None:
+        """Leave the bus; what was sent before is delivered. Idempotent."""
+        if self._socket.fileno() >= 0:
+            if self._outbox:
+                self._flush(wire.DONE)
+            self._socket.close()
+        super().shutdown()
+
+    @staticmethod
+    def _detect_available_configs() -> list[AutoDetectedConfig]:
+        return [
+            {"interface": "fleetloop", "channel": places.name_of(path)}
+            for path in places.live_buses()
+        ]
+
+    # --- packets ---------------------------------------------------------------------------------
+
+    def _receive(self, wait_s: float | None) -> bool:
+        """Take one packet; False if none came in time."""
+        polling = wait_s is not None and wait_s <= 0.0
+        if self._owes and not polling:
+            self._owes = False
+            self._flush(wire.DONE)
+        elif self._outbox:
+            self._flush(0)
+        if self._closed_because is not None:
+            raise can.CanOperationError(f"bus {self.channel!r} closed: {self._closed_because}")
+        try:
+            if polling:
+                data = self._socket.recv(wire.MAX_BYTES, socket.MSG_DONTWAIT)
+            else:
+                if wait_s != self._timeout:
+                    self._limit(wait_s)
+                data = self._socket.recv(wire.MAX_BYTES)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            raise can.CanOperationError(f"bus {self.channel!r} is gone: {error}") from error
+        self._take(data)
+        return True
+
+    def _take(self, data: bytes) -> None:
+        packet = wire.decode(data)
+        if packet is not None and packet.kind == wire.FRAMES:
+            self._stamp_ns = packet.stamp_ns
+            self._owes = self._paced
+            timestamp = packet.stamp_ns / 1e9
+            is_rx = not packet.flags & wire.OWN
+            for frame in packet.frames:
+                self._inbox.append(_to_message(frame, timestamp, self.channel, is_rx))
+        elif packet is not None and packet.kind == wire.BYE:
+            self._closed_because = packet.text
+            raise can.CanOperationError(f"bus {self.channel!r} closed: {packet.text}")
+        elif not data:
+            raise can.CanOperationError(f"bus {self.channel!r} closed without a word")
+
+    def _flush(self, flags: int) -> None:
+        frames, self._outbox = self._outbox, []
+        try:
+            self._send_now(wire.encode_frames(flags, self._stamp_ns, frames))
+        except OSError:
+            # The reason, if there is one, is still to be read.
+            return
+
+    def _limit(self, wait_s: float | None) -> None:
+        """Let the kernel bound a receive: one system call instead of two."""
+        seconds = 0 if wait_s is None else max(wait_s, 1e-6)
+        timeval = _TIMEVAL.pack(int(seconds), int(seconds % 1 * 1e6))
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
+        self._timeout = wait_s
+
+    def _send_late(self, data: bytes, timeout: float | None) -> None:
+        poller = select.poll()
+        poller.register(self._socket, select.POLLOUT)
+        if timeout and poller.poll(timeout * 1e3):
+            try:
+                self._send_now(data, socket.MSG_DONTWAIT)
+            except OSError as error:
+                raise can.CanOperationError(f"bus {self.channel!r}: {error}") from error
+            return
+        raise can.CanOperationError(f"bus {self.channel!r}: transmit buffer full")
+
+
+def _to_frame(msg: can.Message) -> Frame:
+    if msg.is_fd:
+        raise can.CanOperationError("the bus is classic CAN: no FD frames")
+    can_id = msg.arbitration_id
+    if msg.is_extended_id:
+        can_id |= EFF
+    if msg.is_error_frame:
+        can_id |= ERR
+    if msg.is_remote_frame:
+        return Frame(can_id | RTR, bytes(msg.dlc))
+    return Frame(can_id, bytes(msg.data))
+
+
+def _to_message(frame: Frame, timestamp: float, channel: str, is_rx: bool) -> can.Message:
+    can_id, data = frame
+    extended = bool(can_id & EFF)
+    remote = bool(can_id & RTR)
+    error = bool(can_id & ERR)
+    return can.Message(
+        timestamp=timestamp,
+        arbitration_id=can_id & (ID_MASK_29 if extended or error else ID_MASK_11),
+        is_extended_id=extended,
+        is_remote_frame=remote,
+        is_error_frame=error,
+        channel=channel,
+        dlc=len(data),
+        data=None if remote else data,
+        is_rx=is_rx,
+    )

@@ -1,0 +1,91 @@
+"""Packets between a bus's hub and its clients: frames of one instant travel together.
+
+    header   kind u8, flags u8, count u16, reserved u32, stamp i64     little endian, 16 bytes
+    frame    can_id u32, length u8, 3 bytes padding, data 8 bytes      as Linux struct can_frame
+
+    kind       from     flags, count and body
+    HELLO      client   flags PACED, OWN; count = protocol version; body = the client's name
+    WELCOME    hub      stamp = bus time; count = protocol version
+    REFUSED    hub      body = reason
+    FRAMES     both     count frames; from the hub OWN: the client's own come back;
+                        from a paced client DONE: all it had to say until `stamp`, which it echoes
+    BYE        hub      body = reason
+
+`stamp` is bus time: nanoseconds since the bus was powered up. What isn't a packet decodes to None.
+"""
+
+import struct
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from bridge.frame import MAX_DATA, Frame
+
+VERSION = 1
+HELLO, WELCOME, REFUSED, FRAMES, BYE = 1, 2, 3, 4, 5
+PACED, OWN, DONE = 1, 2, 4
+MAX_FRAMES = 1024
+MAX_BYTES = 16 + 16 * MAX_FRAMES
+
+_HEADER = struct.Struct("<BBHIq")
+_FRAME = struct.Struct("<IB3x8s")
+_ONE = struct.Struct("<BBHIqIB3x8s")
+_TWO = struct.Struct("<BBHIqIB3x8sIB3x8s")
+
+
+class Packet(NamedTuple):
+    """A decoded packet; `frames` for FRAMES, `text` for the others."""
+
+    kind: int
+    flags: int
+    number: int  # the header's count
+    stamp_ns: int
+    frames: tuple[Frame, ...]
+    text: str
+
+
+def encode_frames(flags: int, stamp_ns: int, frames: Sequence[Frame]) -> bytes:
+    """A FRAMES packet with at most `MAX_FRAMES` frames of at most 8 bytes each."""
+    count = len(frames)
+    if count == 2:
+        (id_1, data_1), (id_2, data_2) = frames
+        return _TWO.pack(
+            FRAMES, flags, 2, 0, stamp_ns, id_1, len(data_1), data_1, id_2, len(data_2), data_2
+        )
+    if count == 1:
+        ((can_id, data),) = frames
+        return _ONE.pack(FRAMES, flags, 1, 0, stamp_ns, can_id, len(data), data)
+    body = [_FRAME.pack(can_id, len(data), data) for can_id, data in frames]
+    return _HEADER.pack(FRAMES, flags, count, 0, stamp_ns) + b"".join(body)
+
+
+def encode_text(
+    kind: int, text: str = "", *, flags: int = 0, count: int = 0, stamp_ns: int = 0
+) -> bytes:
+    """A packet of any other kind."""
+    return _HEADER.pack(kind, flags, count, 0, stamp_ns) + text.encode()[:1024]
+
+
+def decode(packet: bytes) -> Packet | None:
+    """The packet in the bytes, None if there is none."""
+    size = len(packet)
+    if size == _TWO.size and packet[0] == FRAMES and packet[2] == 2 and packet[3] == 0:
+        kind, flags, count, _, stamp, id_1, n_1, data_1, id_2, n_2, data_2 = _TWO.unpack(packet)
+        if n_1 > MAX_DATA or n_2 > MAX_DATA:
+            return None
+        both = (Frame(id_1, data_1[:n_1]), Frame(id_2, data_2[:n_2]))
+        return Packet(kind, flags, count, stamp, both, "")
+    if size < _HEADER.size:
+        return None
+    kind, flags, count, _, stamp = _HEADER.unpack_from(packet)
+    body = packet[_HEADER.size :]
+    if kind == FRAMES:
+        if count > MAX_FRAMES or len(body) != count * _FRAME.size:
+            return None
+        triples = list(_FRAME.iter_unpack(body))
+        if any(length > MAX_DATA for _, length, _ in triples):
+            return None
+        frames = tuple(Frame(can_id, data[:length]) for can_id, length, data in triples)
+        return Packet(kind, flags, count, stamp, frames, "")
+    if HELLO <= kind <= BYE:
+        return Packet(kind, flags, count, stamp, (), body.decode("utf-8", "replace"))
+    return None

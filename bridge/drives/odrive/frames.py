@@ -1,0 +1,187 @@
+"""ODrive CANSimple frames, firmware 0.6.x (vendor manual, "CAN Protocol"): identifiers and layouts.
+
+11-bit identifier = node_id << 5 | command; node 0x3F is unaddressed. Little endian, float is
+IEEE-754 single. Both directions use the same identifier: what the drive says is `Get_...`, what the
+host says is `Set_...`; a remote frame or an empty data frame with a Get's identifier asks for it.
+
+Hosts send other lengths than the table's: missing bytes read as zero, extra ones are ignored.
+"""
+
+import struct
+from enum import IntEnum, IntFlag
+from typing import NamedTuple
+
+from bridge.frame import RTR, Frame
+
+UNADDRESSED = 0x3F
+MAX_NODE = 0x3E
+BITS = 5
+
+
+class Command(IntEnum):
+    """The command part of an identifier."""
+
+    GET_VERSION = 0x00
+    HEARTBEAT = 0x01
+    ESTOP = 0x02
+    GET_ERROR = 0x03
+    RX_SDO = 0x04
+    TX_SDO = 0x05
+    ADDRESS = 0x06
+    SET_AXIS_STATE = 0x07
+    GET_ENCODER_ESTIMATES = 0x09
+    SET_CONTROLLER_MODE = 0x0B
+    SET_INPUT_POS = 0x0C
+    SET_INPUT_VEL = 0x0D
+    SET_INPUT_TORQUE = 0x0E
+    SET_LIMITS = 0x0F
+    SET_TRAJ_VEL_LIMIT = 0x11
+    SET_TRAJ_ACCEL_LIMITS = 0x12
+    SET_TRAJ_INERTIA = 0x13
+    GET_IQ = 0x14
+    GET_TEMPERATURE = 0x15
+    REBOOT = 0x16
+    GET_BUS_VOLTAGE_CURRENT = 0x17
+    CLEAR_ERRORS = 0x18
+    SET_ABSOLUTE_POSITION = 0x19
+    SET_POS_GAIN = 0x1A
+    SET_VEL_GAINS = 0x1B
+    GET_TORQUES = 0x1C
+    GET_POWERS = 0x1D
+    ENTER_DFU_MODE = 0x1F
+
+
+class AxisState(IntEnum):
+    """What an axis is doing."""
+
+    UNDEFINED = 0
+    IDLE = 1
+    STARTUP_SEQUENCE = 2
+    FULL_CALIBRATION_SEQUENCE = 3
+    MOTOR_CALIBRATION = 4
+    ENCODER_INDEX_SEARCH = 6
+    ENCODER_OFFSET_CALIBRATION = 7
+    CLOSED_LOOP_CONTROL = 8
+
+
+class ControlMode(IntEnum):
+    """What the controller of an axis controls."""
+
+    VOLTAGE = 0
+    TORQUE = 1
+    VELOCITY = 2
+    POSITION = 3
+
+
+class InputMode(IntEnum):
+    """How a set-point becomes the controller's input."""
+
+    INACTIVE = 0
+    PASSTHROUGH = 1
+    VEL_RAMP = 2
+    POS_FILTER = 3
+    TRAP_TRAJ = 5
+    TORQUE_RAMP = 6
+    MIRROR = 7
+    TUNING = 8
+
+
+class ProcedureResult(IntEnum):
+    """How the last change of state ended."""
+
+    SUCCESS = 0
+    BUSY = 1
+    CANCELLED = 2
+    DISARMED = 3
+    INVALID_STATE = 13
+    NOT_CALIBRATED = 14
+
+
+class AxisError(IntFlag):
+    """Active errors and disarm reasons."""
+
+    INITIALIZING = 0x1
+    SYSTEM_LEVEL = 0x2
+    TIMING_ERROR = 0x4
+    MISSING_ESTIMATE = 0x8
+    BAD_CONFIG = 0x10
+    DRV_FAULT = 0x20
+    MISSING_INPUT = 0x40
+    DC_BUS_OVER_VOLTAGE = 0x100
+    DC_BUS_UNDER_VOLTAGE = 0x200
+    DC_BUS_OVER_CURRENT = 0x400
+    DC_BUS_OVER_REGEN_CURRENT = 0x800
+    CURRENT_LIMIT_VIOLATION = 0x1000
+    MOTOR_OVER_TEMP = 0x2000
+    INVERTER_OVER_TEMP = 0x4000
+    VELOCITY_LIMIT_VIOLATION = 0x8000
+    POSITION_LIMIT_VIOLATION = 0x10000
+    WATCHDOG_TIMER_EXPIRED = 0x0100_0000
+    ESTOP_REQUESTED = 0x0200_0000
+    SPINOUT_DETECTED = 0x0400_0000
+    BRAKE_RESISTOR_DISARMED = 0x0800_0000
+    THERMISTOR_DISCONNECTED = 0x1000_0000
+    CALIBRATION_ERROR = 0x4000_0000
+
+
+ONE_FLOAT = struct.Struct("<f")
+TWO_FLOATS = struct.Struct("<ff")
+ONE_U32 = struct.Struct("<I")
+TWO_U32 = struct.Struct("<II")
+HEARTBEAT = struct.Struct("<IBBBB")  # axis error, state, procedure result, flags, reserved
+VERSION = struct.Struct("<8B")
+INPUT_POS = struct.Struct("<fhh")  # rev, 0.001 rev/s, 0.001 N·m
+
+
+class Heartbeat(NamedTuple):
+    """What a drive says of itself, cyclically."""
+
+    errors: AxisError
+    state: int
+    result: int
+    trajectory_done: bool
+
+
+def identifier(node: int, command: Command) -> int:
+    """The identifier of a command of a node."""
+    return node << BITS | command
+
+
+def request(node: int, command: Command) -> Frame:
+    """A remote frame that asks a drive for one of its messages."""
+    return Frame(identifier(node, command) | RTR, bytes(8))
+
+
+def is_request(frame: Frame) -> bool:
+    """Whether a frame with a Get's identifier asks: remote, or empty."""
+    return bool(frame.can_id & RTR) or not frame.data
+
+
+def padded(data: bytes, size: int) -> bytes:
+    """The first `size` bytes of data, missing ones zero."""
+    return data[:size].ljust(size, b"\0")
+
+
+def decode_heartbeat(data: bytes) -> Heartbeat:
+    """The content of a heartbeat."""
+    errors, state, result, flags, _ = HEARTBEAT.unpack(padded(data, HEARTBEAT.size))
+    return Heartbeat(AxisError(errors), state, result, bool(flags & 1))
+
+
+def decode_floats(data: bytes) -> tuple[float, float]:
+    """The two floats of a message."""
+    first, second = TWO_FLOATS.unpack(data if len(data) == 8 else padded(data, 8))
+    return first, second
+
+
+def decode_float(data: bytes) -> float:
+    """The first float of a message."""
+    (value,) = ONE_FLOAT.unpack(data if len(data) == 4 else padded(data, 4))
+    return float(value)
+
+
+def error_names(errors: AxisError) -> str:
+    """Names of the error bits, for people."""
+    known = [bit.name for bit in AxisError if bit in errors and bit.name]
+    rest = int(errors) & ~sum(AxisError)
+    return " | ".join(known + ([hex(rest)] if rest else [])) or "no error"

@@ -1,0 +1,102 @@
+"""Every Zenoh key of a run, one function each; stable parts left.
+
+    fleetloop/<run>/robot/<name>/path        s, v̂_r, t; heard by exactly the out-neighbours
+    fleetloop/<run>/robot/<name>/pose        from the localisation system to the robot
+    fleetloop/<run>/robot/<name>/truth       the plant's rows, to the recorder
+    fleetloop/<run>/robot/<name>/telemetry   the controller's rows, to the recorder
+    fleetloop/<run>/leader/speed             v_r; heard by the robots with h_i = 1
+    fleetloop/<run>/@live/<process>          liveliness token: "ready"
+    fleetloop/<run>/@clock/go                from the launcher to the plant
+    fleetloop/<run>/@progress/<process>      how far a process is, to the launcher
+    fleetloop/<run>/@report/<process>        a process's last word, to the launcher
+
+A process is `plant`, `recorder` or `agent/<robot>`. Chunks that begin with @ are verbatim: no
+wildcard of data subscriptions matches them.
+"""
+
+import re
+
+from configs.errors import ScenarioError
+
+_CHUNK = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
+
+
+def path(run: str, robot: str) -> str:
+    """Where a robot says its path variable."""
+    return f"{_run(run)}/robot/{_chunk(robot)}/path"
+
+
+def pose(run: str, robot: str) -> str:
+    """Where the localisation system says a robot's pose."""
+    return f"{_run(run)}/robot/{_chunk(robot)}/pose"
+
+
+def truth(run: str, robot: str) -> str:
+    """Where the plant says what really happened to a robot."""
+    return f"{_run(run)}/robot/{_chunk(robot)}/truth"
+
+
+def telemetry(run: str, robot: str) -> str:
+    """Where a controller says what it used and commanded."""
+    return f"{_run(run)}/robot/{_chunk(robot)}/telemetry"
+
+
+def leader_speed(run: str) -> str:
+    """Where the virtual leader says its speed."""
+    return f"{_run(run)}/leader/speed"
+
+
+def go(run: str) -> str:
+    """Where the launcher says that everybody is ready."""
+    return f"{_run(run)}/@clock/go"
+
+
+def live(run: str, process: str) -> str:
+    """Liveliness token of a process."""
+    return f"{_run(run)}/@live/{_process(process)}"
+
+
+def live_all(run: str) -> str:
+    """All liveliness tokens of a run."""
+    return f"{_run(run)}/@live/**"
+
+
+def progress(run: str, process: str) -> str:
+    """Where a process says how far it is."""
+    return f"{_run(run)}/@progress/{_process(process)}"
+
+
+def progress_all(run: str) -> str:
+    """Progress of all processes."""
+    return f"{_run(run)}/@progress/**"
+
+
+def report(run: str, process: str) -> str:
+    """Where a process says its last word."""
+    return f"{_run(run)}/@report/{_process(process)}"
+
+
+def report_all(run: str) -> str:
+    """Last words of all processes."""
+    return f"{_run(run)}/@report/**"
+
+
+def process_of(key: str) -> str:
+    """The process that a key of the control plane speaks of."""
+    return key.split("/", 3)[3]
+
+
+def _run(run: str) -> str:
+    return f"fleetloop/{_chunk(run)}"
+
+
+def _process(process: str) -> str:
+    return "/".join(_chunk(chunk) for chunk in process.split("/"))
+
+
+def _chunk(name: str) -> str:
+    if not _CHUNK.fullmatch(name):
+        raise ScenarioError(
+            f"{name!r} can't be part of a Zenoh key: letters, digits, and _ . + - after the first"
+        )
+    return name

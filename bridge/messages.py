@@ -1,0 +1,216 @@
+"""Every message over Zenoh and its bytes.
+
+A message is a msgpack array that begins with the version of its layout. Decoding is bounded: too
+long, the wrong types, a wrong length, an unknown version or a number that isn't finite give None,
+never an exception; the caller counts it. Times are scenario time in ns.
+
+    message        layout                                        key
+    PathState      [1, tick, t_ns, s, v_hat]                     robot/<name>/path
+    PoseFix        [1, tick, t_ns, x_m, y_m, theta_rad]          robot/<name>/pose
+    LeaderSpeed    [1, [[from_t_ns, speed_m_s], ...]]            leader/speed
+    Rows           [1, first_tick, length, rows, final]          robot/<name>/truth, telemetry
+    Progress       [1, tick, t_ns, wall_ns]                      @progress/<process>
+    Report         [1, {name: number or text, ...}]              @report/<process>
+    Go             [1]                                           @clock/go
+"""
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any, NamedTuple
+
+import msgpack
+
+VERSION = 1
+MAX_BYTES = 1 << 20
+_MAX_STEPS = 10_000
+_MAX_INT = 1 << 63
+
+Value = int | float | str
+
+
+class PathState(NamedTuple):
+    """What a robot says to its out-neighbours."""
+
+    tick: int
+    t_ns: int
+    s: float  # [m]
+    v_hat: float  # [m/s]
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, *self))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "PathState | None":
+        """The message in the bytes, None if there is none."""
+        fields = _unpack(payload, 5)
+        if fields is None or not (_ints(fields[1:3]) and _finite(fields[3:])):
+            return None
+        return cls(fields[1], fields[2], fields[3], fields[4])
+
+
+class PoseFix(NamedTuple):
+    """What the localisation system says to a robot."""
+
+    tick: int
+    t_ns: int
+    x_m: float
+    y_m: float
+    theta_rad: float
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, *self))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "PoseFix | None":
+        """The message in the bytes, None if there is none."""
+        fields = _unpack(payload, 6)
+        if fields is None or not (_ints(fields[1:3]) and _finite(fields[3:])):
+            return None
+        return cls(*fields[1:])
+
+
+class LeaderSpeed(NamedTuple):
+    """The virtual leader's speed v_r as steps (from scenario time [ns], speed [m/s]), in order."""
+
+    steps: tuple[tuple[int, float], ...]
+
+    def at(self, t_ns: int) -> float:
+        """Speed at a time [m/s]; the first step holds before it too."""
+        steps = self.steps
+        if len(steps) == 1:
+            return steps[0][1]
+        speed = steps[0][1]
+        for from_ns, value in steps:
+            if from_ns > t_ns:
+                break
+            speed = value
+        return speed
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, self.steps))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "LeaderSpeed | None":
+        """The message in the bytes, None if there is none."""
+        fields = _unpack(payload, 2)
+        if fields is None or not isinstance(fields[1], list):
+            return None
+        if not 1 <= len(fields[1]) <= _MAX_STEPS:
+            return None
+        for step in fields[1]:
+            if not (isinstance(step, list) and len(step) == 2):
+                return None
+            if not (_ints(step[:1]) and _finite(step[1:])):
+                return None
+        times = [step[0] for step in fields[1]]
+        return cls(tuple((t, v) for t, v in fields[1])) if times == sorted(times) else None
+
+
+class Rows(NamedTuple):
+    """A block of rows of consecutive ticks, as `bridge.telemetry` packs them."""
+
+    first_tick: int
+    length: int  # rows in the block
+    rows: bytes
+    final: bool  # nothing follows
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, *self))
+
+    @classmethod
+    def decode(cls, payload: bytes, row_bytes: int) -> "Rows | None":
+        """The message in the bytes, None if there is none or its rows aren't `row_bytes` long."""
+        fields = _unpack(payload, 5)
+        if fields is None or not _ints(fields[1:3]):
+            return None
+        _, _, length, rows, final = fields
+        if not isinstance(rows, bytes) or not isinstance(final, bool):
+            return None
+        return cls(*fields[1:]) if len(rows) == length * row_bytes else None
+
+
+class Progress(NamedTuple):
+    """How far a process is."""
+
+    tick: int
+    t_ns: int
+    wall_ns: int  # since control began
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, *self))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "Progress | None":
+        """The message in the bytes, None if there is none."""
+        fields = _unpack(payload, 4)
+        return cls(*fields[1:]) if fields is not None and _ints(fields[1:]) else None
+
+
+class Report(NamedTuple):
+    """The last word of a process: counters by name."""
+
+    values: Mapping[str, Value]
+
+    def number(self, name: str) -> float:
+        """A counter, 0 if the process didn't count it."""
+        value = self.values.get(name, 0)
+        return value if isinstance(value, int | float) else 0
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, dict(self.values)))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "Report | None":
+        """The message in the bytes, None if there is none."""
+        fields = _unpack(payload, 2)
+        if fields is None or not isinstance(fields[1], dict):
+            return None
+        values: dict[Any, Any] = fields[1]
+        for name, value in values.items():
+            if not isinstance(name, str) or not isinstance(value, int | float | str):
+                return None
+        return cls(values)
+
+
+class Go(NamedTuple):
+    """Everybody is ready."""
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION,))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "Go | None":
+        """The message in the bytes, None if there is none."""
+        return cls() if _unpack(payload, 1) is not None else None
+
+
+def _pack(fields: tuple[object, ...]) -> bytes:
+    packed: bytes = msgpack.packb(fields)
+    return packed
+
+
+def _unpack(payload: bytes, length: int) -> list[Any] | None:
+    if len(payload) > MAX_BYTES:
+        return None
+    try:
+        fields = msgpack.unpackb(payload)
+    except (ValueError, TypeError, RecursionError, msgpack.UnpackException):
+        return None
+    if type(fields) is not list or len(fields) != length or fields[0] != VERSION:
+        return None
+    return fields
+
+
+def _ints(values: list[Any]) -> bool:
+    return all(type(value) is int and -_MAX_INT <= value < _MAX_INT for value in values)
+
+
+def _finite(values: list[Any]) -> bool:
+    return all(type(value) is float and isfinite(value) for value in values)

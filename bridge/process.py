@@ -1,0 +1,124 @@
+"""How a role lives as a process: brief, ready, run, stop, exit status; the same for all roles.
+
+A role's process is started by a launcher that holds three lines to it:
+
+    standard input   the pickled brief, length first; afterwards the lifeline: its end means that
+                     the launcher is gone, and the process ends itself in an orderly way
+    standard output  status lines in JSON, one `Status` each: why the process ended
+    standard error   the terminal's: tracebacks, and the last word if the launcher is gone
+
+SIGTERM asks for an orderly stop; SIGINT is the launcher's business. A process that can't stop in
+`GRACE_S` after its lifeline broke ends itself the hard way, so a killed launcher leaves no orphan.
+"""
+
+import gc
+import json
+import os
+import pickle
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import BinaryIO, TypeVar
+
+from configs.errors import FleetloopError, PeerLostError
+
+GRACE_S = 3.0
+_LENGTH_BYTES = 8
+_Brief = TypeVar("_Brief")
+
+
+@dataclass(slots=True)
+class Stop:
+    """Asked for by a signal or by the launcher's end; the role looks at it once per period."""
+
+    requested: bool = False
+    reason: str = ""
+    wake_fd: int = field(default_factory=lambda: os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC))
+    """Becomes readable with the request, for who waits in a poll."""
+
+    def request(self, reason: str) -> None:
+        """Ask for an orderly stop; the first reason stays."""
+        if not self.requested:
+            self.reason = reason
+            self.requested = True
+            os.eventfd_write(self.wake_fd, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """Why a process ended before its time: one line on standard output."""
+
+    error: str
+    exit_code: int
+    peer_lost: bool
+
+    def to_line(self) -> bytes:
+        """The line, with its newline."""
+        return json.dumps([self.error, self.exit_code, self.peer_lost]).encode() + b"\n"
+
+    @classmethod
+    def from_line(cls, line: bytes) -> "Status | None":
+        """The status that a line says, None if it says none."""
+        try:
+            error, exit_code, peer_lost = json.loads(line)
+        except (ValueError, TypeError):
+            return None
+        return cls(str(error), int(exit_code), bool(peer_lost))
+
+
+def pack_brief(brief: object) -> bytes:
+    """Bytes for the standard input of a role's process."""
+    body = pickle.dumps(brief)
+    return len(body).to_bytes(_LENGTH_BYTES, "little") + body
+
+
+def serve(kind: type[_Brief], body: Callable[[_Brief, Stop], None], *, name: str) -> int:
+    """Take the brief from standard input, run `body` until it returns, return the exit status."""
+    if sys.stdin.isatty():
+        print(f"{name}: started by `fleetloop run`, not by hand", file=sys.stderr)  # noqa: T201
+        return 2
+    brief = _read_brief(sys.stdin.buffer)
+    if not isinstance(brief, kind):
+        print(f"{name}: no {kind.__name__} on standard input", file=sys.stderr)  # noqa: T201
+        return 2
+    stop = Stop()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: stop.request("asked to stop"))
+    threading.Thread(target=_watch_lifeline, args=(stop,), daemon=True).start()
+    try:
+        body(brief, stop)
+    except FleetloopError as error:
+        _say(Status(str(error), error.exit_code, isinstance(error, PeerLostError)), name)
+        return error.exit_code
+    return 0
+
+
+def settle_memory() -> None:
+    """Call once before a periodic loop: what start-up allocated is never scanned again."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000, 50, 100)
+
+
+def _read_brief(stream: BinaryIO) -> object:
+    length = int.from_bytes(stream.read(_LENGTH_BYTES), "little")
+    body = stream.read(length)
+    # The pipe comes from the process that started this one, which could run anything anyway.
+    return pickle.loads(body) if body and len(body) == length else None
+
+
+def _watch_lifeline(stop: Stop) -> None:
+    while os.read(0, 4096):
+        pass
+    stop.request("the launcher is gone")
+    threading.Event().wait(GRACE_S)
+    os._exit(3)
+
+
+def _say(status: Status, name: str) -> None:
+    try:
+        os.write(1, status.to_line())
+    except OSError:
+        print(f"{name}: {status.error}", file=sys.stderr)  # noqa: T201

@@ -1,0 +1,208 @@
+"""A link over Zenoh: client sessions to one router, which enforces the graph.
+
+Client mode, multicast and gossip off, so that nobody can talk past the router; shared memory off;
+reliable, blocking, express, real-time priority: nothing is dropped, nothing waits for a batch.
+Subscribers run on Zenoh's network thread and only queue. Every session is closed in a `with`: one
+that isn't can keep its process from ending.
+"""
+
+import contextlib
+import json
+import re
+import socket
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import zenoh
+from zenoh.handlers import Callback
+
+from bridge.access import AccessPlan
+from bridge.link import Arrival, Inbox, Publisher
+from configs.brief import NetworkLink
+from configs.errors import InfrastructureError
+
+LEASE_MS = 1000
+"""A peer that is silent for this long is gone."""
+_PORT_TRIES = 5
+
+
+class ZenohLink:
+    """One Zenoh session as a `bridge.link.Link`."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session = session
+        self._inbox = Inbox()
+        self._declared: list[object] = []
+        self.receive = self._inbox.receive
+
+    def publisher(self, key: str) -> Publisher:
+        """A publisher on `key`; a put blocks rather than drops."""
+        return self._session.declare_publisher(
+            key,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            priority=zenoh.Priority.REAL_TIME,
+            express=True,
+            reliability=zenoh.Reliability.RELIABLE,
+            allowed_destination=zenoh.Locality.REMOTE,
+        )
+
+    def subscribe(self, key: str, tag: str) -> None:
+        """Queue what others put on `key`, marked with `tag`."""
+        put = self._inbox.put
+
+        def take(sample: zenoh.Sample) -> None:
+            put(Arrival(tag, str(sample.key_expr), sample.payload.to_bytes()))
+
+        self._declared.append(
+            self._session.declare_subscriber(
+                key, Callback(take, indirect=False), allowed_origin=zenoh.Locality.REMOTE
+            )
+        )
+
+    def declare_live(self, key: str) -> None:
+        """Hold a liveliness token on `key`."""
+        self._declared.append(self._session.liveliness().declare_token(key))
+
+    def watch_live(self, key_expr: str, tag: str) -> None:
+        """Queue b"1" for every token that is there or comes, b"0" for every one that goes."""
+        put = self._inbox.put
+
+        def take(sample: zenoh.Sample) -> None:
+            alive = sample.kind == zenoh.SampleKind.PUT
+            put(Arrival(tag, str(sample.key_expr), b"1" if alive else b"0"))
+
+        self._declared.append(
+            self._session.liveliness().declare_subscriber(
+                key_expr, Callback(take, indirect=False), history=True
+            )
+        )
+
+    def close(self) -> None:
+        """Close the session and all that it declared."""
+        self._declared.clear()
+        if not self._session.is_closed():
+            self._session.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class RouterLink(ZenohLink):
+    """The launcher's link: its session is the router."""
+
+    def __init__(self, session: zenoh.Session, endpoint: str) -> None:
+        super().__init__(session)
+        self.endpoint = endpoint
+
+
+def open_client(network: NetworkLink, timeout_s: float) -> ZenohLink:
+    """Connect to the router as `network.user`.
+
+    Raises:
+        InfrastructureError: nobody answers there, or the login was refused.
+    """
+    config = _config("client")
+    _set(config, "connect/endpoints", [network.endpoint])
+    _set(config, "connect/timeout_ms", int(timeout_s * 1000))
+    _set(config, "transport/auth/usrpwd/user", network.user)
+    _set(config, "transport/auth/usrpwd/password", network.password)
+    failure = (
+        f"{network.user}: no session with the router at {network.endpoint} within {timeout_s:g} s:"
+        " nobody listens there, or it refused the login"
+    )
+    return ZenohLink(_open_bounded(config, timeout_s + 1.0, failure))
+
+
+@contextlib.contextmanager
+def open_router(endpoint: str | None, access: AccessPlan, folder: Path) -> Iterator[RouterLink]:
+    """Be the router at `endpoint`, or at a free loopback port if None, and enforce `access`.
+
+    `folder` must be private: the user dictionary is written there while the router opens.
+
+    Raises:
+        InfrastructureError: the endpoint is taken or can't be listened on.
+    """
+    dictionary = folder / "users"
+    dictionary.touch(mode=0o600)
+    dictionary.write_text(access.dictionary(), "utf-8")
+    try:
+        link = _listen(endpoint, access, dictionary)
+    finally:
+        dictionary.unlink()
+    with link:
+        yield link
+
+
+def _listen(endpoint: str | None, access: AccessPlan, dictionary: Path) -> RouterLink:
+    tries = 1 if endpoint else _PORT_TRIES
+    reason = ""
+    for _ in range(tries):
+        at = endpoint or f"tcp/127.0.0.1:{_free_port()}"
+        config = _config("router")
+        _set(config, "listen/endpoints", [at])
+        _set(config, "transport/auth/usrpwd/dictionary_file", str(dictionary))
+        config.insert_json5("access_control", access.access_control())
+        try:
+            return RouterLink(_open_bounded(config, 10.0, f"{at}: the router did not open"), at)
+        except InfrastructureError as error:
+            reason = str(error)
+    raise InfrastructureError(
+        f"can't listen at {endpoint or 'any loopback port'}: already in use, or no such address"
+        f" ({reason})"
+    )
+
+
+def _config(mode: str) -> zenoh.Config:
+    zenoh.init_log_from_env_or("off")
+    config = zenoh.Config()
+    _set(config, "mode", mode)
+    _set(config, "scouting/multicast/enabled", False)
+    _set(config, "scouting/gossip/enabled", False)
+    _set(config, "scouting/delay", 0)
+    _set(config, "transport/shared_memory/enabled", False)
+    _set(config, "transport/link/tx/lease", LEASE_MS)
+    return config
+
+
+def _set(config: zenoh.Config, path: str, value: object) -> None:
+    config.insert_json5(path, json.dumps(value))
+
+
+def _open_bounded(config: zenoh.Config, timeout_s: float, failure: str) -> zenoh.Session:
+    """Open in a thread of its own: a peer that accepts and never answers would hang it."""
+    result: list[zenoh.Session | Exception] = []
+
+    def open_session() -> None:
+        try:
+            result.append(zenoh.open(config))
+        except zenoh.ZError as error:
+            result.append(error)
+
+    opener = threading.Thread(target=open_session, daemon=True)
+    opener.start()
+    opener.join(timeout_s)
+    if not result:
+        raise InfrastructureError(failure)
+    session = result[0]
+    if isinstance(session, Exception):
+        reason = re.sub(r" at /\S+:\d+\.", "", str(session))  # places in Zenoh's own source
+        raise InfrastructureError(f"{failure} ({reason})")
+    return session
+
+
+def _free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port

@@ -1,0 +1,187 @@
+"""Scenario → briefs: what each process of a run is told at its start."""
+
+from configs import sections
+from configs.brief import (
+    AgentBrief,
+    Body,
+    CirclePath,
+    Coordination,
+    CosinePath,
+    Disturbance,
+    DriveLink,
+    DriveModel,
+    FigureEightPath,
+    FormationOffset,
+    Gains,
+    LeaderBrief,
+    LinePath,
+    NetworkLink,
+    PlantBrief,
+    Pose,
+    ReferencePath,
+    RobotBrief,
+    Schedule,
+    Settings,
+    SplinePath,
+    StructureOffset,
+    VaryingOffset,
+    Wheels,
+    WorldOffset,
+)
+from configs.scenario import Scenario
+from configs.splines import Ends, chord_lengths, quintic_spline
+
+UNLIMITED = 1e6
+"""A limit that nothing reaches: [A], [rev/s]."""
+SERIAL_NUMBER = 0x3858_0000_0000
+
+
+def schedule(scenario: Scenario, speed: float = 0.0) -> Schedule:
+    """The ticks of a run; held to a slow `speed`, everybody waits longer for the next tick."""
+    clock = scenario.clock
+    h = clock.control_period_s
+    return Schedule(
+        period_ns=round(h * 1e9),
+        ticks=round(scenario.duration_s / h),
+        countdown_ticks=round(clock.countdown_s / h),
+        share_every=round(clock.share_period_s / h),
+        localise_every=round(clock.localisation_period_s / h),
+        tick_deadline_s=clock.tick_deadline_s + (h / speed if speed > 0 else 0.0),
+        start_deadline_s=clock.start_deadline_s,
+    )
+
+
+def agent_brief(
+    scenario: Scenario, name: str, *, network: NetworkLink, bus: Settings, speed: float = 0.0
+) -> AgentBrief:
+    """What the controller of robot `name` is told."""
+    robot = next(robot for robot in scenario.robot if robot.name == name)
+    control = scenario.control_of(robot)
+    body = scenario.body_of(robot)
+    coordination = scenario.coordination
+    graph = scenario.topology
+    drive = _drive_model(scenario, 0)
+    return AgentBrief(
+        robot=name,
+        law=control.law,
+        wheels=Wheels(body.wheel_radius_m, body.half_track_m),
+        gains=Gains(**control.model_dump(exclude={"law"})),
+        coordination=Coordination(
+            p=coordination.p,
+            q=coordination.q,
+            s_0=robot.s_0,
+            mu_0=coordination.mu_0,
+            v_hat_0=coordination.v_hat_0,
+            age_limit_s=coordination.age_limit_s,
+            silence_limit_s=coordination.silence_limit_s,
+        ),
+        path=reference_path(scenario.path),
+        offset=formation_offset(robot.offset),
+        hears=graph.hears[name],
+        hears_leader=name in graph.leader,
+        localisation=scenario.localisation.source,
+        schedule=schedule(scenario, speed),
+        drives=DriveLink(
+            protocol=drive.protocol,
+            right_node=scenario.drive.right_node,
+            left_node=scenario.drive.left_node,
+            encoder_period_ns=drive.encoder_period_ns,
+            velocity_limit_rev_s=drive.velocity_limit_rev_s,
+            current_limit_A=drive.current_limit_A,
+        ),
+        bus=bus,
+        network=network,
+    )
+
+
+def plant_brief(
+    scenario: Scenario, *, network: NetworkLink, runtime_folder: str = "", speed: float = 0.0
+) -> PlantBrief:
+    """What the plant is told."""
+    ticks = schedule(scenario, speed)
+    return PlantBrief(
+        robots=tuple(_robot(scenario, n, robot) for n, robot in enumerate(scenario.robot, 1)),
+        schedule=ticks,
+        substeps=max(1, -(-ticks.period_ns // round(scenario.clock.plant_step_s * 1e9))),
+        speed=speed,
+        seed=scenario.seed,
+        bitrate_bit_s=scenario.bus.bitrate_bit_s,
+        runtime_folder=runtime_folder,
+        network=network,
+    )
+
+
+def leader_brief(scenario: Scenario) -> LeaderBrief:
+    """What the virtual leader says, from the start and from each of its steps on."""
+    leader = scenario.leader
+    later = tuple((round(step.t_s * 1e9), step.speed_m_s) for step in leader.steps)
+    return LeaderBrief(((0, leader.speed_m_s), *later))
+
+
+def reference_path(path: sections.PathShape) -> ReferencePath:
+    """The centre's path as the controllers evaluate it."""
+    match path:
+        case sections.Line():
+            return LinePath(*path.start_m, path.heading_rad)
+        case sections.Cosine():
+            return CosinePath(*path.start_m, path.amplitude_m, path.wavenumber_rad_m)
+        case sections.Circle():
+            return CirclePath(*path.centre_m, path.radius_m, path.start_angle_rad, path.clockwise)
+        case sections.FigureEight():
+            return FigureEightPath(*path.centre_m, path.half_length_m, path.half_width_m)
+        case sections.Spline():
+            points = [*path.points_m, path.points_m[0]] if path.closed else list(path.points_m)
+            knots = chord_lengths(points)
+            ends: Ends = "periodic" if path.closed else "natural"
+            x, y = (quintic_spline(knots, [point[n] for point in points], ends) for n in (0, 1))
+            return SplinePath(knots, x, y, path.closed)
+
+
+def formation_offset(offset: sections.Offset) -> FormationOffset:
+    """A robot's place in the formation as its controller evaluates it."""
+    match offset:
+        case sections.World():
+            return WorldOffset(offset.x_m, offset.y_m)
+        case sections.Structure():
+            return StructureOffset(offset.ahead_m, offset.left_m)
+        case sections.Varying():
+            knots = tuple(knot.s_m for knot in offset.knots)
+            ahead = quintic_spline(knots, [knot.ahead_m for knot in offset.knots], "clamped")
+            left = quintic_spline(knots, [knot.left_m for knot in offset.knots], "clamped")
+            return VaryingOffset(knots, ahead, left)
+
+
+def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief:
+    disturbance = robot.disturbance or scenario.disturbance
+    return RobotBrief(
+        robot=robot.name,
+        bus=robot.name,
+        body=Body(**scenario.body_of(robot).model_dump()),
+        disturbance=Disturbance(disturbance.amplitude_N_m, disturbance.rate_rad_s, float(number)),
+        drive=_drive_model(scenario, number),
+        right_node=scenario.drive.right_node,
+        left_node=scenario.drive.left_node,
+        pose=Pose(robot.pose.x_m, robot.pose.y_m, robot.pose.theta_rad),
+        v_m_s=robot.v_m_s,
+        omega_rad_s=robot.omega_rad_s,
+    )
+
+
+def _drive_model(scenario: Scenario, number: int) -> DriveModel:
+    drive = scenario.drive
+    limited = drive.preset == "limited"
+    return DriveModel(
+        protocol=drive.protocol,
+        torque_constant_N_m_A=drive.torque_constant_N_m_A,
+        current_limit_A=drive.current_limit_A if limited else UNLIMITED,
+        velocity_limit_rev_s=drive.velocity_limit_rev_s if limited else UNLIMITED,
+        velocity_gain_N_m_s_rev=drive.velocity_gain_N_m_s_rev,
+        overspeed_ratio=drive.overspeed_ratio,
+        torque_limiters=limited,
+        heartbeat_period_ns=round(drive.heartbeat_period_s * 1e9),
+        encoder_period_ns=round(scenario.clock.control_period_s * 1e9),
+        torques_period_ns=round(drive.torques_period_s * 1e9),
+        watchdog_ns=round(drive.watchdog_s * 1e9),
+        zero_torque_on_disarm=drive.zero_torque_on_disarm,
+        serial_number=SERIAL_NUMBER + 2 * number,
+    )

@@ -1,0 +1,157 @@
+"""What relates the sections of a scenario to each other; all problems at once, none raised."""
+
+import itertools
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from configs.scenario import ETSRO, Scenario
+from configs.topology import parse_edge
+
+
+class Problem(NamedTuple):
+    """One thing wrong with a scenario."""
+
+    key: str  # as in the file, robots by name
+    value: object
+    right: str  # what would be right
+
+
+def cross_problems(scenario: Scenario) -> list[Problem]:
+    """All problems that no section can see alone."""
+    problems = [*_names(scenario), *_periods(scenario), *_drives(scenario), *_expects(scenario)]
+    edges = list(_edges(scenario))
+    if not problems and not edges:
+        edges = list(_graph(scenario))
+    return problems + edges
+
+
+def _names(scenario: Scenario) -> Iterator[Problem]:
+    seen: set[str] = set()
+    for robot in scenario.robot:
+        if robot.name in seen:
+            yield Problem("robot.name", robot.name, "two robots have this name; make it unique")
+        seen.add(robot.name)
+        known = {ETSRO, *scenario.robot_types}
+        if robot.type not in known:
+            right = f"no such robot type; known: {', '.join(sorted(known))}"
+            yield Problem(f"robot.{robot.name}.type", robot.type, right)
+        if robot.offset.kind == "varying":
+            places = [knot.s_m for knot in robot.offset.knots]
+            if any(b <= a for a, b in itertools.pairwise(places)):
+                yield Problem(f"robot.{robot.name}.offset.knots", places, "s_m must increase")
+    if scenario.path.kind == "spline":
+        points = scenario.path.points_m
+        if any(a == b for a, b in itertools.pairwise(points)):
+            yield Problem("path.points_m", points, "two neighbouring points are the same")
+        if scenario.path.closed and len(points) < 3:
+            yield Problem("path.points_m", points, "a closed spline needs three points or more")
+    steps = [step.t_s for step in scenario.leader.steps]
+    if any(b <= a for a, b in itertools.pairwise(steps)):
+        yield Problem("leader.steps", steps, "t_s must increase")
+
+
+def _periods(scenario: Scenario) -> Iterator[Problem]:
+    clock = scenario.clock
+    period_ns = clock.control_period_s * 1e9
+    if abs(period_ns - round(period_ns)) > 1e-3 or round(period_ns) < 1000:
+        yield Problem(
+            "clock.control_period_s",
+            clock.control_period_s,
+            "must be a whole number of nanoseconds, 1 µs or more",
+        )
+        return
+    multiples = {
+        "clock.share_period_s": clock.share_period_s,
+        "clock.localisation_period_s": clock.localisation_period_s,
+        "clock.countdown_s": clock.countdown_s,
+        "duration_s": scenario.duration_s,
+    }
+    for key, value in multiples.items():
+        ratio = value / clock.control_period_s
+        least = 0 if key == "clock.countdown_s" else 1
+        if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < least:
+            below = max(int(ratio), 1) * clock.control_period_s
+            yield Problem(
+                key,
+                value,
+                f"must be a whole multiple of clock.control_period_s = {clock.control_period_s:g}"
+                f", for example {below:g}",
+            )
+    shortest = 3 * clock.control_period_s + 2 * scenario.drive.heartbeat_period_s
+    if clock.countdown_s < shortest:
+        yield Problem(
+            "clock.countdown_s",
+            clock.countdown_s,
+            f"too short to arm the drives: three control periods and two heartbeats need"
+            f" {shortest:g} s or more",
+        )
+
+
+def _drives(scenario: Scenario) -> Iterator[Problem]:
+    drive = scenario.drive
+    if drive.right_node == drive.left_node:
+        yield Problem("drive.left_node", drive.left_node, "must differ from drive.right_node")
+    if drive.watchdog_s and drive.watchdog_s < 2 * scenario.clock.control_period_s:
+        yield Problem(
+            "drive.watchdog_s",
+            drive.watchdog_s,
+            "0 (off) or at least two control periods, or every torque comes too late",
+        )
+
+
+def _expects(scenario: Scenario) -> Iterator[Problem]:
+    for n, expect in enumerate(scenario.expect):
+        where = f"expect.{n}"
+        for robot in expect.robots or ():
+            if robot not in scenario.names:
+                yield Problem(f"{where}.robots", robot, _known(scenario))
+        if expect.max_abs is None and expect.min is None and expect.max is None:
+            yield Problem(where, expect.signal, "give max_abs, min or max")
+        end_s = expect.to_s if expect.to_s is not None else scenario.duration_s
+        if expect.from_s >= end_s:
+            yield Problem(f"{where}.from_s", expect.from_s, f"must be below the end, {end_s:g} s")
+
+
+def _edges(scenario: Scenario) -> Iterator[Problem]:
+    graph = scenario.graph
+    if graph.edges is not None and graph.generator is not None:
+        yield Problem("graph.generator", graph.generator, "give either edges or a generator")
+    for text in graph.edges or ():
+        edge = parse_edge(text)
+        if edge is None:
+            yield Problem("graph.edges", text, 'must read "r1 -> r2": r2 hears r1')
+            continue
+        for robot in edge:
+            if robot not in scenario.names:
+                yield Problem("graph.edges", text, f"{robot}: {_known(scenario)}")
+        if edge[0] == edge[1]:
+            yield Problem("graph.edges", text, "a robot doesn't hear itself")
+    for robot in graph.leader or ():
+        if robot not in scenario.names:
+            yield Problem("graph.leader", robot, _known(scenario))
+    if graph.leader is not None and not graph.leader:
+        yield Problem("graph.leader", [], "at least one robot must hear the leader")
+
+
+def _graph(scenario: Scenario) -> Iterator[Problem]:
+    graph = scenario.topology
+    edges = [f"{a} -> {b}" for a, b in graph.edges]
+    unreached = graph.unreached_from(graph.leader)
+    if unreached:
+        yield Problem(
+            "graph.leader",
+            list(graph.leader),
+            f"the leader does not reach {', '.join(unreached)}: add an edge to them from a robot"
+            " that it reaches, or a leader link",
+        )
+    if not graph.roots():
+        yield Problem(
+            "graph.edges",
+            edges,
+            "no robot reaches all others (the graph has no root), so s_i − s_j would never vanish:"
+            " join the parts by an edge",
+        )
+
+
+def _known(scenario: Scenario) -> str:
+    return f"no such robot; known: {', '.join(scenario.names)}"

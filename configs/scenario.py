@@ -1,0 +1,93 @@
+"""The scenario file as a type: everything that the processes of one run have to agree on.
+
+`configs.loading.load` reads and checks a file; nobody checks it again. A scenario says *what* a run
+is; where its processes and buses are is another file's business.
+"""
+
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from configs.sections import (
+    Body,
+    Bus,
+    Clock,
+    Control,
+    CoordinationSection,
+    Cosine,
+    Disturbance,
+    Drive,
+    Expect,
+    GraphSection,
+    Leader,
+    Localisation,
+    Name,
+    Network,
+    PathShape,
+    Positive,
+    RandomGraph,
+    Robot,
+    Section,
+)
+from configs.topology import Graph, generated, parse_edge, random_rooted
+
+ETSRO = "etsro"
+"""The robot type that every scenario knows: the paper's."""
+
+
+class Scenario(Section):
+    """One experiment."""
+
+    schema_: Literal[1] = Field(alias="schema", description="version of this format")
+    name: Name
+    description: str = ""
+    duration_s: Positive = 30.0
+    seed: Annotated[int, Field(ge=0)] = 1
+    clock: Clock = Clock()
+    path: PathShape = Cosine(kind="cosine", start_m=(-3.5, 0.0))
+    leader: Leader = Leader()
+    graph: GraphSection = GraphSection(generator="chain")
+    control: Control = Control()
+    coordination: CoordinationSection = CoordinationSection()
+    localisation: Localisation = Localisation()
+    bus: Bus = Bus()
+    drive: Drive = Drive()
+    disturbance: Disturbance = Disturbance()
+    network: Network = Network()
+    robot_types: dict[Name, Body] = Field(default_factory=dict)
+    robot: Annotated[tuple[Robot, ...], Field(min_length=1, max_length=256, strict=False)]
+    expect: Annotated[tuple[Expect, ...], Field(strict=False)] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The robots, in the order of the file."""
+        return tuple(robot.name for robot in self.robot)
+
+    @property
+    def topology(self) -> Graph:
+        """The directed graph, its generator carried out."""
+        leader = self.graph.leader if self.graph.leader is not None else self.names[:1]
+        return Graph.of(self.names, self._edges(), leader)
+
+    def body_of(self, robot: Robot) -> Body:
+        """The body of a robot: its type's, with what the robot says differently."""
+        kind = self.robot_types.get(robot.type, Body())
+        return Body(**{**kind.model_dump(), **robot.body.model_dump(exclude_none=True)})
+
+    def control_of(self, robot: Robot) -> Control:
+        """The law and gains of a robot: the fleet's, with what the robot says differently."""
+        changes = robot.control.model_dump(exclude_none=True)
+        return Control(**{**self.control.model_dump(), **changes})
+
+    def _edges(self) -> Sequence[tuple[str, str]]:
+        graph = self.graph
+        if graph.edges is not None:
+            return [edge for text in graph.edges if (edge := parse_edge(text)) is not None]
+        if isinstance(graph.generator, RandomGraph):
+            return random_rooted(
+                self.names,
+                max_in_degree=graph.generator.max_in_degree,
+                seed=graph.generator.seed,
+            )
+        return generated(graph.generator or "chain", self.names)

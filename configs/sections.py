@@ -1,0 +1,312 @@
+"""The sections of a scenario file as types: closed, frozen, every key with its unit in its name.
+
+Defaults are the paper's (section 4), and where it is silent those that its numbers were checked
+with. What relates sections to each other is checked in `configs.scenario`.
+"""
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional
+
+from pydantic import BaseModel, ConfigDict, Field, create_model
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=32)]
+Point = Annotated[tuple[Finite, Finite], Field(strict=False)]
+Eight = Annotated[
+    tuple[Finite, Finite, Finite, Finite, Finite, Finite, Finite, Finite], Field(strict=False)
+]
+
+
+class Section(BaseModel):
+    """One table of the file: unknown keys are errors, values don't change type or later."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class Clock(Section):
+    """Who waits for whom, and how often what happens."""
+
+    mode: Literal["lockstep"] = Field(
+        "lockstep", description="the plant owns time, all others answer"
+    )
+    control_period_s: Positive = Field(0.001, description="one tick: sense, decide, act")
+    share_period_s: Positive = Field(0.02, description="path variables go to the out-neighbours")
+    localisation_period_s: Positive = Field(0.01, description="poses go to the robots")
+    plant_step_s: Positive = Field(0.0005, description="longest integration step of the plant")
+    countdown_s: NotNegative = Field(0.25, description="for arming the drives, before t = 0")
+    tick_deadline_s: Positive = Field(2.0, description="longest wait within a tick, wall clock")
+    start_deadline_s: Positive = Field(20.0, description="longest wait for everybody to be ready")
+    on_late: Literal["abort"] = Field("abort", description="what happens when somebody is late")
+
+
+class Line(Section):
+    """A straight line."""
+
+    kind: Literal["line"]
+    start_m: Point = (0.0, 0.0)
+    heading_rad: Finite = 0.0
+
+
+class Cosine(Section):
+    """x = start + s, y = start + amplitude cos(wavenumber s)."""
+
+    kind: Literal["cosine"]
+    start_m: Point = (0.0, 0.0)
+    amplitude_m: Finite = 1.0
+    wavenumber_rad_m: Positive = 1.0
+
+
+class Circle(Section):
+    """A circle, s in metres of arc."""
+
+    kind: Literal["circle"]
+    centre_m: Point = (0.0, 0.0)
+    radius_m: Positive
+    start_angle_rad: Finite = 0.0
+    clockwise: bool = False
+
+
+class FigureEight(Section):
+    """The lemniscate of Gerono."""
+
+    kind: Literal["figure_eight"]
+    centre_m: Point = (0.0, 0.0)
+    half_length_m: Positive
+    half_width_m: Positive
+
+
+class Spline(Section):
+    """A quintic spline through points; s is the length of the polygon through them."""
+
+    kind: Literal["spline"]
+    points_m: Annotated[tuple[Point, ...], Field(min_length=2, max_length=200, strict=False)]
+    closed: bool = False
+
+
+PathShape = Annotated[Line | Cosine | Circle | FigureEight | Spline, Field(discriminator="kind")]
+
+
+class World(Section):
+    """Offset fixed in world axes."""
+
+    kind: Literal["world"]
+    x_m: Finite = 0.0
+    y_m: Finite = 0.0
+
+
+class Structure(Section):
+    """Offset fixed in the axes of the formation, which turn with the path."""
+
+    kind: Literal["structure"]
+    ahead_m: Finite = 0.0
+    left_m: Finite = 0.0
+
+
+class Knot(Section):
+    """Offset at one place of the path."""
+
+    s_m: Finite
+    ahead_m: Finite
+    left_m: Finite
+
+
+class Varying(Section):
+    """Offset that changes along the path, smoothly through these knots and constant outside."""
+
+    kind: Literal["varying"]
+    knots: Annotated[tuple[Knot, ...], Field(min_length=2, max_length=200, strict=False)]
+
+
+Offset = Annotated[World | Structure | Varying, Field(discriminator="kind")]
+
+
+class Body(Section):
+    """Physical parameters, equations (2)-(4); the defaults are the paper's EtsRo robot."""
+
+    wheel_radius_m: Positive = 0.04
+    half_track_m: Positive = 0.1
+    com_offset_m: Finite = 0.02
+    body_mass_kg: Positive = 2.3
+    wheel_mass_kg: NotNegative = 0.28
+    body_inertia_kg_m2: Positive = 0.01
+    wheel_axle_inertia_kg_m2: NotNegative = 0.0056
+    wheel_diameter_inertia_kg_m2: NotNegative = 0.002
+    damping_right_N_m_s: NotNegative = 0.02
+    damping_left_N_m_s: NotNegative = 0.02
+    wheels_in_mass: Literal[1, 2] = Field(
+        1, description="m = m_c + n m_w: 1 as the paper prints it, 2 physically"
+    )
+
+
+class Disturbance(Section):
+    """Δ(t) = amplitude [sin(rate t + i), cos(rate t + i)] on the wheels of robot number i."""
+
+    amplitude_N_m: NotNegative = 0.0
+    rate_rad_s: Finite = 0.5
+
+
+class Pose(Section):
+    """Where a robot starts; θ counter-clockwise from world x."""
+
+    x_m: Finite
+    y_m: Finite
+    theta_rad: Finite = 0.0
+
+
+class Control(Section):
+    """The law and its gains, equations (15)-(36)."""
+
+    law: Literal["adaptive_dsc"] = "adaptive_dsc"
+    k1: Positive = 2.0
+    k2: Positive = 3.0
+    k3: Positive = 1.5
+    k4: Positive = 3.0
+    gamma_1_s: Positive = 0.01
+    gamma_2_s: Positive = 0.01
+    gamma_3_s: Positive = 0.01
+    k5: Eight = (0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1)
+    sigma_max: Positive = Field(1.0, description="bound of every element of Θ")
+    sigma_margin: Positive = Field(0.1, description="the projection's k")
+    eta: NotNegative = Field(0.001, description="(36) [1/s]")
+    rho: Positive = 1.0
+    sgn_width: Positive = Field(0.001, description="sgn(e) is tanh(e / sgn_width)")
+    theta_hat_0: Eight = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    kappa_hat_0: NotNegative = 0.0
+
+
+class CoordinationSection(Section):
+    """Equations (38), (40), (45)."""
+
+    p: Positive = 2.0
+    q: Positive = 1.0
+    v_hat_0: Finite = 0.0
+    mu_0: Finite = 0.0
+    age_limit_s: Positive = Field(2.0, description="a neighbour's value is carried on this far")
+    silence_limit_s: Positive = Field(2.0, description="then a silent neighbour stops counting")
+
+
+def _changes(name: str, model: type[Section]) -> type[Section]:
+    """The same keys as `model`, none of them required: what a robot may say differently."""
+    fields: dict[str, Any] = {
+        key: (Optional[field.rebuild_annotation()], None)  # noqa: UP045 - built at run time
+        for key, field in model.model_fields.items()
+    }
+    return create_model(name, __base__=Section, __doc__=model.__doc__, **fields)
+
+
+if TYPE_CHECKING:
+
+    class BodyChanges(Section):
+        """Keys of `Body`, none required."""
+
+    class ControlChanges(Section):
+        """Keys of `Control`, none required."""
+else:
+    BodyChanges = _changes("BodyChanges", Body)
+    ControlChanges = _changes("ControlChanges", Control)
+
+
+class Robot(Section):
+    """One robot; what isn't said is its type's."""
+
+    name: Name
+    type: Name = "etsro"
+    pose: Pose
+    v_m_s: Finite = 0.0
+    omega_rad_s: Finite = 0.0
+    s_0: Finite = 0.0
+    offset: Offset = World(kind="world")
+    body: BodyChanges = Field(BodyChanges(), description="parameters that differ from its type's")
+    control: ControlChanges = Field(
+        ControlChanges(), description="gains that differ from [control]"
+    )
+    disturbance: Disturbance | None = None
+
+
+class RandomGraph(Section):
+    """A random graph in which the leader reaches everybody."""
+
+    kind: Literal["random"]
+    max_in_degree: Annotated[int, Field(ge=1)] = 2
+    seed: Annotated[int, Field(ge=0)] = 1
+
+
+class GraphSection(Section):
+    """Who hears whom: "r1 -> r2" means r2 hears r1 (a_21 = 1)."""
+
+    edges: Annotated[tuple[str, ...], Field(strict=False)] | None = None
+    generator: Literal["chain", "ring", "tree", "star", "complete"] | RandomGraph | None = None
+    leader: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(
+        None, description="robots that hear the virtual leader; the first one if not given"
+    )
+
+
+class SpeedStep(Section):
+    """From this time on, this speed."""
+
+    t_s: NotNegative
+    speed_m_s: Finite
+
+
+class Leader(Section):
+    """The virtual leader's speed v_r."""
+
+    speed_m_s: Finite = 0.6
+    steps: Annotated[tuple[SpeedStep, ...], Field(max_length=1000, strict=False)] = ()
+
+
+class Bus(Section):
+    """The buses, one per robot."""
+
+    interface: Literal["fleetloop"] = "fleetloop"
+    bitrate_bit_s: Annotated[int, Field(ge=10_000, le=1_000_000)] = 1_000_000
+    timing: Literal["ideal"] = Field("ideal", description="frames take no time")
+
+
+class Drive(Section):
+    """The drives, two per robot."""
+
+    protocol: Literal["odrive"] = "odrive"
+    preset: Literal["ideal", "limited"] = Field(
+        "ideal", description="ideal: torque as commanded; limited: with the limits below"
+    )
+    right_node: Annotated[int, Field(ge=0, le=62)] = 0
+    left_node: Annotated[int, Field(ge=0, le=62)] = 1
+    heartbeat_period_s: Positive = 0.1
+    torques_period_s: NotNegative = Field(0.0, description="0: only on request")
+    watchdog_s: NotNegative = Field(0.1, description="0: off, as drives are delivered")
+    zero_torque_on_disarm: bool = Field(False, description="False: as in the field")
+    torque_constant_N_m_A: Positive = 0.05
+    current_limit_A: Positive = 10.0
+    velocity_limit_rev_s: Positive = 10.0
+    velocity_gain_N_m_s_rev: Positive = 1.0 / 6.0
+    overspeed_ratio: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.2
+
+
+class Localisation(Section):
+    """Where a controller has its pose from."""
+
+    source: Literal["fused", "external", "odometry"] = "fused"
+
+
+class Network(Section):
+    """The Zenoh router of the run."""
+
+    endpoint: Annotated[str, Field(pattern=r"^(tcp|tls|unixsock-stream)/.+")] | None = Field(
+        None, description="where the router listens; a free loopback port if not given"
+    )
+
+
+class Expect(Section):
+    """What has to hold, or the run ends with exit status 1."""
+
+    signal: str = Field(description="a recorded signal, or s_spread")
+    robots: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(
+        None, description="all if not given"
+    )
+    from_s: NotNegative = 0.0
+    to_s: Positive | None = Field(None, description="the end if not given")
+    max_abs: NotNegative | None = None
+    min: Finite | None = None
+    max: Finite | None = None

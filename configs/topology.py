@@ -1,0 +1,143 @@
+"""The directed graph of a fleet: who hears whom, and who hears the virtual leader.
+
+    edge "j -> i"    information flows from j to i: i hears j, a_ij = 1
+    L = diag(Σ_j a_ij) − A        H = diag(h_i), h_i = 1 iff i hears the leader
+
+Two conditions are needed for the robots to move abreast at the leader's speed: the leader reaches
+every robot (L + H is nonsingular), and the robots' own graph is rooted: one robot reaches all
+others (L has a simple zero eigenvalue). Text about directed graphs often turns the arrows round;
+here a root is a robot that *reaches* all others along the flow of information.
+"""
+
+import itertools
+import random
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """Who hears whom, in the order of the robots."""
+
+    robots: tuple[str, ...]
+    hears: Mapping[str, tuple[str, ...]]  # in-neighbours of each robot, sorted
+    leader: tuple[str, ...]  # robots with h_i = 1
+
+    @classmethod
+    def of(
+        cls, robots: Sequence[str], edges: Iterable[tuple[str, str]], leader: Sequence[str]
+    ) -> "Graph":
+        """A graph from (speaker, hearer) pairs."""
+        hears: dict[str, set[str]] = {robot: set() for robot in robots}
+        for speaker, hearer in edges:
+            hears[hearer].add(speaker)
+        in_order = {robot: tuple(sorted(heard)) for robot, heard in hears.items()}
+        return cls(tuple(robots), in_order, tuple(leader))
+
+    @property
+    def edges(self) -> tuple[tuple[str, str], ...]:
+        """All (speaker, hearer) pairs."""
+        return tuple((speaker, i) for i in self.robots for speaker in self.hears[i])
+
+    @property
+    def max_in_degree(self) -> int:
+        """The largest number of in-neighbours."""
+        return max(len(heard) for heard in self.hears.values())
+
+    def adjacency(self) -> Matrix:
+        """A, N × N: a_ij = 1 iff robot i hears robot j."""
+        index = {robot: n for n, robot in enumerate(self.robots)}
+        matrix = np.zeros((len(self.robots), len(self.robots)))
+        for speaker, hearer in self.edges:
+            matrix[index[hearer], index[speaker]] = 1.0
+        return matrix
+
+    def laplacian(self) -> Matrix:
+        """L, N × N, row sums 0."""
+        adjacency = self.adjacency()
+        return np.diag(adjacency.sum(axis=1)) - adjacency
+
+    def leader_links(self) -> Matrix:
+        """H, N × N, diagonal."""
+        return np.diag([float(robot in self.leader) for robot in self.robots])
+
+    def roots(self) -> tuple[str, ...]:
+        """Robots that reach all others."""
+        return tuple(robot for robot in self.robots if not self.unreached_from([robot]))
+
+    def unreached_from(self, speakers: Iterable[str]) -> tuple[str, ...]:
+        """Robots that none of the speakers reaches, directly or through others."""
+        reached = set(speakers)
+        digraph = self.digraph()
+        for speaker in tuple(reached):
+            reached |= nx.descendants(digraph, speaker)
+        return tuple(robot for robot in self.robots if robot not in reached)
+
+    def digraph(self) -> "nx.DiGraph":
+        """The graph as networkx has it, arrows along the flow of information."""
+        digraph = nx.DiGraph()
+        digraph.add_nodes_from((robot, {"leader": robot in self.leader}) for robot in self.robots)
+        digraph.add_edges_from(self.edges)
+        return digraph
+
+    def to_graphml(self) -> str:
+        """GraphML text; nodes carry `leader`."""
+        return "\n".join(nx.generate_graphml(self.digraph()))
+
+    @classmethod
+    def from_graphml(cls, text: str) -> "Graph":
+        """The graph of a GraphML text; self-edges are dropped, parallel edges are one."""
+        digraph = nx.DiGraph(nx.parse_graphml(text))
+        leader = [str(n) for n, data in digraph.nodes(data=True) if data.get("leader")]
+        edges = [(str(a), str(b)) for a, b in digraph.edges if a != b]
+        return cls.of([str(n) for n in digraph.nodes], edges, leader)
+
+
+def parse_edge(text: str) -> tuple[str, str] | None:
+    """(speaker, hearer) of "r1 -> r2", None if it isn't an edge."""
+    speaker, arrow, hearer = (part.strip() for part in text.partition("->"))
+    return (speaker, hearer) if arrow and speaker and hearer else None
+
+
+def generated(kind: str, robots: Sequence[str]) -> list[tuple[str, str]]:
+    """Edges of a named shape over the robots in their order; the first robot is a root.
+
+    chain 1→2→3…, ring (chain closed), tree (binary: n hears n // 2), star (all hear the first),
+    complete (all hear all).
+    """
+    chain = list(itertools.pairwise(robots))
+    match kind:
+        case "chain":
+            return chain
+        case "ring":
+            return [*chain, (robots[-1], robots[0])] if len(robots) > 1 else []
+        case "tree":
+            return [(robots[(n + 1) // 2 - 1], robots[n]) for n in range(1, len(robots))]
+        case "star":
+            return [(robots[0], other) for other in robots[1:]]
+        case "complete":
+            return [(a, b) for a in robots for b in robots if a != b]
+    raise ValueError(f"no generator {kind!r}")
+
+
+def random_rooted(robots: Sequence[str], *, max_in_degree: int, seed: int) -> list[tuple[str, str]]:
+    """Edges of a random graph in which the first robot reaches all others.
+
+    Every other robot hears one robot before it in a random order, so a tree spans the graph, and up
+    to `max_in_degree` robots in all. The same seed gives the same graph.
+    """
+    draw = random.Random(seed)
+    order = [robots[0], *draw.sample(list(robots[1:]), len(robots) - 1)]
+    edges = []
+    for n, robot in enumerate(order):
+        heard = [order[draw.randrange(n)]] if n else []
+        others = [other for other in order if other != robot and other not in heard]
+        more = min(draw.randint(0, max_in_degree - len(heard)), len(others))
+        edges += [(speaker, robot) for speaker in [*heard, *draw.sample(others, more)]]
+    return edges

@@ -1,0 +1,5 @@
+"""`python -m fleetloop` is `fleetloop`."""
+
+from fleetloop.cli import main
+
+main()

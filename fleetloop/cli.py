@@ -1,0 +1,201 @@
+"""The command line: `fleetloop VERB ...`. Arguments only; each verb's work is in its own module.
+
+Exit status: 0 held, 1 an expectation failed or two runs differ, 2 usage or scenario,
+3 infrastructure (named), 130 interrupted.
+"""
+
+import signal
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import click
+import typer
+
+from configs.errors import FleetloopError
+
+INTERRUPTED = 130
+
+app = typer.Typer(
+    name="fleetloop",
+    help="Run cooperating differential-drive robots in emulation: one controller process per robot,"
+    " Zenoh between them, a python-can bus to emulated drives.",
+    epilog="Start with: fleetloop run paper",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+
+ScenarioArg = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="A scenario file, or the name of a shipped one (fleetloop check lists them).",
+    ),
+]
+RunArg = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its record.mcap.")]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Override a key of the scenario, e.g. --set coordination.p=3"
+        " --set robot.r2.pose.x_m=-6.5 . May be repeated.",
+    ),
+]
+
+
+@app.command()
+def run(
+    scenario: ScenarioArg,
+    in_process: Annotated[
+        bool,
+        typer.Option(
+            "--in-process",
+            help="The reference: everything in this process, no network, no bus. Leaves the same"
+            " record, bit for bit.",
+        ),
+    ] = False,
+    speed: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            metavar="FACTOR",
+            help="Hold the run to this multiple of real time; 0: as fast as the machine allows.",
+        ),
+    ] = 0.0,
+    duration: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Scenario time to run, instead of the file's."),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(metavar="N", help="Seed, instead of the file's.")
+    ] = None,
+    overrides: SetOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="The run's folder, new or empty. Else runs/<time>-<scenario>.",
+        ),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print summary.json on standard output, no table.")
+    ] = False,
+    figures: Annotated[
+        bool, typer.Option("--report/--no-report", help="Make report.html and the figures.")
+    ] = True,
+) -> None:
+    """Run a scenario, record everything, check its expectations, print and save the results."""
+    from fleetloop.run import Options, run_scenario
+
+    changes = list(overrides or [])
+    if duration is not None:
+        changes.append(f"duration_s={duration}")
+    if seed is not None:
+        changes.append(f"seed={seed}")
+    options = Options(
+        in_process=in_process,
+        speed=speed,
+        overrides=tuple(changes),
+        out=out,
+        as_json=as_json,
+        figures=figures,
+    )
+    raise typer.Exit(run_scenario(scenario, options))
+
+
+@app.command()
+def check(
+    scenario: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[SCENARIO]",
+            help="A scenario file or the name of a shipped one; none: list them.",
+        ),
+    ] = None,
+    overrides: SetOption = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON Schema of scenario files, for editors.")
+    ] = False,
+) -> None:
+    """Check a scenario without running it: schema, graph conditions, stability, gains, torque."""
+    from fleetloop.check import check_scenario, list_scenarios, print_schema
+
+    if schema:
+        print_schema()
+    elif scenario is None:
+        list_scenarios()
+    else:
+        raise typer.Exit(check_scenario(scenario, tuple(overrides or []), as_json=as_json))
+
+
+@app.command()
+def report(run: RunArg) -> None:
+    """Make report.html and the figures of a run again from its record."""
+    from fleetloop.report import write_report
+    from fleetloop.terminal import say
+
+    page = write_report(run)
+    say(f"report   {page}\nfigures  {page.parent / 'figures'}")
+
+
+@app.command()
+def export(
+    run: RunArg,
+    target: Annotated[
+        Path, typer.Argument(metavar="FILE.csv|FILE.npz", help="What to write; the ending decides.")
+    ],
+) -> None:
+    """Write one row per tick and robot: truth, path variable, errors, torques."""
+    from fleetloop.export import export as export_run
+    from fleetloop.terminal import say
+
+    export_run(run, target)
+    say(f"wrote {target}")
+
+
+@app.command()
+def diff(
+    a: Annotated[Path, typer.Argument(metavar="A", help="A run's folder, or its record.mcap.")],
+    b: Annotated[Path, typer.Argument(metavar="B", help="The other one.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Compare two runs bit for bit; name the first tick, robot and field that differ."""
+    from fleetloop.diff import print_comparison
+
+    raise typer.Exit(print_comparison(a, b, as_json=as_json))
+
+
+@app.command()
+def init(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE.toml", help="The scenario file to write.")
+    ] = Path("scenario.toml"),
+) -> None:
+    """Write a commented starter scenario."""
+    from fleetloop.init import write_starter
+
+    write_starter(file)
+
+
+def main() -> None:
+    """Run the command line; every error that a user can cause is one line and an exit status."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        status = app(standalone_mode=False)
+    except click.exceptions.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except FleetloopError as error:
+        sys.stderr.write(f"fleetloop: {error}\n")
+        sys.exit(error.exit_code)
+    except (KeyboardInterrupt, click.exceptions.Abort):
+        sys.stderr.write("fleetloop: interrupted\n")
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(0)
+    sys.exit(status if isinstance(status, int) else 0)

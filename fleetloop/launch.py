@@ -1,0 +1,249 @@
+"""A lockstep run over processes: start everybody, watch, end everybody, whatever happens.
+
+    launcher   this process: Zenoh router with access control, operator's end of the control plane
+    plant      emulated drives and physics of all robots; owns the clock
+    agents     one controller per robot
+    recorder   writes the record
+
+Start: sockets first, then processes, then the barrier: everybody proves its links and declares a
+liveliness token; with the last one the launcher says go. End: the plant stops within a tick, the
+controllers follow it, the recorder takes what still comes; who doesn't is killed after a bound.
+"""
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from bridge import access, keys
+from bridge.can_bus import places
+from bridge.link import Arrival, Link
+from bridge.messages import Go, LeaderSpeed, Progress, Report
+from bridge.process import Stop
+from bridge.zenoh_link import RouterLink, open_router
+from configs.brief import NetworkLink, RecorderBrief
+from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
+from configs.errors import InfrastructureError
+from configs.loading import to_toml
+from configs.scenario import Scenario
+from fleetloop.children import Child, Failure, await_end, cause, end, refuse_shadowed_roles
+from fleetloop.record.writer import finish_truncated
+
+WATCH_EVERY_S = 0.05
+DRAIN_S = 2.0
+"""How long the recorder may take to write what is still on its way, once all others have ended."""
+
+
+@dataclass(slots=True)
+class Outcome:
+    """How a run went: counters for the summary, and why it ended."""
+
+    ended: str = "completed"  # "completed", "interrupted", "aborted"
+    reason: str = ""
+    ticks: int = 0
+    wall_s: float = 0.0
+    startup_s: float = 0.0
+    teardown_s: float = 0.0
+    reports: dict[str, Report] = field(default_factory=dict)
+
+
+class LockstepRun:
+    """One run of a scenario over processes."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        run: str,
+        record: Path,
+        speed: float,
+        on_progress: Callable[[Progress], None],
+    ) -> None:
+        self._scenario = scenario
+        self._run = run
+        self._record = record
+        self._speed = speed
+        self._on_progress = on_progress
+        self._robots = scenario.names
+        self._processes = ("plant", "recorder", *(f"agent/{robot}" for robot in self._robots))
+        self._children: list[Child] = []
+        self._alive: set[str] = set()
+        self._seen: dict[str, tuple[int, float]] = {}
+        self.outcome = Outcome()
+
+    def run(self, stop: Stop) -> Outcome:
+        """Run to the end, to a failure or to a stop; nothing that was started is left.
+
+        Raises:
+            InfrastructureError: the run could not start.
+        """
+        refuse_shadowed_roles(("agents", "plant", "fleetloop"))
+        began = time.monotonic()
+        try:
+            with self._started() as link:
+                failure = self._await_ready(link, stop)
+                if failure is None and not stop.requested:
+                    self.outcome.startup_s = time.monotonic() - began
+                    failure = self._watch(link, stop)
+                ending = time.monotonic()
+                self._end(link, stop, failure)
+                self.outcome.teardown_s = time.monotonic() - ending
+        finally:
+            end(self._children, grace_s=0.0)
+        return self.outcome
+
+    # --- start -------------------------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def _started(self) -> Iterator[RouterLink]:
+        scenario, run = self._scenario, self._run
+        folder = places.create_run_folder(run)
+        try:
+            graph = scenario.topology
+            plan = access.plan(run, self._robots, graph.hears, graph.leader)
+            with open_router(scenario.network.endpoint, plan, folder) as link:
+                link.watch_live(keys.live_all(run), "live")
+                link.subscribe(keys.progress_all(run), "progress")
+                link.subscribe(keys.report_all(run), "report")
+                self._spawn(link, plan, folder)
+                yield link
+        finally:
+            places.remove_run_folder(folder)
+
+    def _spawn(self, link: RouterLink, plan: access.AccessPlan, folder: Path) -> None:
+        scenario, run = self._scenario, self._run
+
+        def network(user: str) -> NetworkLink:
+            return NetworkLink(run, link.endpoint, user, plan.passwords[user])
+
+        ticks = schedule(scenario, self._speed)
+        listeners = places.listen(folder, self._robots)
+        try:
+            plant = plant_brief(
+                scenario,
+                network=network("plant"),
+                runtime_folder=str(folder),
+                speed=self._speed,
+            )
+            fds = tuple((bus, listener.fileno()) for bus, listener in listeners.items())
+            plant = replace(plant, listeners=fds)
+            self._children.append(Child("plant", "plant", plant, [fd for _, fd in fds]))
+            for robot in self._robots:
+                channel = str(places.socket_path(folder, robot))
+                bus = (("channel", channel), ("interface", "fleetloop"), ("paced", True))
+                user = network(access.agent_user(robot))
+                brief = agent_brief(scenario, robot, network=user, bus=bus, speed=self._speed)
+                self._children.append(Child(f"agent/{robot}", "agents", brief))
+        finally:
+            for listener in listeners.values():
+                listener.close()
+        recorder = RecorderBrief(
+            str(self._record),
+            self._robots,
+            to_toml(scenario),
+            ticks.period_ns,
+            ticks.start_deadline_s,
+            network("recorder"),
+        )
+        self._children.append(Child("recorder", "fleetloop.recorder", recorder))
+
+    def _await_ready(self, link: Link, stop: Stop) -> Failure | None:
+        """Say the leader's speed until all tokens are there, then go until the plant ticks."""
+        run = self._run
+        leader = link.publisher(keys.leader_speed(run))
+        go = link.publisher(keys.go(run))
+        speed = LeaderSpeed(leader_brief(self._scenario).speed_steps).encode()
+        deadline = time.monotonic() + self._scenario.clock.start_deadline_s
+        while not stop.requested:
+            ready = self._alive.issuperset(self._processes)
+            if ready and "plant" in self._seen:
+                return None
+            if (failure := cause(self._children)) is not None:
+                return failure
+            if time.monotonic() > deadline:
+                absent = sorted(set(self._processes) - self._alive) or ["the plant's first tick"]
+                raise InfrastructureError(
+                    f"not ready within {self._scenario.clock.start_deadline_s:g} s:"
+                    f" {', '.join(absent)}"
+                )
+            leader.put(speed)
+            if ready:
+                go.put(Go().encode())
+            self._take(link.receive(0.02))
+        return None
+
+    # --- run ---------------------------------------------------------------------------------
+
+    def _watch(self, link: Link, stop: Stop) -> Failure | None:
+        """Follow the run until the plant and all controllers have ended."""
+        actors = [child for child in self._children if child.name != "recorder"]
+        while not stop.requested:
+            self._take(link.receive(WATCH_EVERY_S))
+            if (failure := cause(self._children)) is not None:
+                await_end(actors, 0.3)
+                return cause(self._children) or failure
+            if all(child.ended() for child in actors):
+                return None
+            if (silent := self._silent()) is not None:
+                return silent
+        return None
+
+    def _silent(self) -> Failure | None:
+        """The process whose progress stopped, None while all are well."""
+        limit_s = schedule(self._scenario, self._speed).tick_deadline_s + 0.5
+        now = time.monotonic()
+        for name in ("plant", "recorder"):
+            child = next(child for child in self._children if child.name == name)
+            tick, when = self._seen.get(name, (0, now))
+            if now - when > limit_s and not child.ended():
+                text = f"{name}: no progress for {now - when:.1f} s after tick {tick}"
+                return Failure(2, name, text)
+        return None
+
+    def _take(self, arrival: Arrival | None) -> None:
+        if arrival is None:
+            return
+        process = keys.process_of(arrival.key)
+        if arrival.tag == "live":
+            (self._alive.add if arrival.payload == b"1" else self._alive.discard)(process)
+        elif arrival.tag == "progress":
+            progress = Progress.decode(arrival.payload)
+            if progress is not None:
+                self._seen[process] = (progress.tick, time.monotonic())
+                if process == "plant":
+                    self.outcome.ticks = progress.tick
+                    self.outcome.wall_s = progress.wall_ns * 1e-9
+                    self._on_progress(progress)
+        elif (report := Report.decode(arrival.payload)) is not None:
+            self.outcome.reports[process] = report
+
+    # --- end ---------------------------------------------------------------------------------
+
+    def _end(self, link: Link, stop: Stop, failure: Failure | None) -> None:
+        outcome = self.outcome
+        if stop.requested:
+            outcome.ended, outcome.reason = "interrupted", stop.reason
+        elif failure is not None:
+            outcome.ended, outcome.reason = "aborted", failure.text
+        recorder = self._children[-1]
+        actors = self._children[:-1]
+        if outcome.ended != "completed":
+            actors[0].ask_to_stop()
+            await_end(actors, 1.0)
+        end(actors)
+        if outcome.ended != "completed":
+            recorder.ask_to_stop()
+        deadline = time.monotonic() + DRAIN_S
+        while not recorder.ended() and time.monotonic() < deadline:
+            self._take(link.receive(WATCH_EVERY_S))
+        while (arrival := link.receive(0.0)) is not None:
+            self._take(arrival)
+        unfinished = not recorder.ended() or recorder.failure() is not None
+        end([recorder])
+        if outcome.ended == "completed" and unfinished:
+            outcome.ended = "aborted"
+            lost = recorder.failure()
+            outcome.reason = lost.text if lost else f"recorder: not done within {DRAIN_S:g} s"
+        if unfinished and self._record.exists():
+            finish_truncated(self._record)

@@ -1,0 +1,1 @@
+"""The record of a run: `record.mcap`, every signal of every robot at every tick."""

@@ -1,0 +1,168 @@
+"""What a record holds: channels, message layouts, and their schemas.
+
+    channel                    schema                          one message
+    robot/<name>/plant         fleetloop_msgs/msg/Plant        a tick: the truth
+    robot/<name>/controller    fleetloop_msgs/msg/Controller   a tick: what was used and commanded
+    robot/<name>/pose          geometry_msgs/msg/PoseStamped   every 20 ms: for 3-D views
+
+Messages are CDR (little endian) with ROS 2 schemas, which Foxglove opens, and of fixed size, so
+that a block of them is one numpy array: MCAP's record header, the CDR header, then the fields.
+Field names in the schemas are those of `bridge.telemetry` in lower case, as ROS wants them. Times
+are scenario time; nothing in a record knows the wall clock, so equal runs leave equal files.
+"""
+
+from collections.abc import Sequence
+from enum import IntEnum
+
+import numpy as np
+
+from bridge.telemetry import AGENT_SIGNALS, PLANT_SIGNALS, Signal
+
+POSE_PERIOD_NS = 20_000_000
+_MESSAGE = 0x05  # MCAP's opcode
+_MESSAGE_HEADER = [
+    ("opcode", "<u1"),
+    ("length", "<u8"),
+    ("channel", "<u2"),
+    ("sequence", "<u4"),
+    ("log_time", "<u8"),
+    ("publish_time", "<u8"),
+]
+_HEADER_BYTES = 9
+_CDR_LITTLE_ENDIAN = 0x0000_0100
+
+
+class Kind(IntEnum):
+    """Channels of a robot; the number is also the schema's, less one."""
+
+    PLANT = 0
+    CONTROLLER = 1
+    POSE = 2
+
+
+def _row_type(signals: Sequence[Signal]) -> np.dtype[np.void]:
+    fields = [("tick", "<i8"), *((signal.name, "<f8") for signal in signals)]
+    return np.dtype(fields)
+
+
+def _message_type(payload: np.dtype[np.void]) -> np.dtype[np.void]:
+    return np.dtype([*_MESSAGE_HEADER, ("cdr", "<u4"), ("payload", payload)])
+
+
+POSE_TYPE = np.dtype(
+    [
+        ("sec", "<i4"),
+        ("nanosec", "<u4"),
+        ("frame_length", "<u4"),
+        ("frame", "S6"),
+        ("padding", "V6"),
+        ("position", "<f8", 3),
+        ("orientation", "<f8", 4),
+    ]
+)
+ROW_TYPES = {Kind.PLANT: _row_type(PLANT_SIGNALS), Kind.CONTROLLER: _row_type(AGENT_SIGNALS)}
+MESSAGE_TYPES = {
+    **{kind: _message_type(row) for kind, row in ROW_TYPES.items()},
+    Kind.POSE: _message_type(POSE_TYPE),
+}
+
+
+def channel_id(robot_number: int, kind: Kind) -> int:
+    """MCAP's channel id of a robot's channel; from 1."""
+    return robot_number * len(Kind) + kind + 1
+
+
+def kind_of(channel: int) -> Kind:
+    """The kind of a channel by its id."""
+    return Kind((channel - 1) % len(Kind))
+
+
+def robot_number_of(channel: int) -> int:
+    """The robot of a channel by its id."""
+    return (channel - 1) // len(Kind)
+
+
+def topic(robot: str, kind: Kind) -> str:
+    """The topic of a robot's channel."""
+    return f"robot/{robot}/{kind.name.lower()}"
+
+
+def row_messages(channel: int, first_tick: int, rows: np.ndarray, period_ns: int) -> np.ndarray:
+    """Messages of consecutive ticks; `rows` are float64, one line per tick."""
+    messages = _blank(channel, np.arange(first_tick, first_tick + len(rows)), period_ns)
+    payload = messages["payload"]
+    payload["tick"] = messages["sequence"]
+    names = ROW_TYPES[kind_of(channel)].names or ()
+    for column, name in enumerate(names[1:]):
+        payload[name] = rows[:, column]
+    return messages
+
+
+def pose_messages(channel: int, first_tick: int, rows: np.ndarray, period_ns: int) -> np.ndarray:
+    """Pose messages of those ticks that begin a new pose period; `rows` are the plant's."""
+    ticks = np.arange(first_tick, first_tick + len(rows))
+    every = max(1, POSE_PERIOD_NS // period_ns)
+    chosen = ticks % every == 0
+    messages = _blank(channel, ticks[chosen], period_ns)
+    payload = messages["payload"]
+    payload["sec"] = messages["log_time"] // 1_000_000_000
+    payload["nanosec"] = messages["log_time"] % 1_000_000_000
+    payload["frame_length"] = 6
+    payload["frame"] = b"world"
+    names = [signal.name for signal in PLANT_SIGNALS]
+    payload["position"][:, 0] = rows[chosen, names.index("x_m")]
+    payload["position"][:, 1] = rows[chosen, names.index("y_m")]
+    heading = rows[chosen, names.index("theta_rad")]
+    payload["orientation"][:, 2] = np.sin(heading / 2)
+    payload["orientation"][:, 3] = np.cos(heading / 2)
+    return messages
+
+
+def _blank(channel: int, ticks: np.ndarray, period_ns: int) -> np.ndarray:
+    messages = np.zeros(len(ticks), MESSAGE_TYPES[kind_of(channel)])
+    messages["opcode"] = _MESSAGE
+    messages["length"] = messages.dtype.itemsize - _HEADER_BYTES
+    messages["channel"] = channel
+    messages["sequence"] = ticks
+    messages["log_time"] = messages["publish_time"] = ticks * period_ns
+    messages["cdr"] = _CDR_LITTLE_ENDIAN
+    return messages
+
+
+def _row_schema(signals: Sequence[Signal]) -> str:
+    lines = [f"float64 {s.name.lower()}  # [{s.unit}] {s.meaning}" for s in signals]
+    return "\n".join(["int64 tick  # control tick", *lines]) + "\n"
+
+
+_POSE_SCHEMA = """std_msgs/Header header
+geometry_msgs/Pose pose
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+================================================================================
+MSG: geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+================================================================================
+MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+"""
+
+SCHEMAS: dict[Kind, tuple[str, str]] = {
+    Kind.PLANT: ("fleetloop_msgs/msg/Plant", _row_schema(PLANT_SIGNALS)),
+    Kind.CONTROLLER: ("fleetloop_msgs/msg/Controller", _row_schema(AGENT_SIGNALS)),
+    Kind.POSE: ("geometry_msgs/msg/PoseStamped", _POSE_SCHEMA),
+}

@@ -1,0 +1,120 @@
+"""Rows in, record out: the same file whatever the order in which blocks arrive.
+
+Blocks of one source (a robot's plant or controller rows) come in order; those of different sources
+as they like. A group of `CHUNK_TICKS` ticks is written once every source has delivered it, in the
+order of the robots; the rest at the end. So the file depends on the run alone.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Literal, Self
+
+import numpy as np
+
+from bridge.telemetry import AGENT_SIGNALS, PLANT_SIGNALS
+from configs.errors import InfrastructureError
+from fleetloop.record.mcap_file import McapFile
+from fleetloop.record.schema import Kind, channel_id, pose_messages, row_messages
+
+Source = Literal["plant", "controller"]
+CHUNK_TICKS = 512
+_KINDS: dict[str, Kind] = {"plant": Kind.PLANT, "controller": Kind.CONTROLLER}
+_WIDTHS = {Kind.PLANT: len(PLANT_SIGNALS), Kind.CONTROLLER: len(AGENT_SIGNALS)}
+
+
+class _Rows:
+    """Rows of one source that aren't written yet."""
+
+    __slots__ = ("blocks", "count", "first_tick")
+
+    def __init__(self) -> None:
+        self.first_tick = 0
+        self.count = 0
+        self.blocks: list[np.ndarray] = []
+
+    def add(self, block: np.ndarray) -> None:
+        self.blocks.append(block)
+        self.count += len(block)
+
+    def take(self, count: int) -> np.ndarray:
+        """The first `count` rows, or all if there are fewer."""
+        rows = np.concatenate(self.blocks) if self.blocks else np.empty((0, 0))
+        self.blocks = [rows[count:]] if len(rows) > count else []
+        taken = rows[:count]
+        self.first_tick += len(taken)
+        self.count -= len(taken)
+        return taken
+
+
+class RecordWriter:
+    """Writes one record; a context manager that completes the file."""
+
+    def __init__(
+        self, path: str | Path, robots: Sequence[str], scenario_toml: str, period_ns: int
+    ) -> None:
+        self._path = Path(path)
+        self._robots = tuple(robots)
+        self._period_ns = period_ns
+        self._file = McapFile.create(self._path, self._robots, scenario_toml)
+        self._sources = {
+            (number, kind): _Rows() for number in range(len(self._robots)) for kind in _WIDTHS
+        }
+        self._numbers = {robot: number for number, robot in enumerate(self._robots)}
+
+    def add(self, robot: str, source: Source, first_tick: int, rows: bytes) -> None:
+        """Add rows of consecutive ticks, float64 as `bridge.telemetry` packs them.
+
+        Raises:
+            InfrastructureError: ticks are missing or come twice, or the disk is full.
+        """
+        kind = _KINDS[source]
+        held = self._sources[self._numbers[robot], kind]
+        expected = held.first_tick + held.count
+        if first_tick != expected:
+            raise InfrastructureError(
+                f"{self._path}: rows of {source} {robot} begin at tick {first_tick},"
+                f" expected {expected}"
+            )
+        held.add(np.frombuffer(rows, "<f8").reshape(-1, _WIDTHS[kind]))
+        if held.count >= CHUNK_TICKS:
+            while min(rows.count for rows in self._sources.values()) >= CHUNK_TICKS:
+                self._write_group(CHUNK_TICKS)
+
+    def close(self) -> None:
+        """Write what is left and complete the file."""
+        while any(rows.count for rows in self._sources.values()):
+            self._write_group(CHUNK_TICKS)
+        self._file.finish()
+
+    def _write_group(self, ticks: int) -> None:
+        for (number, kind), held in self._sources.items():
+            first = held.first_tick
+            rows = held.take(ticks)
+            if not len(rows):
+                continue
+            channel = channel_id(number, kind)
+            self._file.chunk(channel, row_messages(channel, first, rows, self._period_ns))
+            if kind is Kind.PLANT:
+                channel = channel_id(number, Kind.POSE)
+                self._file.chunk(channel, pose_messages(channel, first, rows, self._period_ns))
+        self._file.flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if isinstance(value, InfrastructureError):
+            self._file.close()
+        else:
+            self.close()
+
+
+def finish_truncated(path: Path) -> None:
+    """Complete a record whose writer was killed, so that any reader opens it."""
+    McapFile.resume(path).finish()

@@ -1,0 +1,89 @@
+"""The recorder's process: hears every robot's rows and writes `record.mcap`.
+
+It stands apart from the lockstep path, so that neither writing nor a slow disk costs a tick, and it
+outlives the launcher for as long as it takes to complete the file. Started by `fleetloop run`.
+"""
+
+import time
+
+from bridge import keys
+from bridge.barrier import Hellos, await_hellos
+from bridge.link import Arrival
+from bridge.messages import Progress, Report, Rows
+from bridge.process import Stop, serve
+from bridge.telemetry import AGENT_ROW, PLANT_ROW
+from bridge.zenoh_link import open_client
+from configs.brief import RecorderBrief
+from fleetloop.record.writer import RecordWriter, Source
+
+QUIET_S = 0.3
+"""Once asked to stop, the recorder takes what still comes until nothing came for this long."""
+PROGRESS_EVERY_S = 0.25
+_ROW_SIZES = {"plant": PLANT_ROW.size, "controller": AGENT_ROW.size}
+
+
+class _Recorder:
+    def __init__(self, brief: RecorderBrief, writer: RecordWriter) -> None:
+        self._writer = writer
+        sources = {f"{kind}/{robot}" for robot in brief.robots for kind in _ROW_SIZES}
+        self.unheard = set(sources)
+        self.unfinished = set(sources)
+        self.undecodable = 0
+        self.ticks = 0
+
+    def take(self, arrival: Arrival) -> None:
+        kind, _, robot = arrival.tag.partition("/")
+        rows = Rows.decode(arrival.payload, _ROW_SIZES[kind])
+        if rows is None:
+            self.undecodable += 1
+            return
+        self.unheard.discard(arrival.tag)
+        if rows.length:
+            source: Source = "plant" if kind == "plant" else "controller"
+            self._writer.add(robot, source, rows.first_tick, rows.rows)
+            self.ticks = max(self.ticks, rows.first_tick + rows.length)
+        if rows.final:
+            self.unfinished.discard(arrival.tag)
+
+
+def run(brief: RecorderBrief, stop: Stop) -> None:
+    """Record until every source said its last, or until told to stop and nothing comes any more."""
+    with (
+        open_client(brief.network, brief.start_deadline_s) as link,
+        RecordWriter(brief.path, brief.robots, brief.scenario_toml, brief.period_ns) as writer,
+    ):
+        name = brief.network.run
+        recorder = _Recorder(brief, writer)
+        for robot in brief.robots:
+            link.subscribe(keys.truth(name, robot), f"plant/{robot}")
+            link.subscribe(keys.telemetry(name, robot), f"controller/{robot}")
+        progress = link.publisher(keys.progress(name, "recorder"))
+        report = link.publisher(keys.report(name, "recorder"))
+        await_hellos(
+            link,
+            Hellos(),
+            recorder.take,
+            lambda: sorted(recorder.unheard),
+            who="recorder",
+            within_s=brief.start_deadline_s,
+            stop=stop,
+        )
+        link.declare_live(keys.live(name, "recorder"))
+        next_report = 0.0
+        quiet_since = time.monotonic()
+        while recorder.unfinished:
+            arrival = link.receive(PROGRESS_EVERY_S)
+            now = time.monotonic()
+            if arrival is not None:
+                recorder.take(arrival)
+                quiet_since = now
+            elif stop.requested and now - quiet_since > QUIET_S:
+                break
+            if now >= next_report:
+                next_report = now + PROGRESS_EVERY_S
+                progress.put(Progress(recorder.ticks, 0, 0).encode())
+        report.put(Report({"undecodable": recorder.undecodable}).encode())
+
+
+if __name__ == "__main__":
+    raise SystemExit(serve(RecorderBrief, run, name="recorder"))

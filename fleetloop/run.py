@@ -1,0 +1,179 @@
+"""`fleetloop run`: one scenario from file to results."""
+
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from types import FrameType
+
+from bridge.messages import Progress
+from bridge.process import Stop
+from configs.brief import NetworkLink
+from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
+from configs.loading import load, to_toml
+from configs.scenario import Scenario
+from fleetloop import run_folder
+from fleetloop.launch import LockstepRun, Outcome
+from fleetloop.lockstep import InProcessRun
+from fleetloop.record.reader import Record
+from fleetloop.record.writer import RecordWriter
+from fleetloop.results import print_results
+from fleetloop.summary import RunStats, check_expectations, summarise, to_json
+from fleetloop.terminal import RunProgress, say
+
+EXIT_CODES = {"held": 0, "failed": 1, "aborted": 3, "interrupted": 130}
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What the command line says about a run."""
+
+    in_process: bool = False
+    speed: float = 0.0
+    overrides: tuple[str, ...] = ()
+    out: Path | None = None
+    as_json: bool = False
+    figures: bool = True
+
+
+def run_scenario(source: str, options: Options) -> int:
+    """Run a scenario, save and print its results; return the exit status.
+
+    Raises:
+        ScenarioError: the scenario or an option is wrong; nothing was started.
+        InfrastructureError: the run could not start.
+    """
+    scenario = load(source, options.overrides)
+    check_expectations(scenario.expect)
+    started = datetime.now(UTC).astimezone()
+    folder = run_folder.create(scenario.name, options.out, now=started)
+    run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
+    with (
+        _stop_on_signals() as stop,
+        RunProgress(scenario.name, scenario.duration_s, quiet=options.as_json) as progress,
+    ):
+
+        def on_progress(state: Progress) -> None:
+            progress.show(state.t_ns * 1e-9, state.wall_ns * 1e-9)
+
+        run = _in_process if options.in_process else _over_processes
+        stats = run(scenario, folder, options.speed, on_progress, stop)
+    stats.started = started.isoformat(timespec="seconds")
+    return _finish(scenario, folder, stats, options)
+
+
+def _over_processes(
+    scenario: Scenario,
+    folder: Path,
+    speed: float,
+    on_progress: Callable[[Progress], None],
+    stop: Stop,
+) -> RunStats:
+    run = LockstepRun(
+        scenario,
+        run=f"{folder.name}-{time.monotonic_ns() % 1_000_000:06d}",
+        record=folder / run_folder.RECORD,
+        speed=speed,
+        on_progress=on_progress,
+    )
+    return _stats(run.run(stop))
+
+
+def _in_process(
+    scenario: Scenario,
+    folder: Path,
+    speed: float,  # noqa: ARG001 - the reference runs as fast as it can
+    on_progress: Callable[[Progress], None],
+    stop: Stop,
+) -> RunStats:
+    network = NetworkLink("in-process", "", "", "")
+    began = time.monotonic()
+    record = folder / run_folder.RECORD
+    period_ns = schedule(scenario).period_ns
+    with RecordWriter(record, scenario.names, to_toml(scenario), period_ns) as writer:
+        run = InProcessRun(
+            plant_brief(scenario, network=network),
+            [agent_brief(scenario, r, network=network, bus=()) for r in scenario.names],
+            leader_brief(scenario),
+            writer,
+            on_progress,
+        )
+        startup_s = time.monotonic() - began
+        run.run(stop)
+    return RunStats(
+        mode="in-process",
+        ended="interrupted" if stop.requested else "completed",
+        reason=stop.reason,
+        wall_s=run.wall_s,
+        startup_s=startup_s,
+        frames_per_bus=run.frames,
+        stopped_robots=run.stopped_robots,
+    )
+
+
+def _stats(outcome: Outcome) -> RunStats:
+    stats = RunStats(
+        mode="lockstep",
+        ended=outcome.ended,
+        reason=outcome.reason,
+        wall_s=outcome.wall_s,
+        startup_s=outcome.startup_s,
+        teardown_s=outcome.teardown_s,
+    )
+    for process, report in outcome.reports.items():
+        waits = {
+            name.removesuffix("_ns"): round(report.number(name) * 1e-9, 4)
+            for name in report.values
+            if name.endswith("_ns")
+        }
+        if waits:
+            stats.waits_s[process] = waits
+        if process == "plant":
+            stats.overruns = int(report.number("overruns"))
+            stats.frames_per_bus = {
+                name.removeprefix("frames."): int(report.number(name))
+                for name in report.values
+                if name.startswith("frames.")
+            }
+        if stopped := report.values.get("stopped"):
+            stats.stopped_robots[process.removeprefix("agent/")] = str(stopped)
+    return stats
+
+
+def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options) -> int:
+    record = folder / run_folder.RECORD
+    if not record.exists():
+        say(f"{stats.ended}: {stats.reason}; nothing was recorded")
+        return EXIT_CODES[stats.ended]
+    summary = summarise(Record.open(record), scenario, stats)
+    text = to_json(summary)
+    run_folder.write(folder / run_folder.SUMMARY, text)
+    if options.figures and summary["ticks"]:
+        from fleetloop.report import write_report
+
+        write_report(folder)
+    if options.as_json:
+        say(to_json(summary | {"folder": str(folder)}).rstrip())
+    else:
+        print_results(summary, folder)
+    return EXIT_CODES[summary["verdict"]]
+
+
+@contextmanager
+def _stop_on_signals() -> Iterator[Stop]:
+    """Ctrl-C, SIGTERM and a closed terminal ask for an orderly stop while the run lasts."""
+    stop = Stop()
+
+    def request(number: int, _: FrameType | None) -> None:
+        stop.request(f"interrupted by {signal.Signals(number).name}")
+
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.signal(number, request) for number in numbers}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

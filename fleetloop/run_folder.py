@@ -1,0 +1,67 @@
+"""Where a run leaves its files: `runs/<time>-<scenario>/` or the folder that the user names."""
+
+import os
+from datetime import datetime
+from pathlib import Path
+
+from configs.errors import InfrastructureError, ScenarioError
+
+RECORD = "record.mcap"
+SCENARIO = "scenario.toml"
+SUMMARY = "summary.json"
+
+
+def create(scenario_name: str, out: Path | None, *, now: datetime) -> Path:
+    """Make the run's folder and return it.
+
+    Raises:
+        ScenarioError: `out` exists and holds something already.
+        InfrastructureError: the folder can't be made or written.
+    """
+    folder = (
+        out if out is not None else _fresh(Path("runs"), f"{now:%Y%m%d-%H%M%S}-{scenario_name}")
+    )
+    try:
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise ScenarioError(
+                f"--out {folder}: exists and is not an empty folder; name a new one"
+            )
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise PermissionError(13, "Permission denied", str(folder))
+    except OSError as error:
+        raise InfrastructureError(f"can't write the run's folder {folder}: {error}") from error
+    return folder
+
+
+def write(path: Path, text: str) -> None:
+    """Write a file of the run.
+
+    Raises:
+        InfrastructureError: disk full, no right, ...
+    """
+    try:
+        path.write_text(text, "utf-8")
+    except OSError as error:
+        raise InfrastructureError(f"can't write {path}: {error.strerror or error}") from error
+
+
+def record_of(run: Path) -> Path:
+    """The record of a run, named by its folder or by the record file itself.
+
+    Raises:
+        ScenarioError: there is none.
+    """
+    record = run / RECORD if run.is_dir() else run
+    if not record.is_file():
+        raise ScenarioError(f"{run}: no {RECORD} there; name a run's folder or its record")
+    return record
+
+
+def _fresh(parent: Path, name: str) -> Path:
+    folder = parent / name
+    number = 2
+    while folder.exists():
+        folder = parent / f"{name}-{number}"
+        number += 1
+    return folder

@@ -1,0 +1,177 @@
+"""What a run came to: settle times, errors, spread, cost, and whether its expectations held."""
+
+import json
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from bridge.telemetry import AGENT_SIGNALS, PLANT_SIGNALS
+from configs.errors import ScenarioError
+from configs.scenario import Scenario
+from configs.sections import Expect
+from fleetloop.record.reader import Record
+
+SETTLE_BAND = 0.05
+"""An error has settled when it stays within this: [m], [rad]."""
+FINAL_S = 5.0
+"""Final values are taken over this last part of a run."""
+SPREAD = "s_spread"
+ERRORS = ("x_e_m", "y_e_m", "theta_e_rad")
+_PACKAGES = ("fleetloop", "eclipse-zenoh", "python-can", "numpy", "msgpack", "mcap", "pydantic")
+
+
+@dataclass(slots=True)
+class RunStats:
+    """What the record can't know."""
+
+    mode: str  # "lockstep" over processes, or "in-process"
+    started: str = ""  # wall clock, ISO 8601
+    ended: str = "completed"  # "completed", "interrupted", "aborted"
+    reason: str = ""
+    wall_s: float = 0.0
+    startup_s: float = 0.0
+    teardown_s: float = 0.0
+    overruns: int = 0
+    frames_per_bus: dict[str, int] = field(default_factory=dict)
+    waits_s: dict[str, dict[str, float]] = field(default_factory=dict)
+    stopped_robots: dict[str, str] = field(default_factory=dict)
+
+
+Summary = dict[str, Any]
+"""summary.json as it is written."""
+
+
+def check_expectations(expectations: Sequence[Expect]) -> None:
+    """Refuse a signal that isn't recorded.
+
+    Raises:
+        ScenarioError: naming the signals that are.
+    """
+    known = sorted({s.name for s in (*PLANT_SIGNALS, *AGENT_SIGNALS)} | {SPREAD})
+    for n, expect in enumerate(expectations):
+        if expect.signal not in known:
+            raise ScenarioError(
+                f"expect.{n}.signal = {expect.signal!r}: no such signal; known: {', '.join(known)}"
+            )
+
+
+def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
+    """The summary of a run, complete or not."""
+    ticks = min((len(rows) for rows in record.controller.values()), default=0)
+    controllers = {robot: rows[:ticks] for robot, rows in record.controller.items()}
+    expectations = [_expectation(expect, record, ticks) for expect in scenario.expect]
+    held = all(item["held"] for item in expectations) and not stats.stopped_robots
+    verdict = stats.ended if stats.ended != "completed" else "held" if held else "failed"
+    robots = {robot: _robot(rows) for robot, rows in controllers.items()} if ticks else {}
+    simulated_s = ticks * scenario.clock.control_period_s
+    return {
+        "verdict": verdict,
+        "reason": stats.reason,
+        "scenario": scenario.name,
+        "mode": stats.mode,
+        "started": stats.started,
+        "ticks": ticks,
+        "wall_s": round(stats.wall_s, 4),
+        "real_time_factor": round(simulated_s / stats.wall_s, 3) if stats.wall_s > 0 else None,
+        "startup_s": round(stats.startup_s, 3),
+        "teardown_s": round(stats.teardown_s, 3),
+        "robots": robots,
+        "worst": _worst(list(robots.values())),
+        "s_spread": _spread_of(controllers) if ticks else None,
+        "expectations": expectations,
+        "stopped_robots": stats.stopped_robots,
+        "overruns": stats.overruns,
+        "frames_per_bus": stats.frames_per_bus,
+        "waits_s": stats.waits_s,
+        "seed": scenario.seed,
+        "versions": {"python": platform.python_version()}
+        | {package: version(package) for package in _PACKAGES},
+    }
+
+
+def to_json(summary: Summary) -> str:
+    """summary.json's text."""
+    return json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
+
+
+def settle_s(t: np.ndarray, values: np.ndarray, band: float = SETTLE_BAND) -> float | None:
+    """Last time outside the band [s]; 0 if never outside, None if outside at the end."""
+    outside = np.flatnonzero(~(np.abs(values) <= band))
+    if not len(outside):
+        return 0.0
+    return float(t[outside[-1]]) if outside[-1] < len(values) - 1 else None
+
+
+def spread(controllers: dict[str, np.ndarray]) -> np.ndarray:
+    """max_i s_i − min_i s_i at every tick."""
+    s = np.stack([rows["s"] for rows in controllers.values()])
+    difference: np.ndarray = s.max(axis=0) - s.min(axis=0)
+    return difference
+
+
+def _final(t: np.ndarray) -> slice:
+    return slice(int(np.searchsorted(t, t[-1] - FINAL_S, side="right")), None)
+
+
+def _robot(rows: np.ndarray) -> dict[str, Any]:
+    t, last = rows["t_s"], _final(rows["t_s"])
+    torque = max(_peak(rows["tau_right_Nm"]), _peak(rows["tau_left_Nm"]))
+    return {
+        "settle_s": {name: settle_s(t, rows[name]) for name in ERRORS},
+        "final_max": {name: _peak(rows[name][last]) for name in ERRORS},
+        "peak_torque_Nm": torque,
+        "settle_s_dot_s": settle_s(t, rows["s_dot"] - rows["s_dot"][-1]),
+    }
+
+
+def _peak(values: np.ndarray) -> float:
+    return float(np.max(np.abs(values)))
+
+
+def _worst(robots: list[dict[str, Any]]) -> dict[str, Any] | None:
+    if not robots:
+        return None
+    settles = {name: [robot["settle_s"][name] for robot in robots] for name in ERRORS}
+    return {
+        "settle_s": {name: None if None in v else max(v) for name, v in settles.items()},
+        "final_max": {name: max(robot["final_max"][name] for robot in robots) for name in ERRORS},
+        "peak_torque_Nm": max(robot["peak_torque_Nm"] for robot in robots),
+    }
+
+
+def _spread_of(controllers: dict[str, np.ndarray]) -> dict[str, float | None]:
+    t = next(iter(controllers.values()))["t_s"]
+    values = spread(controllers)
+    return {
+        "peak": float(values.max()),
+        "settle_s": settle_s(t, values),
+        "final": float(values[_final(t)].max()),
+    }
+
+
+def _expectation(expect: Expect, record: Record, ticks: int) -> dict[str, Any]:
+    robots = expect.robots or record.robots
+    signals = {signal.name for signal in PLANT_SIGNALS}
+    source = record.plant if expect.signal in signals - {"t_s"} else record.controller
+    if expect.signal == SPREAD:
+        rows = {robot: record.controller[robot][:ticks] for robot in robots}
+        series = [(rows[robots[0]]["t_s"], spread(rows))] if ticks else []
+    else:
+        series = [(source[r]["t_s"][:ticks], source[r][expect.signal][:ticks]) for r in robots]
+    end = expect.to_s if expect.to_s is not None else np.inf
+    values = np.concatenate(
+        [np.empty(0), *(v[(t >= expect.from_s) & (t <= end)] for t, v in series)]
+    )
+    result: dict[str, Any] = expect.model_dump(mode="json", exclude_none=True)
+    if not len(values):
+        return result | {"held": False, "found": None}
+    found = {"max_abs": _peak(values), "min": float(values.min()), "max": float(values.max())}
+    held = bool(np.isfinite(values).all())
+    held &= expect.max_abs is None or found["max_abs"] <= expect.max_abs
+    held &= expect.min is None or found["min"] >= expect.min
+    held &= expect.max is None or found["max"] <= expect.max
+    return result | {"held": held, "found": found}

@@ -1,0 +1,76 @@
+"""What the operator reads: results on standard output, progress and notes on standard error.
+
+On a terminal a progress bar with the real-time factor moves; elsewhere a plain line comes every few
+seconds, so that a CI log shows life and nothing else.
+"""
+
+import sys
+import time
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn
+
+PLAIN_EVERY_S = 5.0
+
+
+def say(text: str) -> None:
+    """Print a result."""
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+def note(text: str) -> None:
+    """Print a note that is not part of the result."""
+    sys.stderr.write(text + "\n")
+    sys.stderr.flush()
+
+
+class RunProgress:
+    """Shows how far a run is; a context manager."""
+
+    def __init__(self, name: str, duration_s: float, *, quiet: bool = False) -> None:
+        self._name = name
+        self._duration_s = duration_s
+        self._quiet = quiet
+        self._console = Console(stderr=True)
+        self._bar: Progress | None = None
+        self._task = TaskID(0)
+        self._next_line = 0.0
+
+    def __enter__(self) -> Self:
+        if self._console.is_terminal and not self._quiet:
+            self._bar = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                TextColumn("{task.completed:6.2f} / {task.total:g} s"),
+                TextColumn("{task.fields[factor]}"),
+                console=self._console,
+                transient=True,
+            )
+            self._bar.start()
+            self._task = self._bar.add_task(
+                f"{self._name}: starting", total=self._duration_s, factor=""
+            )
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def show(self, t_s: float, wall_s: float) -> None:
+        """Say that scenario time `t_s` was reached after `wall_s` of running."""
+        factor = f"{t_s / wall_s:5.1f} × real time" if t_s > 0 and wall_s > 0 else ""
+        if self._bar is not None:
+            self._bar.update(
+                self._task, completed=max(t_s, 0.0), description=self._name, factor=factor
+            )
+        elif not self._quiet and t_s > 0 and (now := time.monotonic()) >= self._next_line:
+            self._next_line = now + PLAIN_EVERY_S
+            note(f"{self._name}: {t_s:.2f} / {self._duration_s:g} s  {factor.strip()}")

@@ -1,0 +1,117 @@
+"""The plant's process: emulated drives and physics of all robots, and the clock of a lockstep run.
+
+Started by `fleetloop run` with a `PlantBrief` on standard input and the buses' listening sockets as
+inherited file descriptors.
+"""
+
+import socket
+from collections.abc import Callable
+from functools import partial
+
+from bridge import keys
+from bridge.barrier import Hellos, await_hellos
+from bridge.can_bus.hub import Hub
+from bridge.link import Arrival, Link, Publisher
+from bridge.messages import PoseFix, Progress, Report, Rows
+from bridge.process import Stop, serve, settle_memory
+from bridge.telemetry import RowBuffer
+from bridge.zenoh_link import open_client
+from configs.brief import PlantBrief
+from configs.errors import InfrastructureError
+from plant.loop import LockstepLoop, bus_frames
+from plant.unit import Unit
+
+EARLY = -1
+"""Tick of the poses that only prove the link, before the run."""
+
+
+def run(brief: PlantBrief, stop: Stop) -> None:
+    """Wire the plant to its buses and the network, wait for everybody, and run."""
+    listeners = {bus: socket.socket(fileno=fd) for bus, fd in brief.listeners}
+    with open_client(brief.network, brief.schedule.start_deadline_s) as link:
+        hub = Hub(listeners, stop.wake_fd)
+        try:
+            _run(brief, stop, link, hub)
+        except BaseException as error:
+            hub.close(str(error) or type(error).__name__)
+            raise
+        hub.close(stop.reason or "end of the run")
+
+
+def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> None:
+    name = brief.network.run
+    units = [Unit(robot) for robot in brief.robots]
+    poses = [link.publisher(keys.pose(name, unit.brief.robot)) for unit in units]
+    truths = [link.publisher(keys.truth(name, unit.brief.robot)) for unit in units]
+    rows = [RowBuffer(partial(_put_rows, truth)) for truth in truths]
+    progress = link.publisher(keys.progress(name, "plant"))
+    report = link.publisher(keys.report(name, "plant"))
+    link.subscribe(keys.go(name), "go")
+
+    hellos = Hellos()
+    for unit, pose, truth in zip(units, poses, truths, strict=True):
+        start = unit.brief.pose
+        hellos.add(pose, PoseFix(EARLY, 0, start.x_m, start.y_m, start.theta_rad).encode())
+        hellos.add(truth, Rows(0, 0, b"", False).encode())
+    _await_controllers(brief, hub, hellos, stop)
+    link.declare_live(keys.live(name, "plant"))
+    gone: set[str] = set()
+    await_hellos(
+        link,
+        hellos,
+        _note_go(gone),
+        lambda: () if gone else ("the launcher's go",),
+        who="plant",
+        within_s=brief.schedule.start_deadline_s,
+        stop=stop,
+    )
+    settle_memory()
+    loop = LockstepLoop(brief, units, hub, poses, rows, lambda state: progress.put(state.encode()))
+    try:
+        loop.run(stop)
+    finally:
+        for buffer in rows:
+            buffer.finish()
+        counters = loop.counters
+        period_ns = brief.schedule.period_ns
+        progress.put(
+            Progress(counters.ticks, counters.ticks * period_ns, counters.wall_ns).encode()
+        )
+        values: dict[str, int | float | str] = {
+            "ticks": counters.ticks,
+            "wall_ns": counters.wall_ns,
+            "waited_ns": counters.waited_ns,
+            "overruns": counters.overruns,
+            **bus_frames(counters),
+        }
+        report.put(Report(values).encode())
+
+
+def _put_rows(publisher: Publisher, first: int, count: int, rows: bytes, final: bool) -> None:
+    publisher.put(Rows(first, count, rows, final).encode())
+
+
+def _note_go(gone: set[str]) -> Callable[[Arrival], None]:
+    def take(arrival: Arrival) -> None:
+        gone.add(arrival.tag)
+
+    return take
+
+
+def _await_controllers(brief: PlantBrief, hub: Hub, hellos: Hellos, stop: Stop) -> None:
+    """Say hello until every bus has its controller; bounded by the start deadline."""
+    rounds = int(brief.schedule.start_deadline_s / 0.02)
+    buses = [robot.bus for robot in brief.robots]
+    for _ in range(rounds):
+        hellos.say()
+        missing = hub.await_paced(buses, 0.02)
+        if not missing or stop.requested:
+            return
+    raise InfrastructureError(
+        f"plant: not ready after {brief.schedule.start_deadline_s:g} s:"
+        f" no controller on bus {', '.join(missing)}"
+    )
+
+
+if __name__ == "__main__":
+    raise SystemExit(serve(PlantBrief, run, name="plant"))

@@ -1,0 +1,48 @@
+"""The classical Runge-Kutta step of fourth order for one robot, torques held over the step.
+
+Written out on floats: this is the inner loop of the plant. The wheel angles are integrals of speeds
+that are linear in (v, ω), so they come from the same stages.
+"""
+
+from math import cos, sin
+
+from plant.robot import Robot, State
+
+
+def rk4(
+    robot: Robot, state: State, tau_right: float, tau_left: float, t_s: float, step_s: float
+) -> State:
+    """State after `step_s` from scenario time `t_s`, under held torques [N·m]."""
+    x, y, theta, v, omega, right_angle, left_angle = state
+    accelerations = robot.accelerations
+    half = 0.5 * step_s
+    d_right, d_left = robot.disturbance(t_s)
+    a1, w1 = accelerations(v, omega, tau_right - d_right, tau_left - d_left)
+
+    v2, omega2, theta2 = v + half * a1, omega + half * w1, theta + half * omega
+    d_right, d_left = robot.disturbance(t_s + half)
+    right, left = tau_right - d_right, tau_left - d_left
+    a2, w2 = accelerations(v2, omega2, right, left)
+
+    v3, omega3, theta3 = v + half * a2, omega + half * w2, theta + half * omega2
+    a3, w3 = accelerations(v3, omega3, right, left)
+
+    v4, omega4, theta4 = v + step_s * a3, omega + step_s * w3, theta + step_s * omega3
+    d_right, d_left = robot.disturbance(t_s + step_s)
+    a4, w4 = accelerations(v4, omega4, tau_right - d_right, tau_left - d_left)
+
+    sixth = step_s / 6.0
+    travel = sixth * (v + 2.0 * (v2 + v3) + v4)
+    turn = sixth * (omega + 2.0 * (omega2 + omega3) + omega4)
+    rolled, turned = travel * robot.inv_r, turn * robot.b * robot.inv_r
+    return State(
+        x
+        + sixth * (v * cos(theta) + 2.0 * (v2 * cos(theta2) + v3 * cos(theta3)) + v4 * cos(theta4)),
+        y
+        + sixth * (v * sin(theta) + 2.0 * (v2 * sin(theta2) + v3 * sin(theta3)) + v4 * sin(theta4)),
+        theta + turn,
+        v + sixth * (a1 + 2.0 * (a2 + a3) + a4),
+        omega + sixth * (w1 + 2.0 * (w2 + w3) + w4),
+        right_angle + rolled + turned,
+        left_angle + rolled - turned,
+    )

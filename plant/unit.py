@@ -1,0 +1,94 @@
+"""One emulated robot: body, and behind each wheel a drive, a motor and an encoder.
+
+    bus frames ─► drive ─torque demand─► motor ─torque─► body ─wheel angle, speed─► encoder ─► drive
+
+A unit is told the time and never asks for it. Between two ticks the torques are held.
+"""
+
+from collections.abc import Sequence
+
+from bridge.drives import DRIVES
+from bridge.frame import Frame
+from configs.brief import RobotBrief
+from plant.encoder import revolutions
+from plant.integrate import rk4
+from plant.motor import Motor
+from plant.robot import Robot, State
+
+
+class Unit:
+    """One robot on its bus."""
+
+    __slots__ = (
+        "_body",
+        "_demand_left",
+        "_demand_right",
+        "_drives",
+        "_left",
+        "_motor_left",
+        "_motor_right",
+        "_right",
+        "_torque_left",
+        "_torque_right",
+        "brief",
+        "state",
+    )
+
+    def __init__(self, brief: RobotBrief) -> None:
+        node = DRIVES[brief.drive.protocol].node
+        self.brief = brief
+        self._body = Robot(brief.body, brief.disturbance)
+        self._right = node(brief.drive, brief.right_node, brief.drive.serial_number)
+        self._left = node(brief.drive, brief.left_node, brief.drive.serial_number + 1)
+        self._drives = (self._right, self._left)
+        self._motor_right = Motor()
+        self._motor_left = Motor()
+        self._demand_right = self._demand_left = 0.0
+        self._torque_right = self._torque_left = 0.0
+        pose = brief.pose
+        self.state = State(
+            pose.x_m, pose.y_m, pose.theta_rad, brief.v_m_s, brief.omega_rad_s, 0.0, 0.0
+        )
+
+    def frames_due(self, now_ns: int) -> list[Frame]:
+        """What both drives send at this instant, in order of arbitration."""
+        state = self.state
+        right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
+        self._right.feed(revolutions(state.right_angle), revolutions(right_speed))
+        self._left.feed(revolutions(state.left_angle), revolutions(left_speed))
+        frames = [*self._right.due(now_ns), *self._left.due(now_ns)]
+        frames.sort()
+        return frames
+
+    def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
+        """Give one frame from the bus to both drives and return their replies."""
+        return [*self._right.hear(frame, now_ns), *self._left.hear(frame, now_ns)]
+
+    def advance(self, t_s: float, period_s: float, substeps: int) -> None:
+        """Integrate one control period from scenario time `t_s`, torques held."""
+        state = self.state
+        right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
+        self._demand_right = self._right.torque_demand()
+        self._demand_left = self._left.torque_demand()
+        right = self._torque_right = self._motor_right.torque(self._demand_right, right_speed)
+        left = self._torque_left = self._motor_left.torque(self._demand_left, left_speed)
+        step = period_s / substeps
+        for n in range(substeps):
+            state = rk4(self._body, state, right, left, t_s + n * step, step)
+        self.state = state
+
+    def row(self, t_s: float) -> tuple[float, ...]:
+        """The signals of `bridge.telemetry.PLANT_SIGNALS` at this instant."""
+        x, y, theta, v, omega, _, _ = self.state
+        return (
+            t_s,
+            x,
+            y,
+            theta,
+            v,
+            omega,
+            self._demand_right,
+            self._demand_left,
+            self._torque_right,
+            self._torque_left,
+        )
