@@ -66,19 +66,9 @@ def progress(run: str, process: str) -> str:
     return f"{_run(run)}/@progress/{_process(process)}"
 
 
-def progress_all(run: str) -> str:
-    """Progress of all processes."""
-    return f"{_run(run)}/@progress/**"
-
-
 def report(run: str, process: str) -> str:
     """Where a process says its last word."""
     return f"{_run(run)}/@report/{_process(process)}"
-
-
-def report_all(run: str) -> str:
-    """Last words of all processes."""
-    return f"{_run(run)}/@report/**"
 
 
 def process_of(key: str) -> str:

@@ -104,8 +104,10 @@ class LockstepRun:
             plan = access.plan(run, self._robots, graph.hears, graph.leader)
             with open_router(scenario.network.endpoint, plan, folder) as link:
                 link.watch_live(keys.live_all(run), "live")
-                link.subscribe(keys.progress_all(run), "progress")
-                link.subscribe(keys.report_all(run), "report")
+                # One by one: a wildcard is wider than any identity's rights and would be refused.
+                for process in self._processes:
+                    link.subscribe(keys.progress(run, process), "progress")
+                    link.subscribe(keys.report(run, process), "report")
                 self._spawn(link, plan, folder)
                 yield link
         finally:

@@ -78,14 +78,14 @@ class LockstepLoop:
             if now_ns >= next_report_ns:
                 next_report_ns = now_ns + int(PROGRESS_EVERY_S * 1e9)
                 self._report(Progress(tick, tick * schedule.period_ns, now_ns - start_ns))
-            self._tick(tick)
+            self._tick(tick, stop)
             counters.ticks = max(tick, 0)
         counters.wall_ns = time.monotonic_ns() - start_ns
         for bus in self._robot_of:
             crossed = self._hub.counters(bus)
             counters.frames[bus] = crossed.from_drives + crossed.from_clients
 
-    def _tick(self, tick: int) -> None:
+    def _tick(self, tick: int, stop: Stop) -> None:
         schedule = self._brief.schedule
         t_ns = tick * schedule.period_ns
         t_s = t_ns * 1e-9
@@ -97,7 +97,9 @@ class LockstepLoop:
                 pose.put(PoseFix(tick, t_ns, state.x, state.y, state.theta).encode())
         for unit in self._units:
             hub.deliver(unit.brief.bus, bus_ns, unit.frames_due(bus_ns))
-        self._collect(tick, bus_ns)
+        self._collect(tick, bus_ns, stop)
+        if stop.requested:
+            return
         recorded = 0 <= tick < schedule.ticks
         for unit, rows in zip(self._units, self._rows, strict=True):
             if recorded:
@@ -105,24 +107,33 @@ class LockstepLoop:
             if tick < schedule.ticks:
                 unit.advance(t_s, schedule.period_s, self._brief.substeps)
 
-    def _collect(self, tick: int, bus_ns: int) -> None:
+    def _collect(self, tick: int, bus_ns: int, stop: Stop) -> None:
         """Wait for all answers; what drives reply to requests goes out within the same instant."""
         hub = self._hub
-        while True:
-            waiting_since = time.monotonic_ns()
-            late = hub.collect(self._brief.schedule.tick_deadline_s)
-            self.counters.waited_ns += time.monotonic_ns() - waiting_since
-            if late or hub.left():
-                self._name_the_absent(tick, late)
-            quiet = True
-            for unit in self._units:
-                bus = unit.brief.bus
-                replies = [r for frame in hub.take(bus) for r in unit.hear(frame, bus_ns)]
-                if replies:
-                    quiet = False
-                    hub.deliver(bus, bus_ns, replies)
-            if quiet:
+        closing = tick >= self._brief.schedule.ticks
+        began_ns = time.monotonic_ns()
+        deadline_ns = began_ns + int(self._brief.schedule.tick_deadline_s * 1e9)
+        answered = False
+        while not answered:
+            left_s = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)
+            late = hub.collect(left_s)
+            if stop.requested:
                 return
+            if (late and left_s <= 0.0) or (hub.left() and not closing):
+                self._name_the_absent(tick, late)
+            answered = not late and not self._reply(bus_ns)
+        self.counters.waited_ns += time.monotonic_ns() - began_ns
+
+    def _reply(self, bus_ns: int) -> bool:
+        """Hand the drives what the clients sent; return whether any drive replied."""
+        replied = False
+        for unit in self._units:
+            bus = unit.brief.bus
+            replies = [r for frame in self._hub.take(bus) for r in unit.hear(frame, bus_ns)]
+            if replies:
+                replied = True
+                self._hub.deliver(bus, bus_ns, replies)
+        return replied
 
     def _name_the_absent(self, tick: int, late: Sequence[str]) -> None:
         when = f"tick {tick} (t = {tick * self._brief.schedule.period_ns * 1e-9:.3f} s)"
