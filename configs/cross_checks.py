@@ -107,9 +107,8 @@ def _expects(scenario: Scenario) -> Iterator[Problem]:
                 yield Problem(f"{where}.robots", robot, _known(scenario))
         if expect.max_abs is None and expect.min is None and expect.max is None:
             yield Problem(where, expect.signal, "give max_abs, min or max")
-        end_s = expect.to_s if expect.to_s is not None else scenario.duration_s
-        if expect.from_s >= end_s:
-            yield Problem(f"{where}.from_s", expect.from_s, f"must be below the end, {end_s:g} s")
+        if expect.to_s is not None and expect.from_s >= expect.to_s:
+            yield Problem(f"{where}.from_s", expect.from_s, f"must be below to_s = {expect.to_s:g}")
 
 
 def _edges(scenario: Scenario) -> Iterator[Problem]:

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from fleetloop.summary import ERRORS, Summary
 
+_MARKS = {True: "held   ", False: "FAILED ", None: "not reached"}
 _UNITS = {"x_e_m": "x_e [m]", "y_e_m": "y_e [m]", "theta_e_rad": "θ_e [rad]"}
 
 
@@ -23,8 +24,7 @@ def print_results(summary: Summary, folder: Path) -> None:
             f" final {spread['final']:.2e} m"
         )
     for expect in summary["expectations"]:
-        mark = "held  " if expect["held"] else "FAILED"
-        console.print(f"{mark}  {_claim(expect)}")
+        console.print(f"{_MARKS[expect['held']]}  {_claim(expect)}")
     for robot, reason in summary["stopped_robots"].items():
         console.print(f"STOPPED {robot}: {reason}")
     if summary["real_time_factor"] is not None:
@@ -72,7 +72,7 @@ def _claim(expect: dict[str, Any]) -> str:
     bounds = [f"{k} {expect[k]:g}" for k in ("max_abs", "min", "max") if k in expect]
     until = f" to {expect['to_s']:g} s" if "to_s" in expect else ""
     found = expect["found"]
-    shown = "nothing recorded there"
+    shown = "nothing: the run ended before"
     if found is not None:
         shown = ", ".join(f"{k} {found[k]:.3g}" for k in ("max_abs", "min", "max") if k in expect)
     robots = f" of {', '.join(expect['robots'])}" if "robots" in expect else ""

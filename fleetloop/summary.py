@@ -64,7 +64,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
     ticks = min((len(rows) for rows in record.controller.values()), default=0)
     controllers = {robot: rows[:ticks] for robot, rows in record.controller.items()}
     expectations = [_expectation(expect, record, ticks) for expect in scenario.expect]
-    held = all(item["held"] for item in expectations) and not stats.stopped_robots
+    held = all(item["held"] is not False for item in expectations) and not stats.stopped_robots
     verdict = stats.ended if stats.ended != "completed" else "held" if held else "failed"
     robots = {robot: _robot(rows) for robot, rows in controllers.items()} if ticks else {}
     simulated_s = ticks * scenario.clock.control_period_s
@@ -168,7 +168,7 @@ def _expectation(expect: Expect, record: Record, ticks: int) -> dict[str, Any]:
     )
     result: dict[str, Any] = expect.model_dump(mode="json", exclude_none=True)
     if not len(values):
-        return result | {"held": False, "found": None}
+        return result | {"held": None, "found": None}  # the run ended before
     found = {"max_abs": _peak(values), "min": float(values.min()), "max": float(values.max())}
     held = bool(np.isfinite(values).all())
     held &= expect.max_abs is None or found["max_abs"] <= expect.max_abs
