@@ -35,7 +35,15 @@ def load(source: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     Raises:
         ScenarioError: no such scenario, or all that is wrong with it, a line each.
     """
-    name, text = _read(str(source))
+    return loads(*_read(str(source)), overrides)
+
+
+def loads(name: str, text: str, overrides: Sequence[str] = ()) -> Scenario:
+    """Load a scenario from TOML text; `name` stands for the file in messages.
+
+    Raises:
+        ScenarioError: all that is wrong with it, a line each.
+    """
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

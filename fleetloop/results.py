@@ -1,74 +1,94 @@
-"""The results of a run as the operator sees them."""
+"""The results of a run as the operator sees them, in the terminal and on the page."""
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from fleetloop.summary import ERRORS, Summary
 
-_MARKS = {True: "held   ", False: "FAILED ", None: "not reached"}
-_UNITS = {"x_e_m": "x_e [m]", "y_e_m": "y_e [m]", "theta_e_rad": "θ_e [rad]"}
+_MARKS = {True: "held", False: "FAILED", None: "not reached"}
+_SYMBOLS = {"x_e_m": ("x_e", "m"), "y_e_m": ("y_e", "m"), "theta_e_rad": ("θ_e", "rad")}
 
 
 def print_results(summary: Summary, folder: Path) -> None:
     """Print the table of a run, its verdict, and where its files are."""
     console = Console(file=sys.stdout, highlight=False)
+
+    def line(text: str, style: str | None = None) -> None:
+        console.print(text, style=style, soft_wrap=True, markup=False)
+
     if summary["robots"]:
-        console.print(_robots(summary))
-        spread = summary["s_spread"]
-        console.print(
-            f"spread of s: peak {spread['peak']:.4f} m, settled {_time(spread['settle_s'])},"
-            f" final {spread['final']:.2e} m"
-        )
+        title = f"{summary['scenario']}: path following, {summary['mode']}"
+        table = Table(title=title, box=box.SIMPLE_HEAD, pad_edge=False)
+        first, *others = robot_header(break_lines=True)
+        table.add_column(first, no_wrap=True)
+        for header in others:
+            table.add_column(escape(header), justify="right", no_wrap=True)
+        for row in robot_rows(summary):
+            if row[0] == "worst":
+                table.add_section()
+            table.add_row(*row)
+        console.print(table)
+        line(spread_line(summary))
     for expect in summary["expectations"]:
-        console.print(f"{_MARKS[expect['held']]}  {_claim(expect)}")
+        line(f"{mark(expect):<11}  {claim(expect)}")
     for robot, reason in summary["stopped_robots"].items():
-        console.print(f"STOPPED {robot}: {reason}")
+        line(f"STOPPED {robot}: {reason}")
     if summary["real_time_factor"] is not None:
-        console.print(
+        line(
             f"{summary['ticks']} ticks in {summary['wall_s']:.2f} s:"
             f" {summary['real_time_factor']:.2f} × real time"
             f" (start {summary['startup_s']:.2f} s, end {summary['teardown_s']:.2f} s,"
             f" overruns {summary['overruns']})"
         )
     reason = f": {summary['reason']}" if summary["reason"] else ""
-    console.print(f"verdict  {summary['verdict']}{reason}", style="bold", soft_wrap=True)
-    console.print(f"run      {folder}", soft_wrap=True)
+    line(f"verdict  {summary['verdict']}{reason}", "bold")
+    line(f"run      {folder}")
     if (folder / "report.html").exists():
-        console.print(f"report   {folder / 'report.html'}", soft_wrap=True)
-        console.print(f"figures  {folder / 'figures'}", soft_wrap=True)
+        line(f"report   {folder / 'report.html'}")
+        line(f"figures  {folder / 'figures'}")
 
 
-def _robots(summary: Summary) -> Table:
-    table = Table(title=f"{summary['scenario']}: path following, {summary['mode']}")
-    table.add_column("robot")
-    for name in ERRORS:
-        table.add_column(f"{_UNITS[name].split()[0]} settled", justify="right")
-    for name in ERRORS:
-        table.add_column(f"final {_UNITS[name]}", justify="right")
-    table.add_column("peak torque [N·m]", justify="right")
+def robot_header(*, break_lines: bool = False) -> list[str]:
+    """Headers of `robot_rows`."""
+    gap = "\n" if break_lines else " "
+    settled = [f"{_SYMBOLS[name][0]}{gap}settled" for name in ERRORS]
+    final = [f"{_SYMBOLS[name][0]} [{_SYMBOLS[name][1]}]{gap}final" for name in ERRORS]
+    return ["robot", *settled, *final, f"τ [N·m]{gap}peak"]
+
+
+def robot_rows(summary: Summary) -> Iterator[list[str]]:
+    """A row per robot; with several, a last one named worst."""
     for robot, values in summary["robots"].items():
-        table.add_row(robot, *_cells(values))
+        yield [robot, *_cells(values)]
     if len(summary["robots"]) > 1:
-        table.add_section()
-        table.add_row("worst", *_cells(summary["worst"]))
-    return table
+        yield ["worst", *_cells(summary["worst"])]
 
 
-def _cells(values: dict[str, Any]) -> list[str]:
-    settles = [_time(values["settle_s"][name]) for name in ERRORS]
-    finals = [f"{values['final_max'][name]:.5f}" for name in ERRORS]
-    return [*settles, *finals, f"{values['peak_torque_Nm']:.2f}"]
+def spread_line(summary: Summary) -> str:
+    """The spread of the path variables in one line."""
+    spread = summary["s_spread"]
+    if spread is None:
+        return ""
+    return (
+        f"spread of s: peak {spread['peak']:.4f} m, settled {_time(spread['settle_s'])},"
+        f" final {spread['final']:.2e} m"
+    )
 
 
-def _time(value: float | None) -> str:
-    return "not" if value is None else f"{value:.2f} s"
+def mark(expect: dict[str, Any]) -> str:
+    """Whether an expectation held."""
+    return _MARKS[expect["held"]]
 
 
-def _claim(expect: dict[str, Any]) -> str:
+def claim(expect: dict[str, Any]) -> str:
+    """An expectation and what was found, in one line."""
     bounds = [f"{k} {expect[k]:g}" for k in ("max_abs", "min", "max") if k in expect]
     until = f" to {expect['to_s']:g} s" if "to_s" in expect else ""
     found = expect["found"]
@@ -80,3 +100,13 @@ def _claim(expect: dict[str, Any]) -> str:
         f"{expect['signal']}{robots} from {expect['from_s']:g} s{until}:"
         f" {', '.join(bounds)}; found {shown}"
     )
+
+
+def _cells(values: dict[str, Any]) -> list[str]:
+    settles = [_time(values["settle_s"][name]) for name in ERRORS]
+    finals = [f"{values['final_max'][name]:.5f}" for name in ERRORS]
+    return [*settles, *finals, f"{values['peak_torque_Nm']:.2f}"]
+
+
+def _time(value: float | None) -> str:
+    return "not" if value is None else f"{value:.2f} s"

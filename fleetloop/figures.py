@@ -1,0 +1,294 @@
+"""Figures of a run, as the paper shows them and a few more; matplotlib only, no files.
+
+    fig3  the directed graph                     fig8  path parameter errors s_i − s_j over edges
+    fig4  positions and orientations             s, v_r_hat, torques: what the fleet agreed on and
+    fig5, fig6, fig7  x_e, y_e, θ_e                    what it cost
+
+Robots differ by dash pattern and by lightness, so the figures stay readable in grey.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import networkx as nx
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from configs.scenario import Scenario
+from fleetloop.record.reader import Record
+
+WIDTH_IN, HEIGHT_IN, DPI = 6.4, 3.6, 150
+LEADER = "leader"
+_COLOURS = ("#08306b", "#d95f02", "#1b9e77", "#9e2a8c", "#7f7f7f", "#b8860b")
+_DASHES: tuple[object, ...] = ("-", (0, (6, 2)), (0, (2, 1.2)), (0, (7, 2, 1.5, 2)))
+_POINTS = 1500
+_STYLE: Any = {
+    "font.size": 9,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.titlesize": 10,
+    "lines.linewidth": 1.3,
+    "legend.fontsize": 8,
+    "legend.framealpha": 0.9,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Captioned:
+    """A figure, its file name without ending, and what it shows."""
+
+    name: str
+    caption: str
+    figure: Figure
+
+
+def all_figures(record: Record, scenario: Scenario) -> list[Captioned]:
+    """Every figure of a run; the record holds at least one tick of every robot."""
+    with mpl.rc_context(_STYLE):
+        return [
+            Captioned(name, caption, draw(record, scenario)) for name, caption, draw in _FIGURES
+        ]
+
+
+# --- the graph and the plane ----------------------------------------------------------------------
+
+
+def graph(_: Record, scenario: Scenario) -> Figure:
+    """Who hears whom: arrows along the flow of information, layers by distance from the leader."""
+    topology = scenario.topology
+    digraph = nx.DiGraph(list(topology.edges))
+    digraph.add_nodes_from(topology.robots)
+    digraph.add_edges_from((LEADER, robot) for robot in topology.leader)
+    depths = nx.single_source_shortest_path_length(digraph, LEADER)
+    for node in digraph:
+        digraph.nodes[node]["layer"] = depths.get(node, 0)
+    places = nx.multipartite_layout(digraph, subset_key="layer", align="vertical")
+    widest = max(Counter(depths.values()).values())
+    figure, axes = _axes(height_in=min(7.0, 1.2 + 0.9 * widest))
+    nodes = [node for node in digraph if node != LEADER]
+    style = {"ax": axes, "node_size": 900, "edgecolors": "black"}
+    nx.draw_networkx_nodes(digraph, places, nodelist=nodes, node_color="white", **style)
+    nx.draw_networkx_nodes(
+        digraph, places, nodelist=[LEADER], node_color="#dddddd", node_shape="s", **style
+    )
+    nx.draw_networkx_labels(digraph, places, ax=axes, font_size=8)
+    links = [(LEADER, robot) for robot in topology.leader]
+    for edges, dash in ((list(topology.edges), "solid"), (links, "dashed")):
+        nx.draw_networkx_edges(
+            digraph,
+            places,
+            ax=axes,
+            edgelist=edges,
+            style=dash,
+            arrowsize=14,
+            node_size=900,
+            connectionstyle="arc3,rad=0.15" if dash == "solid" else "arc3",
+        )
+    axes.set_title(f"Directed graph of {scenario.name}: arrows from who speaks to who hears")
+    axes.margins(0.15)
+    axes.set_axis_off()
+    return figure
+
+
+def positions(record: Record, _: Scenario) -> Figure:
+    """Tracks in the plane with the heading at regular times, over the reference paths."""
+    figure, axes = _axes(height_in=4.6)
+    for n, robot in enumerate(record.robots):
+        truth, used = record.plant[robot], record.controller[robot]
+        colour, dash = _style(n)
+        pick = _stride(len(used))
+        axes.plot(used["x_d_m"][pick], used["y_d_m"][pick], color="0.75", linewidth=2.6, zorder=1)
+        pick = _stride(len(truth))
+        axes.plot(truth["x_m"][pick], truth["y_m"][pick], color=colour, linestyle=dash, label=robot)
+        at = np.linspace(0, len(truth) - 1, 9).astype(int)
+        heading = truth["theta_rad"][at]
+        axes.quiver(
+            truth["x_m"][at],
+            truth["y_m"][at],
+            np.cos(heading),
+            np.sin(heading),
+            color=colour,
+            angles="xy",
+            scale=26,
+            width=0.005,
+            zorder=3,
+        )
+        axes.plot(truth["x_m"][0], truth["y_m"][0], "o", color=colour, markersize=4)
+    axes.plot([], [], color="0.75", linewidth=2.6, label="reference")
+    axes.set(xlabel="x [m]", ylabel="y [m]", title="Positions and orientations; dots: start")
+    axes.set_aspect("equal", adjustable="datalim")
+    _legend(axes, len(record.robots) + 1)
+    return figure
+
+
+# --- over time ------------------------------------------------------------------------------------
+
+
+def error_of(signal: str, symbol: str, unit: str) -> Callable[[Record, Scenario], Figure]:
+    """A figure of one path following error; beside it the settled part at its own scale."""
+
+    def draw(record: Record, _: Scenario) -> Figure:
+        series = {robot: rows[signal] for robot, rows in record.controller.items()}
+        return _over_time(
+            record, series, f"Path following error {symbol}", f"{symbol} [{unit}]", zoom=True
+        )
+
+    return draw
+
+
+def parameter_errors(record: Record, scenario: Scenario) -> Figure:
+    """s_i − s_j for every edge j → i."""
+    s = {robot: rows["s"] for robot, rows in record.controller.items()}
+    length = min(len(values) for values in s.values())
+    series = {
+        f"{hearer} − {speaker}": s[hearer][:length] - s[speaker][:length]
+        for speaker, hearer in scenario.topology.edges
+    }
+    return _over_time(record, series, "Path parameter errors", "s$_i$ − s$_j$ [m]", zoom=True)
+
+
+def path_variables(record: Record, _: Scenario) -> Figure:
+    """The path variable of every robot."""
+    series = {robot: rows["s"] for robot, rows in record.controller.items()}
+    return _over_time(record, series, "Path variables", "s [m]")
+
+
+def speed_estimates(record: Record, scenario: Scenario) -> Figure:
+    """v̂_r of every robot and the leader's speed."""
+    series = {robot: rows["v_r_hat"] for robot, rows in record.controller.items()}
+    figure = _over_time(record, series, "Estimates of the reference speed", "v̂$_r$ [m/s]")
+    axes = figure.axes[0]
+    end = max(rows["t_s"][-1] for rows in record.controller.values())
+    steps = [(0.0, scenario.leader.speed_m_s)]
+    steps += [(step.t_s, step.speed_m_s) for step in scenario.leader.steps if step.t_s <= end]
+    times, speeds = zip(*steps, (end, steps[-1][1]), strict=True)
+    axes.step(times, speeds, where="post", color="black", linewidth=0.8, label="leader v$_r$")
+    low, high = axes.get_ylim()
+    axes.set_ylim(min(low, 0.0), max(high, 1e-3))
+    _legend(axes, len(series) + 1)
+    return figure
+
+
+def torques(record: Record, _: Scenario) -> Figure:
+    """Commanded wheel torques; linear near zero, logarithmic beyond 1 N·m."""
+    figure = Figure(figsize=(WIDTH_IN, 5.0), dpi=DPI, layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    for axes, side in ((upper, "right"), (lower, "left")):
+        for n, robot in enumerate(record.robots):
+            rows = record.controller[robot]
+            colour, dash = _style(n)
+            t, values = _envelope(rows["t_s"], rows[f"tau_{side}_Nm"])
+            axes.plot(t, values, color=colour, linestyle=dash, linewidth=1.0, label=robot)
+        peak = max(float(np.abs(r[f"tau_{side}_Nm"]).max()) for r in record.controller.values())
+        if peak > 1.0:
+            axes.set_yscale("symlog", linthresh=1.0, linscale=2.0)
+        axes.set(ylabel=f"τ {side} [N·m]")
+    upper.set_title("Commanded wheel torques")
+    lower.set_xlabel("t [s]")
+    _legend(upper, len(record.robots))
+    return figure
+
+
+# --- helpers --------------------------------------------------------------------------------------
+
+
+def _over_time(
+    record: Record,
+    series: Mapping[str, np.ndarray],
+    title: str,
+    ylabel: str,
+    *,
+    zoom: bool = False,
+) -> Figure:
+    """One line per entry; with `zoom`, a second panel from when all are within the settle band."""
+    t = max((rows["t_s"] for rows in record.controller.values()), key=len)
+    settled = _settled(list(series.values())) if zoom else None
+    if not settled or t[-1] - t[settled] < 0.1 * t[-1]:
+        figure, whole = _axes()
+        panels = [(whole, 0)]
+    else:
+        figure = Figure(figsize=(WIDTH_IN, HEIGHT_IN), dpi=DPI, layout="constrained")
+        whole, close = figure.subplots(1, 2, width_ratios=(3, 2))
+        close.set_title(f"from {t[settled]:.1f} s on", fontsize=9)
+        close.set_xlabel("t [s]")
+        panels = [(whole, 0), (close, settled)]
+    for n, (name, values) in enumerate(series.items()):
+        colour, dash = _style(n)
+        for axes, first in panels:
+            x, y = _envelope(t[first : len(values)], values[first:])
+            axes.plot(x, y, color=colour, linestyle=dash, label=name)
+    whole.set(xlabel="t [s]", ylabel=ylabel, title=title)
+    _legend(panels[-1][0], len(series))
+    return figure
+
+
+def _settled(series: Sequence[np.ndarray]) -> int | None:
+    """The first index from which all stay within the settle band, None if they don't."""
+    last = 0
+    for values in series:
+        outside = np.flatnonzero(~(np.abs(values) <= 0.05))
+        if len(outside):
+            last = max(last, int(outside[-1]) + 1)
+    shortest = min((len(values) for values in series), default=0)
+    return last if last < shortest - 2 else None
+
+
+def _envelope(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Few enough points to draw, with every peak: smallest and largest value of each stretch."""
+    stretch = len(values) // _POINTS
+    if stretch < 3:
+        return t, values
+    count = len(values) // stretch
+    blocks = values[: count * stretch].reshape(count, stretch)
+    first = np.arange(count) * stretch
+    chosen = np.stack([first + blocks.argmin(axis=1), first + blocks.argmax(axis=1)])
+    index = np.append(np.sort(chosen, axis=0).T.ravel(), len(values) - 1)
+    return t[index], values[index]
+
+
+def _stride(length: int) -> slice:
+    return slice(None, None, max(1, length // _POINTS))
+
+
+def _style(n: int) -> tuple[str, object]:
+    return _COLOURS[n % len(_COLOURS)], _DASHES[(n + n // len(_COLOURS)) % len(_DASHES)]
+
+
+def _axes(height_in: float = HEIGHT_IN) -> tuple[Figure, Axes]:
+    figure = Figure(figsize=(WIDTH_IN, height_in), dpi=DPI, layout="constrained")
+    return figure, figure.subplots()
+
+
+def _legend(axes: Axes, entries: int) -> None:
+    axes.legend(
+        loc="center left",
+        bbox_to_anchor=(1.0, 0.5),
+        ncols=1 + (entries - 1) // 14,
+        handlelength=2.8,
+        frameon=False,
+    )
+
+
+_FIGURES: Sequence[tuple[str, str, Callable[[Record, Scenario], Figure]]] = (
+    ("fig3_graph", "The directed graph (the paper's Figure 3).", graph),
+    ("fig4_positions", "Robot positions and orientations (Figure 4).", positions),
+    ("fig5_x_e", "Path following errors x_e (Figure 5).", error_of("x_e_m", "x$_e$", "m")),
+    ("fig6_y_e", "Path following errors y_e (Figure 6).", error_of("y_e_m", "y$_e$", "m")),
+    (
+        "fig7_theta_e",
+        "Path following errors θ_e (Figure 7).",
+        error_of("theta_e_rad", "θ$_e$", "rad"),
+    ),
+    (
+        "fig8_parameter_errors",
+        "Path parameter errors over the edges (Figure 8).",
+        parameter_errors,
+    ),
+    ("path_variables", "Path variables s.", path_variables),
+    ("speed_estimates", "Estimates of the reference speed, equation (38).", speed_estimates),
+    ("torques", "Commanded wheel torques, equation (34).", torques),
+)

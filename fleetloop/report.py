@@ -1,0 +1,120 @@
+"""`fleetloop report`: the figures of a run as PNG files, and one HTML page that holds them all.
+
+<run>/figures/*.png      <run>/report.html: needs nothing beside it, no network, no script
+"""
+
+import base64
+import json
+from collections.abc import Iterable, Sequence
+from html import escape
+from importlib import resources
+from io import BytesIO
+from pathlib import Path
+from string import Template
+
+from configs.errors import InfrastructureError, ScenarioError
+from configs.loading import loads
+from configs.scenario import Scenario
+from fleetloop import run_folder
+from fleetloop.figures import Captioned, all_figures
+from fleetloop.record.reader import Record
+from fleetloop.results import claim, mark, robot_header, robot_rows, spread_line
+from fleetloop.summary import RunStats, Summary, summarise
+
+PAGE = "report.html"
+FIGURES = "figures"
+
+
+def write_report(run: Path) -> Path:
+    """Make the figures and the page of a run, named by its folder or its record; return the page.
+
+    Raises:
+        ScenarioError: no record there, or nothing in it.
+        InfrastructureError: the page or a figure can't be written.
+    """
+    path = run_folder.record_of(run)
+    record = Record.open(path)
+    if not all(len(rows) for rows in (*record.plant.values(), *record.controller.values())):
+        raise ScenarioError(f"{path}: not one tick of every robot is in it, nothing to show")
+    scenario = loads(f"{path}: {run_folder.SCENARIO}", record.scenario_toml)
+    summary = _summary(path.parent, record, scenario)
+    figures = [(item, _png(item)) for item in all_figures(record, scenario)]
+    folder = path.parent / FIGURES
+    try:
+        folder.mkdir(exist_ok=True)
+        for item, data in figures:
+            (folder / f"{item.name}.png").write_bytes(data)
+    except OSError as error:
+        raise InfrastructureError(f"can't write the figures of {run}: {error}") from error
+    page = path.parent / PAGE
+    run_folder.write(page, _page(summary, scenario, record, figures))
+    return page
+
+
+def _summary(folder: Path, record: Record, scenario: Scenario) -> Summary:
+    try:
+        summary: Summary = json.loads((folder / run_folder.SUMMARY).read_text("utf-8"))
+    except (OSError, ValueError):
+        reason = f"the run left no {run_folder.SUMMARY}"
+        return summarise(record, scenario, RunStats("unknown", ended="aborted", reason=reason))
+    return summary
+
+
+def _png(item: Captioned) -> bytes:
+    buffer = BytesIO()
+    # No software name or date in the file: equal runs make equal figures.
+    item.figure.savefig(buffer, format="png", metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def _page(
+    summary: Summary,
+    scenario: Scenario,
+    record: Record,
+    figures: Sequence[tuple[Captioned, bytes]],
+) -> str:
+    template = Template(resources.files("fleetloop").joinpath("report.html").read_text("utf-8"))
+    return template.substitute(
+        title=escape(f"Fleetloop: {scenario.name}"),
+        subtitle=escape(scenario.description),
+        verdict=escape(summary["verdict"]),
+        reason=escape(summary["reason"]),
+        robots=_table(robot_header(), robot_rows(summary)),
+        spread=escape(spread_line(summary)),
+        expectations=_table(
+            ("", "expectation"), ((mark(item), claim(item)) for item in summary["expectations"])
+        ),
+        figures="\n".join(_figure(item, data) for item, data in figures),
+        facts=_table(("", ""), _facts(summary)),
+        scenario=escape(record.scenario_toml),
+    )
+
+
+def _facts(summary: Summary) -> Iterable[tuple[str, str]]:
+    factor = summary["real_time_factor"]
+    yield "started", summary["started"]
+    yield "mode", summary["mode"]
+    yield "ticks", f"{summary['ticks']}"
+    yield "wall time", f"{summary['wall_s']:.2f} s"
+    yield "real-time factor", f"{factor:.2f}" if factor is not None else "unknown"
+    yield "start, end", f"{summary['startup_s']:.2f} s, {summary['teardown_s']:.2f} s"
+    yield "overruns", f"{summary['overruns']}"
+    frames = (f"{bus} {count}" for bus, count in summary["frames_per_bus"].items())
+    yield "frames per bus", ", ".join(frames)
+    yield "seed", f"{summary['seed']}"
+    versions = (f"{name} {number}" for name, number in summary["versions"].items())
+    yield "versions", ", ".join(versions)
+
+
+def _figure(item: Captioned, data: bytes) -> str:
+    text = escape(item.caption)
+    source = f"data:image/png;base64,{base64.b64encode(data).decode()}"
+    return f'<figure><img alt="{text}" src="{source}"><figcaption>{text}</figcaption></figure>'
+
+
+def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
+    css = ' class="text"' if len(header) == 2 else ""
+    lines = ("".join(f"<td{css}>{escape(cell)}</td>" for cell in row) for row in rows)
+    body = "".join(f"<tr>{line}</tr>" for line in lines)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
