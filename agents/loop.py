@@ -24,6 +24,8 @@ plant names the controller itself."""
 BUS_SHARE = 2.0
 """Multiple of the tick deadline that a controller waits for its bus: the plant has its own word
 first."""
+STOP_EVERY_S = 0.1
+"""How often a controller that waits for messages looks whether it was told to stop."""
 
 
 @dataclass(slots=True)
@@ -97,14 +99,17 @@ class LockstepLoop:
         agent = self._agent
         counters = self.counters
         message: can.Message | None = first
+        answered_ns = -1
         asked_ns = time.monotonic_ns()
         while message is not None:
             now_ns = round(message.timestamp * 1e9)
             agent.hear(_frame(message), now_ns)
-            if agent.complete(now_ns):
+            # Replies to somebody else may follow at an instant that is answered already.
+            if now_ns > answered_ns and agent.complete(now_ns):
+                answered_ns = now_ns
                 came_ns = time.monotonic_ns()
                 tick = self._schedule.tick_of(now_ns)
-                self._listen(tick)
+                self._listen(tick, stop)
                 heard_ns = time.monotonic_ns()
                 for frame in agent.step(tick) if not stop.requested else agent.leave():
                     self._bus.send(_message(frame))
@@ -121,22 +126,24 @@ class LockstepLoop:
             f" {BUS_SHARE * self._schedule.tick_deadline_s:g} s after {counters.ticks} ticks"
         )
 
-    def _listen(self, tick: int) -> None:
-        """Share when due, then wait for what the schedule owes this tick."""
+    def _listen(self, tick: int, stop: Stop) -> None:
+        """Share when due, then wait for what the schedule owes this tick, or for a stop."""
         agent = self._agent
         if self._schedule.shares(tick):
             self._path.put(agent.share(tick).encode())
         elif not self._schedule.localises(tick):
             return
         deadline = time.monotonic() + LISTEN_SHARE * self._schedule.tick_deadline_s
-        while missing := agent.missing(tick):
-            arrival = self._link.receive(max(0.0, deadline - time.monotonic()))
-            if arrival is None:
+        while (missing := agent.missing(tick)) and not stop.requested:
+            left_s = deadline - time.monotonic()
+            arrival = self._link.receive(min(max(0.0, left_s), STOP_EVERY_S))
+            if arrival is not None:
+                self.take(arrival)
+            elif left_s <= 0.0:
                 raise InfrastructureError(
                     f"{self._robot}: tick {tick}: no {', no '.join(missing)} within"
                     f" {LISTEN_SHARE * self._schedule.tick_deadline_s:g} s"
                 )
-            self.take(arrival)
 
     def _receive(self, timeout_s: float) -> can.Message | None:
         try:

@@ -5,7 +5,8 @@ A role's process is started by a launcher that holds three lines to it:
     standard input   the pickled brief, length first; afterwards the lifeline: its end means that
                      the launcher is gone, and the process ends itself in an orderly way
     standard output  status lines in JSON, one `Status` each: why the process ended
-    standard error   the terminal's: tracebacks, and the last word if the launcher is gone
+    standard error   the terminal's: tracebacks, and the last word of plant and recorder if the
+                     launcher is gone
 
 SIGTERM asks for an orderly stop; SIGINT is the launcher's business. A process that can't stop in
 `GRACE_S` after its lifeline broke ends itself the hard way, so a killed launcher leaves no orphan.
@@ -15,6 +16,7 @@ import gc
 import json
 import os
 import pickle
+import select
 import signal
 import sys
 import threading
@@ -25,6 +27,9 @@ from typing import BinaryIO, TypeVar
 from configs.errors import FleetloopError, PeerLostError
 
 GRACE_S = 3.0
+LAUNCHER_GONE = "the launcher is gone"
+_SAME_CAUSE_S = 0.1
+"""A peer that left may have left for a reason that is on its way here too."""
 _LENGTH_BYTES = 8
 _Brief = TypeVar("_Brief")
 
@@ -74,8 +79,11 @@ def pack_brief(brief: object) -> bytes:
     return len(body).to_bytes(_LENGTH_BYTES, "little") + body
 
 
-def serve(kind: type[_Brief], body: Callable[[_Brief, Stop], None], *, name: str) -> int:
-    """Take the brief from standard input, run `body` until it returns, return the exit status."""
+def serve(kind: type[_Brief], body: Callable[[_Brief, Stop], str | None], *, name: str) -> int:
+    """Take the brief from standard input, run `body` until it returns, return the exit status.
+
+    What `body` returns is its last word: said if there is no launcher any more that could say it.
+    """
     if sys.stdin.isatty():
         print(f"{name}: started by `fleetloop run`, not by hand", file=sys.stderr)  # noqa: T201
         return 2
@@ -88,10 +96,17 @@ def serve(kind: type[_Brief], body: Callable[[_Brief, Stop], None], *, name: str
     signal.signal(signal.SIGTERM, lambda *_: stop.request("asked to stop"))
     threading.Thread(target=_watch_lifeline, args=(stop,), daemon=True).start()
     try:
-        body(brief, stop)
+        word = body(brief, stop)
     except FleetloopError as error:
-        _say(Status(str(error), error.exit_code, isinstance(error, PeerLostError)), name)
-        return error.exit_code
+        peer_lost = isinstance(error, PeerLostError)
+        if peer_lost:
+            select.select([stop.wake_fd], [], [], _SAME_CAUSE_S)
+        if stop.reason != LAUNCHER_GONE:
+            _say(Status(str(error), error.exit_code, peer_lost), name)
+            return error.exit_code
+        word = None if peer_lost else str(error)
+    if word and stop.reason == LAUNCHER_GONE:
+        print(f"{name}: {LAUNCHER_GONE}; {word}", file=sys.stderr)  # noqa: T201
     return 0
 
 
@@ -112,7 +127,7 @@ def _read_brief(stream: BinaryIO) -> object:
 def _watch_lifeline(stop: Stop) -> None:
     while os.read(0, 4096):
         pass
-    stop.request("the launcher is gone")
+    stop.request(LAUNCHER_GONE)
     threading.Event().wait(GRACE_S)
     os._exit(3)
 

@@ -102,6 +102,11 @@ class Failure:
         self.name = name
         self.text = text
 
+    @property
+    def unexpected(self) -> bool:
+        """Whether the process had no chance to say when it happened."""
+        return self.rank < 2
+
 
 def cause(children: Iterable[Child]) -> Failure | None:
     """The failure that explains the others, None if nobody failed."""

@@ -188,12 +188,13 @@ class LockstepRun:
             if all(child.ended() for child in actors):
                 return None
             if (silent := self._silent()) is not None:
-                return silent
+                await_end(actors, 0.3)
+                return cause(self._children) or silent
         return None
 
     def _silent(self) -> Failure | None:
         """The process whose progress stopped, None while all are well."""
-        limit_s = schedule(self._scenario, self._speed).tick_deadline_s + 0.5
+        limit_s = schedule(self._scenario, self._speed).tick_deadline_s
         now = time.monotonic()
         for name in ("plant", "recorder"):
             child = next(child for child in self._children if child.name == name)
@@ -228,6 +229,8 @@ class LockstepRun:
             outcome.ended, outcome.reason = "interrupted", stop.reason
         elif failure is not None:
             outcome.ended, outcome.reason = "aborted", failure.text
+            if failure.unexpected:
+                outcome.reason += f", at tick {outcome.ticks} or soon after"
         recorder = self._children[-1]
         actors = self._children[:-1]
         if outcome.ended != "completed":

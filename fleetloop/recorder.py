@@ -46,7 +46,7 @@ class _Recorder:
             self.unfinished.discard(arrival.tag)
 
 
-def run(brief: RecorderBrief, stop: Stop) -> None:
+def run(brief: RecorderBrief, stop: Stop) -> str:
     """Record until every source said its last, or until told to stop and nothing comes any more."""
     with (
         open_client(brief.network, brief.start_deadline_s) as link,
@@ -83,6 +83,7 @@ def run(brief: RecorderBrief, stop: Stop) -> None:
                 next_report = now + PROGRESS_EVERY_S
                 progress.put(Progress(recorder.ticks, 0, 0).encode())
         report.put(Report({"undecodable": recorder.undecodable}).encode())
+    return f"{brief.path} is complete up to tick {recorder.ticks}"
 
 
 if __name__ == "__main__":

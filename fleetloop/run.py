@@ -13,6 +13,7 @@ from bridge.messages import Progress
 from bridge.process import Stop
 from configs.brief import NetworkLink
 from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
+from configs.errors import InfrastructureError
 from configs.loading import load, to_toml
 from configs.scenario import Scenario
 from fleetloop import run_folder
@@ -60,7 +61,11 @@ def run_scenario(source: str, options: Options) -> int:
             progress.show(state.t_ns * 1e-9, state.wall_ns * 1e-9)
 
         run = _in_process if options.in_process else _over_processes
-        stats = run(scenario, folder, options.speed, on_progress, stop)
+        try:
+            stats = run(scenario, folder, options.speed, on_progress, stop)
+        except InfrastructureError:
+            run_folder.remove_if_unused(folder)
+            raise
     stats.started = started.isoformat(timespec="seconds")
     return _finish(scenario, folder, stats, options)
 
@@ -149,16 +154,21 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options)
         say(f"{stats.ended}: {stats.reason}; nothing was recorded")
         return EXIT_CODES[stats.ended]
     summary = summarise(Record.open(record), scenario, stats)
-    text = to_json(summary)
-    run_folder.write(folder / run_folder.SUMMARY, text)
-    if options.figures and summary["ticks"]:
-        from fleetloop.report import write_report
+    unsaved: InfrastructureError | None = None
+    try:
+        run_folder.write(folder / run_folder.SUMMARY, to_json(summary))
+        if options.figures and summary["ticks"]:
+            from fleetloop.report import write_report
 
-        write_report(folder)
+            write_report(folder)
+    except InfrastructureError as error:
+        unsaved = error  # results first
     if options.as_json:
         say(to_json(summary | {"folder": str(folder)}).rstrip())
     else:
         print_results(summary, folder)
+    if unsaved is not None:
+        raise unsaved
     return EXIT_CODES[summary["verdict"]]
 
 

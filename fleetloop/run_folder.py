@@ -46,6 +46,13 @@ def write(path: Path, text: str) -> None:
         raise InfrastructureError(f"can't write {path}: {error.strerror or error}") from error
 
 
+def remove_if_unused(folder: Path) -> None:
+    """Remove the folder of a run that never started: it holds nothing but the scenario."""
+    if [item.name for item in folder.iterdir()] == [SCENARIO]:
+        (folder / SCENARIO).unlink()
+        folder.rmdir()
+
+
 def record_of(run: Path) -> Path:
     """The record of a run, named by its folder or by the record file itself.
 

@@ -7,9 +7,11 @@ inherited file descriptors.
 import socket
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 from bridge import keys
 from bridge.barrier import Hellos, await_hellos
+from bridge.can_bus import places
 from bridge.can_bus.hub import Hub
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import PoseFix, Progress, Report, Rows
@@ -18,27 +20,32 @@ from bridge.telemetry import RowBuffer
 from bridge.zenoh_link import open_client
 from configs.brief import PlantBrief
 from configs.errors import InfrastructureError
-from plant.loop import LockstepLoop, bus_frames
+from plant.loop import Counters, LockstepLoop, bus_frames
 from plant.unit import Unit
 
 EARLY = -1
 """Tick of the poses that only prove the link, before the run."""
 
 
-def run(brief: PlantBrief, stop: Stop) -> None:
+def run(brief: PlantBrief, stop: Stop) -> str:
     """Wire the plant to its buses and the network, wait for everybody, and run."""
     listeners = {bus: socket.socket(fileno=fd) for bus, fd in brief.listeners}
-    with open_client(brief.network, brief.schedule.start_deadline_s) as link:
-        hub = Hub(listeners, stop.wake_fd)
-        try:
-            _run(brief, stop, link, hub)
-        except BaseException as error:
-            hub.close(str(error) or type(error).__name__)
-            raise
-        hub.close(stop.reason or "end of the run")
+    try:
+        with open_client(brief.network, brief.schedule.start_deadline_s) as link:
+            hub = Hub(listeners, stop.wake_fd)
+            try:
+                counters = _run(brief, stop, link, hub)
+            except BaseException as error:
+                hub.close(str(error) or type(error).__name__)
+                raise
+            hub.close(stop.reason or "end of the run")
+    finally:
+        # The launcher does it too, unless it was killed.
+        places.remove_run_folder(Path(brief.runtime_folder))
+    return f"ended after tick {counters.ticks}"
 
 
-def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> None:
+def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> Counters:
     name = brief.network.run
     units = [Unit(robot) for robot in brief.robots]
     poses = [link.publisher(keys.pose(name, unit.brief.robot)) for unit in units]
@@ -85,6 +92,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> None:
             **bus_frames(counters),
         }
         report.put(Report(values).encode())
+    return counters
 
 
 def _put_rows(publisher: Publisher, first: int, count: int, rows: bytes, final: bool) -> None:

@@ -23,6 +23,9 @@ from configs.errors import InfrastructureError, PeerLostError
 from plant.unit import Unit
 
 PROGRESS_EVERY_S = 0.1
+ANSWER_SHARE = 0.9
+"""Part of the tick deadline that the plant waits for answers: before that, controllers name who is
+silent; after it, the launcher names the plant."""
 
 
 @dataclass(slots=True)
@@ -55,6 +58,7 @@ class LockstepLoop:
         self._poses = poses
         self._rows = rows
         self._report = report
+        self._limit_s = ANSWER_SHARE * brief.schedule.tick_deadline_s
         self._robot_of = {unit.brief.bus: unit.brief.robot for unit in units}
         self.counters = Counters()
 
@@ -112,7 +116,7 @@ class LockstepLoop:
         hub = self._hub
         closing = tick >= self._brief.schedule.ticks
         began_ns = time.monotonic_ns()
-        deadline_ns = began_ns + int(self._brief.schedule.tick_deadline_s * 1e9)
+        deadline_ns = began_ns + int(self._limit_s * 1e9)
         answered = False
         while not answered:
             left_s = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)
@@ -142,8 +146,7 @@ class LockstepLoop:
             raise PeerLostError(f"{when}: the controller of {', of '.join(gone)}")
         names = ", ".join(self._robot_of[bus] for bus in late)
         raise InfrastructureError(
-            f"{when}: no answer from the controller of {names} within"
-            f" {self._brief.schedule.tick_deadline_s:g} s"
+            f"{when}: no answer from the controller of {names} within {self._limit_s:g} s"
         )
 
     def _pace(self, tick: int, start_ns: int) -> int:
