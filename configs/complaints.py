@@ -70,6 +70,11 @@ def _problem(item: dict[str, Any], data: dict[str, Any]) -> Problem:
         holder = inner
     if item["type"] == "extra_forbidden":
         return Problem(".".join(names), item["input"], _unknown(loc))
+    if item["type"].startswith("union_tag"):
+        tag = item["ctx"].get("tag", MISSING)
+        tags = item["ctx"].get("expected_tags", "")
+        right = f"must be one of {tags}" if tags else "must be given"
+        return Problem(".".join([*names, "kind"]), tag, right)
     value = MISSING if item["type"] == "missing" else item["input"]
     return Problem(".".join(names), value, _right(item))
 
@@ -111,8 +116,9 @@ def _known_keys(loc: Sequence[int | str]) -> list[str]:
             node = resolve(node["properties"][part], tag)
             if node.get("type") == "array":
                 continue
-        elif isinstance(node.get("additionalProperties"), dict):
-            node = resolve(node["additionalProperties"], tag)
+        elif "patternProperties" in node:
+            (named,) = node["patternProperties"].values()
+            node = resolve(named, tag)
     return sorted(node.get("properties", {}))
 
 

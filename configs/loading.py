@@ -11,13 +11,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import tomli_w
 from pydantic import ValidationError
 
 from configs.complaints import complaints, line, salvage
 from configs.cross_checks import Problem, cross_problems
 from configs.errors import ScenarioError
 from configs.scenario import Scenario
-from configs.toml_writer import dump
 
 _NOT_SCENARIOS = {"starter"}
 
@@ -55,7 +55,7 @@ def loads(name: str, text: str, overrides: Sequence[str] = ()) -> Scenario:
 
 def to_toml(scenario: Scenario) -> str:
     """The scenario with all defaults written out; loads back to an equal one."""
-    return dump(scenario.model_dump(mode="json", by_alias=True, exclude_none=True))
+    return tomli_w.dumps(scenario.model_dump(mode="json", by_alias=True, exclude_none=True))
 
 
 def json_schema() -> dict[str, Any]:

@@ -26,7 +26,6 @@ from configs.sections import (
     Network,
     PathShape,
     Positive,
-    RandomGraph,
     Robot,
     Section,
 )
@@ -84,10 +83,6 @@ class Scenario(Section):
         graph = self.graph
         if graph.edges is not None:
             return [edge for text in graph.edges if (edge := parse_edge(text)) is not None]
-        if isinstance(graph.generator, RandomGraph):
-            return random_rooted(
-                self.names,
-                max_in_degree=graph.generator.max_in_degree,
-                seed=graph.generator.seed,
-            )
+        if graph.generator == "random":
+            return random_rooted(self.names, max_in_degree=graph.max_in_degree, seed=graph.seed)
         return generated(graph.generator or "chain", self.names)

@@ -224,19 +224,15 @@ class Robot(Section):
     disturbance: Disturbance | None = None
 
 
-class RandomGraph(Section):
-    """A random graph in which the leader reaches everybody."""
-
-    kind: Literal["random"]
-    max_in_degree: Annotated[int, Field(ge=1)] = 2
-    seed: Annotated[int, Field(ge=0)] = 1
-
-
 class GraphSection(Section):
     """Who hears whom: "r1 -> r2" means r2 hears r1 (a_21 = 1)."""
 
     edges: Annotated[tuple[str, ...], Field(strict=False)] | None = None
-    generator: Literal["chain", "ring", "tree", "star", "complete"] | RandomGraph | None = None
+    generator: Literal["chain", "ring", "tree", "star", "complete", "random"] | None = Field(
+        None, description="a named shape over the robots in their order, instead of edges"
+    )
+    max_in_degree: Annotated[int, Field(ge=1)] = Field(2, description="of the random graph")
+    seed: Annotated[int, Field(ge=0)] = Field(1, description="of the random graph")
     leader: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(
         None, description="robots that hear the virtual leader; the first one if not given"
     )
