@@ -150,7 +150,7 @@ def test_a_scenario_can_not_be_changed_after_loading() -> None:
 
 
 def test_a_robot_may_differ_from_its_type_and_from_the_fleet() -> None:
-    text = SMALL + 'body = { body_mass_kg = 5.0 }\ncontrol = { k4 = 1.5 }\n'
+    text = SMALL + "body = { body_mass_kg = 5.0 }\ncontrol = { k4 = 1.5 }\n"
     scenario = loads("f", text)
     first, second = scenario.robot
     assert scenario.body_of(first).body_mass_kg == 2.3

@@ -1,0 +1,105 @@
+"""Speed estimate and path variable: exact maps, and the whole fleet against its exact solution."""
+
+from math import exp
+
+import numpy as np
+import pytest
+
+from agents.coordination import CoordinationState, Coordinator, matrix_exponential
+from agents.neighbours import Neighbours
+from configs.brief import Coordination
+from configs.loading import load
+from configs.scenario import Scenario
+
+GAINS = Coordination(
+    p=2.0, q=1.0, s_0=0.0, mu_0=0.0, v_hat_0=0.0, age_limit_s=2.0, silence_limit_s=2.0
+)
+H = 0.001
+
+
+def fleet(scenario: Scenario, share_every: int, ticks: int) -> np.ndarray:
+    """(ticks + 1, robots, 3): v̂, μ, s of the coordination alone, sharing every so many ticks."""
+    graph = scenario.topology
+    period_s = share_every * H
+    ears = {r: Neighbours(graph.hears[r], GAINS, H, period_s) for r in graph.robots}
+    minds = {r: Coordinator(GAINS, H, r in graph.leader) for r in graph.robots}
+    states = {r: CoordinationState(0.0, 0.0, 0.0) for r in graph.robots}
+    history = [[states[r] for r in graph.robots]]
+    for tick in range(ticks):
+        now_ns = tick * 1_000_000
+        if tick % share_every == 0:
+            for speaker, hearer in graph.edges:
+                ears[hearer].hear(speaker, now_ns, states[speaker].s, states[speaker].v_hat)
+        sums = {r: ears[r].sums(now_ns) for r in graph.robots}
+        states = {r: minds[r].advance(states[r], *sums[r], 0.6) for r in graph.robots}
+        history.append([states[r] for r in graph.robots])
+    return np.array(history)
+
+
+def exact(scenario: Scenario, ticks: int) -> np.ndarray:
+    """The same from the linear system of all robots at once, by powers of its exact map."""
+    graph = scenario.topology
+    n = len(graph.robots)
+    laplacian, links = graph.laplacian(), graph.leader_links()
+    zero, one = np.zeros((n, n)), np.eye(n)
+    generator = np.block(
+        [
+            [-(laplacian + links), zero, zero, links @ np.ones((n, 1)) * 0.6],
+            [zero, -2.0 * one, -laplacian, np.zeros((n, 1))],
+            [one, one, zero, np.zeros((n, 1))],
+            [np.zeros((1, 3 * n + 1))],
+        ]
+    )
+    step, term = np.eye(3 * n + 1), np.eye(3 * n + 1)
+    for order in range(1, 12):
+        term = term @ generator * H / order
+        step = step + term
+    state = np.append(np.zeros(3 * n), 1.0)
+    history = [state]
+    for _ in range(ticks):
+        state = step @ state
+        history.append(state)
+    return np.array(history)[:, : 3 * n].reshape(-1, 3, n).transpose(0, 2, 1)
+
+
+@pytest.mark.parametrize("name", ["paper", "paper_ring", "paper_tree", "paper_star", "paper_extra"])
+def test_with_fresh_data_every_tick_the_fleet_follows_the_exact_solution(name: str) -> None:
+    scenario = load(name)
+    ours, truth = fleet(scenario, 1, 15_000), exact(scenario, 15_000)
+    assert np.abs(ours[:, :, 0] - truth[:, :, 0]).max() < 1e-3  # v̂
+    assert np.abs(ours[:, :, 2] - truth[:, :, 2]).max() < 1e-3  # s
+    s_dot = (ours[:, :, 0] + ours[:, :, 1]) - (truth[:, :, 0] + truth[:, :, 1])
+    assert np.abs(s_dot).max() < 1e-3
+
+
+def test_shared_at_50_hz_the_chains_spread_peaks_within_2_percent_of_the_exact_one() -> None:
+    scenario = load("paper")
+    spreads = [
+        (history[:, :, 2].max(axis=1) - history[:, :, 2].min(axis=1)).max()
+        for history in (fleet(scenario, 20, 15_000), exact(scenario, 15_000))
+    ]
+    assert spreads[0] == pytest.approx(1.136, abs=0.02)
+    assert spreads[0] == pytest.approx(spreads[1], rel=0.02)
+
+
+def test_alone_with_the_leader_the_estimate_is_a_first_order_lag() -> None:
+    mind = Coordinator(GAINS, H, hears_leader=True)
+    state = CoordinationState(0.0, 0.0, 0.0)
+    for _ in range(2000):
+        state = mind.advance(state, 0, 0.0, 0.0, 0.6)
+    assert state.v_hat == pytest.approx(0.6 * (1 - exp(-2.0)), rel=1e-12)
+    assert state.s == pytest.approx(0.6 * (2.0 - (1 - exp(-2.0))), rel=1e-11)
+
+
+def test_without_anybody_to_hear_the_estimate_stays_and_mu_decays() -> None:
+    mind = Coordinator(GAINS, H, hears_leader=False)
+    state = mind.advance(CoordinationState(0.3, 1.0, 5.0), 0, 0.0, 0.0, 0.6)
+    assert state.v_hat == 0.3
+    assert state.mu == pytest.approx(exp(-2.0 * H))
+
+
+def test_the_exponential_of_a_rotation_is_cosine_and_sine() -> None:
+    assert np.array(matrix_exponential([[0.0, -2.0], [2.0, 0.0]])) == pytest.approx(
+        np.array([[np.cos(2), -np.sin(2)], [np.sin(2), np.cos(2)]]), abs=1e-13
+    )
+    assert matrix_exponential([[-30.0]])[0][0] == pytest.approx(exp(-30.0), rel=1e-9)

@@ -1,0 +1,79 @@
+"""The law as a whole: closed loop on its own robot model."""
+
+from math import cos, sin
+
+import pytest
+
+from agents.laws import LAWS, Sense
+from agents.paths import Reference, robot_path
+from configs.brief import NetworkLink, WorldOffset
+from configs.briefing import agent_brief, plant_brief, reference_path
+from configs.loading import load
+from plant.integrate import rk4
+from plant.robot import Robot, State
+
+NOWHERE = NetworkLink("test", "", "", "")
+PAPER = load("paper")
+BRIEF = agent_brief(PAPER, "r1", network=NOWHERE, bus=())
+H = 0.001
+
+
+def drive(law, state: State, seconds: float, speed: float = 0.6):
+    """Follow the paper's path at a constant ṡ; the last output."""
+    robot = Robot(plant_brief(PAPER, network=NOWHERE).robots[0].body, NO_DISTURBANCE)
+    path = robot_path(reference_path(PAPER.path), WorldOffset(0.0, 2.0))
+    memory = output = None
+    for k in range(int(seconds / H)):
+        sense = Sense(state.x, state.y, state.theta, state.v, state.omega)
+        output = law(memory, sense, path(speed * k * H), speed)
+        memory = output.state
+        state = rk4(robot, state, output.tau_right, output.tau_left, k * H, H)
+    return output
+
+
+NO_DISTURBANCE = plant_brief(PAPER, network=NOWHERE).robots[0].disturbance
+
+
+def law():
+    return LAWS["adaptive_dsc"](BRIEF.gains, BRIEF.wheels, H)
+
+
+def test_errors_end_within_millimetres_from_the_papers_start() -> None:
+    last = drive(law(), State(-8.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0), 12.0)
+    assert abs(last.x_e) < 0.003
+    assert abs(last.y_e) < 0.003
+    assert abs(last.theta_e) < 0.003
+
+
+def test_at_rest_on_its_reference_a_robot_is_told_to_stay() -> None:
+    here = Reference(1.0, 2.0, 0.3, 1.0, 0.0)
+    out = law()(None, Sense(1.0, 2.0, 0.3, 0.0, 0.0), here, 0.0)
+    assert (out.tau_right, out.tau_left) == (0.0, 0.0)
+
+
+def test_the_first_tick_starts_the_filters_at_their_inputs() -> None:
+    here = Reference(0.0, 0.0, 0.0, 1.0, 0.0)
+    out = law()(None, Sense(-0.5, 0.0, 0.0, 0.0, 0.0), here, 0.6)
+    assert out.used.alpha_v == pytest.approx(2.0 * 0.5 + 0.6)  # (15) with k_1 = 2
+    assert out.xi_e1 == pytest.approx(-1.6)
+
+
+def test_mirrored_situations_give_mirrored_torques() -> None:
+    straight = Reference(0.0, 0.0, 0.0, 1.0, 0.0)
+    left = law()(None, Sense(0.1, 0.4, 0.2, 0.5, 0.1), straight, 0.6)
+    right = law()(None, Sense(0.1, -0.4, -0.2, 0.5, -0.1), straight, 0.6)
+    assert left.tau_right == pytest.approx(right.tau_left)
+    assert left.tau_left == pytest.approx(right.tau_right)
+
+
+def test_turning_the_whole_world_changes_no_torque() -> None:
+    angle = 0.8
+    c, s = cos(angle), sin(angle)
+    plain = law()(None, Sense(0.1, 0.4, 0.2, 0.5, 0.1), Reference(0.0, 0.1, 0.1, 1.0, 0.3), 0.6)
+    turned = law()(
+        None,
+        Sense(c * 0.1 - s * 0.4, s * 0.1 + c * 0.4, 0.2 + angle, 0.5, 0.1),
+        Reference(-s * 0.1, c * 0.1, 0.1 + angle, 1.0, 0.3),
+        0.6,
+    )
+    assert (turned.tau_right, turned.tau_left) == pytest.approx((plain.tau_right, plain.tau_left))

@@ -1,0 +1,44 @@
+"""Pose estimates from fixes and wheels."""
+
+from math import pi
+
+import pytest
+
+from agents.localisation import Localiser
+from configs.brief import Wheels
+
+WHEELS = Wheels(0.04, 0.1)
+
+
+def test_equal_wheels_roll_straight_on() -> None:
+    localiser = Localiser("fused", WHEELS)
+    localiser.wheels(0.0, 0.0, 0.0, 0.0)
+    localiser.fix(1.0, 2.0, pi / 2)
+    sense = localiser.wheels(10.0, 10.0, 25.0, 25.0)
+    assert sense == pytest.approx((1.0, 2.4, pi / 2, 1.0, 0.0))
+
+
+def test_opposite_wheels_turn_on_the_spot() -> None:
+    localiser = Localiser("fused", WHEELS)
+    localiser.wheels(0.0, 0.0, 0.0, 0.0)
+    localiser.fix(0.0, 0.0, 0.0)
+    sense = localiser.wheels(2.5, -2.5, 2.5, -2.5)
+    assert sense == pytest.approx((0.0, 0.0, 1.0, 0.0, 1.0))
+
+
+@pytest.mark.parametrize(("mode", "x"), [("fused", 5.4), ("external", 5.0), ("odometry", 0.8)])
+def test_modes_differ_in_what_they_do_with_a_second_fix_and_with_wheels(mode, x) -> None:
+    localiser = Localiser(mode, WHEELS)
+    localiser.wheels(0.0, 0.0, 0.0, 0.0)
+    localiser.fix(0.0, 0.0, 0.0)
+    localiser.wheels(10.0, 10.0, 0.0, 0.0)
+    localiser.fix(5.0, 0.0, 0.0)
+    assert localiser.wheels(20.0, 20.0, 0.0, 0.0).x == pytest.approx(x)
+
+
+def test_a_fix_is_taken_as_the_nearest_angle_of_its_direction() -> None:
+    localiser = Localiser("fused", WHEELS)
+    localiser.wheels(0.0, 0.0, 0.0, 0.0)
+    localiser.fix(0.0, 0.0, 3.0)
+    localiser.wheels(1.0, -1.0, 0.0, 0.0)  # on to 3.4
+    assert localiser.fix(0.0, 0.0, 3.4 - 2 * pi).theta == pytest.approx(3.4)

@@ -1,0 +1,303 @@
+"""The python-can interface against a hub in this process: third-party contract and lockstep."""
+
+import threading
+from collections.abc import Callable, Iterator
+
+import can
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.can_bus import places
+from bridge.can_bus.hub import Hub
+from bridge.can_bus.interface import FleetloopBus
+from bridge.frame import EFF, RTR, Frame
+
+
+class Running:
+    """A hub that a thread keeps going while clients in this thread wait for it."""
+
+    def __init__(self) -> None:
+        folder = places.create_run_folder("test")
+        self.hub = Hub(places.listen(folder, ("r1", "r2")))
+        self._lock = threading.Lock()
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        while not self._over.is_set():
+            with self._lock:
+                self.hub.collect(0.0)
+            self._over.wait(0.001)
+
+    def deliver(self, *frames: Frame, bus: str = "r1", stamp_ns: int = 1_000_000) -> None:
+        with self._lock:
+            self.hub.deliver(bus, stamp_ns, frames)
+
+    def taken(self, count: int, bus: str = "r1") -> list[Frame]:
+        """What clients sent, once `count` frames are there."""
+        frames: list[Frame] = []
+        for _ in range(5000):
+            with self._lock:
+                frames += self.hub.take(bus)
+            if len(frames) >= count:
+                break
+            self._over.wait(0.001)
+        return frames
+
+    def close(self) -> None:
+        self._over.set()
+        self._thread.join()
+        self.hub.close("the test is over")
+        places.remove_run_folder(places.base_folder() / "test")
+
+
+@pytest.fixture
+def running(runtime_folder) -> Iterator[Running]:
+    running = Running()
+    yield running
+    running.close()
+
+
+@pytest.fixture
+def join(running: Running) -> Iterator[Callable[..., can.BusABC]]:
+    buses: list[can.BusABC] = []
+
+    def open_bus(channel: str = "r1", **options) -> can.BusABC:
+        bus = can.Bus(interface="fleetloop", channel=channel, **options)
+        buses.append(bus)
+        return bus
+
+    yield open_bus
+    for bus in buses:
+        bus.shutdown()
+
+
+def test_frames_of_drives_come_as_messages_with_bus_time(running, join) -> None:
+    bus = join()
+    assert isinstance(bus, FleetloopBus)
+    running.deliver(Frame(0x009, b"12345678"), Frame(0x123 | RTR, bytes(4)), stamp_ns=2_500_000)
+    first, second = bus.recv(5.0), bus.recv(5.0)
+    assert (first.arbitration_id, bytes(first.data), first.dlc) == (0x009, b"12345678", 8)
+    assert (first.timestamp, first.is_rx, first.channel) == (0.0025, True, "r1")
+    assert (second.is_remote_frame, second.dlc) == (True, 4)
+    assert bus.recv(0.0) is None
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        can.Message(arbitration_id=0x7FF, data=b"12345678", is_extended_id=False),
+        can.Message(arbitration_id=0x1FFFFFFF, data=b"", is_extended_id=True),
+        can.Message(arbitration_id=0x17, is_remote_frame=True, dlc=8, is_extended_id=False),
+    ],
+)
+def test_any_classic_frame_travels_unchanged_to_other_clients_and_drives(
+    running, join, message: can.Message
+) -> None:
+    sender, hearer = join(), join()
+    sender.send(message)
+    heard = hearer.recv(5.0)
+    assert heard.equals(message, timestamp_delta=None, check_channel=False, check_direction=False)
+    (frame,) = running.taken(1)
+    assert frame.can_id & 0x1FFFFFFF == message.arbitration_id
+    assert bool(frame.can_id & EFF) == message.is_extended_id
+    assert bool(frame.can_id & RTR) == message.is_remote_frame
+
+
+def test_own_messages_come_back_only_if_asked_for(running, join) -> None:
+    quiet, echoing = join(), join(receive_own_messages=True)
+    echoing.send(can.Message(arbitration_id=1, is_extended_id=False))
+    echo = echoing.recv(5.0)
+    assert (echo.arbitration_id, echo.is_rx) == (1, False)
+    assert quiet.recv(5.0).arbitration_id == 1
+    quiet.send(can.Message(arbitration_id=2, is_extended_id=False))
+    assert echoing.recv(5.0).arbitration_id == 2
+    assert quiet.recv(0.05) is None
+
+
+def test_buses_are_apart(running, join) -> None:
+    one, two = join("r1"), join("r2")
+    one.send(can.Message(arbitration_id=1, is_extended_id=False))
+    running.taken(1)
+    assert two.recv(0.05) is None
+
+
+def test_filters_hold(running, join) -> None:
+    bus = join(can_filters=[{"can_id": 0x20, "can_mask": 0x7E0}])
+    running.deliver(Frame(0x009, b""), Frame(0x029, b""), Frame(0x049, b""))
+    assert bus.recv(5.0).arbitration_id == 0x029
+    assert bus.recv(0.05) is None
+
+
+def test_thousands_of_frames_arrive_without_loss_and_in_order(running, join) -> None:
+    bus = join()
+    for k in range(3000):
+        running.deliver(Frame(k % 0x800, k.to_bytes(4, "little")), stamp_ns=k)
+    received = [int.from_bytes(bus.recv(5.0).data, "little") for _ in range(3000)]
+    assert received == list(range(3000))
+
+
+def test_a_client_that_never_reads_stops_nobody(running, join) -> None:
+    join()  # never read
+    reader = join()
+    for k in range(3000):
+        running.deliver(Frame(k % 0x800, b""), stamp_ns=k)
+    assert sum(reader.recv(5.0) is not None for _ in range(3000)) == 3000
+
+
+def test_a_descriptor_is_readable_once_per_frame(running, join) -> None:
+    bus = join()
+    heard: list[can.Message] = []
+    notifier = can.Notifier(bus, [heard.append], timeout=0.1)
+    running.deliver(*(Frame(k, b"") for k in range(50)))
+    for _ in range(5000):
+        if len(heard) == 50:
+            break
+        threading.Event().wait(0.001)
+    notifier.stop()
+    assert [message.arbitration_id for message in heard] == list(range(50))
+
+
+def test_fd_frames_and_unknown_options_are_refused(running, join) -> None:
+    with pytest.raises(can.CanOperationError, match="classic CAN"):
+        join().send(can.Message(arbitration_id=1, is_fd=True, is_extended_id=False))
+    with pytest.raises(can.CanInitializationError, match="fd must be False"):
+        join(fd=True)
+    with pytest.raises(TypeError, match="no option baud"):
+        join(baud=1)
+
+
+def test_a_bus_that_is_not_there_is_named_with_those_that_are(running, join) -> None:
+    with pytest.raises(can.CanInitializationError, match=r"no bus 'r9'.*test/r1, test/r2"):
+        join("r9")
+
+
+def test_channels_go_by_bus_by_run_and_by_path(running, join) -> None:
+    for channel in ("r1", "test/r1", str(places.base_folder() / "test" / "r1.can")):
+        join(channel).send(can.Message(arbitration_id=1, is_extended_id=False))
+    assert len(running.taken(3)) == 3
+
+
+def test_live_buses_are_detected(running) -> None:
+    found = can.detect_available_configs("fleetloop")
+    assert [config["channel"] for config in found] == ["test/r1", "test/r2"]
+
+
+def test_the_end_of_the_bus_is_an_error_that_says_why(running, join) -> None:
+    bus = join()
+    running.deliver(Frame(1, b""))
+    running.close()
+    assert bus.recv(5.0).arbitration_id == 1  # nothing that was said is lost
+    with pytest.raises(can.CanOperationError, match="the test is over"):
+        bus.recv(5.0)
+
+
+def test_shutdown_twice_is_once(running, join) -> None:
+    bus = join()
+    bus.shutdown()
+    bus.shutdown()
+
+
+LEAVE = 0x7FF
+
+
+# --- lockstep -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def paced(runtime_folder) -> Iterator[Hub]:
+    """A hub driven by the test, and a paced client in a thread that answers like a controller."""
+    folder = places.create_run_folder("test")
+    hub = Hub(places.listen(folder, ("r1",)))
+
+    def answer() -> None:
+        bus = can.Bus(interface="fleetloop", channel="r1", paced=True)
+        try:
+            while True:
+                message = bus.recv(10.0)
+                if message is not None and message.arbitration_id == LEAVE:
+                    break
+                if message is not None and message.arbitration_id == 0x009:
+                    bus.send(can.Message(arbitration_id=0x00E, data=message.data[:4]))
+                    bus.send(can.Message(arbitration_id=0x02E, data=message.data[4:]))
+        except can.CanOperationError:
+            pass
+        bus.shutdown()
+
+    thread = threading.Thread(target=answer)
+    thread.start()
+    assert hub.await_paced(("r1",), 10.0) == ()
+    yield hub
+    hub.close("the test is over")
+    thread.join()
+    places.remove_run_folder(folder)
+
+
+def test_collect_returns_with_all_that_a_paced_client_had_to_say(paced) -> None:
+    hub = paced
+    for k in range(200):
+        data = k.to_bytes(4, "little") + bytes(4)
+        hub.deliver("r1", k, (Frame(0x009, data),))
+        assert hub.collect(10.0) == ()
+        frames = hub.take("r1")
+        assert [frame.can_id & 0x7FF for frame in frames] == [0x00E, 0x02E]
+        assert frames[0].data == k.to_bytes(4, "little")
+
+
+def test_a_paced_client_with_nothing_to_say_still_answers(paced) -> None:
+    hub = paced
+    hub.deliver("r1", 0, (Frame(0x001, bytes(8)),))
+    assert hub.collect(10.0) == ()
+    assert hub.take("r1") == []
+
+
+def test_a_listener_beside_a_paced_client_changes_nothing(paced) -> None:
+    hub = paced
+    listener: list[can.BusABC] = []
+    opener = threading.Thread(
+        target=lambda: listener.append(can.Bus(interface="fleetloop", channel="r1"))
+    )
+    opener.start()
+    while opener.is_alive():
+        hub.collect(0.0)
+    for k in range(50):
+        hub.deliver("r1", k, (Frame(0x009, bytes(8)),))
+        assert hub.collect(10.0) == ()
+        assert len(hub.take("r1")) == 2
+    heard = [listener[0].recv(5.0).arbitration_id & 0x7FF for _ in range(150)]
+    assert heard == [0x009, 0x00E, 0x02E] * 50
+    listener[0].shutdown()
+
+
+def test_a_paced_client_that_leaves_is_named_and_waited_for_no_longer(paced) -> None:
+    hub = paced
+    hub.deliver("r1", 0, (Frame(LEAVE, b""),))
+    hub.collect(10.0)
+    while not hub.left():
+        hub.collect(0.0)
+    hub.deliver("r1", 1, (Frame(0x009, bytes(8)),))
+    assert hub.collect(10.0) == ()
+    assert hub.left() == ("r1",)
+
+
+@given(st.lists(st.binary(max_size=64), max_size=5))
+def test_garbage_from_a_client_is_counted_and_harms_nobody(garbage: list[bytes]) -> None:
+    import os
+    import socket
+    import tempfile
+
+    with tempfile.TemporaryDirectory(prefix="fl-", dir="/tmp") as folder:
+        os.environ["FLEETLOOP_RUNTIME"] = folder
+        run = places.create_run_folder("garbage")
+        hub = Hub(places.listen(run, ("r1",)))
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as stranger:
+            stranger.connect(str(places.socket_path(run, "r1")))
+            for data in garbage:
+                stranger.send(data)
+            for _ in range(len(garbage) + 2):
+                hub.collect(0.0)
+        hub.collect(0.0)
+        assert hub.take("r1") == []
+        hub.close("")
