@@ -105,7 +105,6 @@ class InProcessRun:
                     agent.hear(reply, bus_ns)
             if recorded:
                 truth.add(tick, unit.row(t_s))
-            if tick < schedule.ticks:
                 unit.advance(t_s, schedule.period_s, self._brief.substeps)
 
     def _localise(self, tick: int) -> None:

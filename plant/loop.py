@@ -5,8 +5,8 @@
              integrate to t_{k+1} with the torques held
 
 Bus time runs from power-up; scenario time is 0 when control starts, after the countdown in which
-the controllers arm their drives. The run ends with one closing tick at which the controllers
-disarm.
+the controllers arm their drives and the bodies are held as the scenario puts them. The run ends
+with one closing tick at which the controllers disarm.
 """
 
 import time
@@ -104,12 +104,11 @@ class LockstepLoop:
         self._collect(tick, bus_ns, stop)
         if stop.requested:
             return
-        recorded = 0 <= tick < schedule.ticks
+        if not 0 <= tick < schedule.ticks:
+            return
         for unit, rows in zip(self._units, self._rows, strict=True):
-            if recorded:
-                rows.add(tick, unit.row(t_s))
-            if tick < schedule.ticks:
-                unit.advance(t_s, schedule.period_s, self._brief.substeps)
+            rows.add(tick, unit.row(t_s))
+            unit.advance(t_s, schedule.period_s, self._brief.substeps)
 
     def _collect(self, tick: int, bus_ns: int, stop: Stop) -> None:
         """Wait for all answers; what drives reply to requests goes out within the same instant."""

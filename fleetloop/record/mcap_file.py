@@ -6,8 +6,9 @@ messages of one channel each. A file that lost its end (its writer was killed) i
 """
 
 import zlib
+from io import FileIO
 from pathlib import Path
-from typing import BinaryIO, Self
+from typing import Self
 
 import numpy as np
 import zstandard
@@ -27,7 +28,7 @@ _ZSTD_LEVEL = 1
 class McapFile:
     """One record file that is being written."""
 
-    def __init__(self, path: Path, stream: BinaryIO) -> None:
+    def __init__(self, path: Path, stream: FileIO) -> None:
         self._path = path
         self._stream = stream
         self._offset = 0
@@ -46,7 +47,7 @@ class McapFile:
             InfrastructureError: it can't be written.
         """
         try:
-            file = cls(path, path.open("wb"))
+            file = cls(path, path.open("wb", buffering=0))
         except OSError as error:
             raise InfrastructureError(f"can't write {path}: {error.strerror}") from error
         file._write(MAGIC)
@@ -78,7 +79,7 @@ class McapFile:
     def resume(cls, path: Path) -> Self:
         """Take up a file that lost its end; what isn't complete is cut off."""
         found = scan(path)
-        stream = path.open("r+b")
+        stream = path.open("r+b", buffering=0)
         stream.truncate(found.end)
         stream.seek(found.end)
         file = cls(path, stream)
@@ -126,13 +127,6 @@ class McapFile:
         )
         self._counts[channel] = self._counts.get(channel, 0) + len(messages)
 
-    def flush(self) -> None:
-        """Hand everything to the operating system: a kill can't take it back."""
-        try:
-            self._stream.flush()
-        except OSError as error:
-            raise self._failed(error) from error
-
     def finish(self) -> None:
         """Write summary and footer, and close."""
         self._put(records.DataEnd(data_section_crc=0))
@@ -144,7 +138,6 @@ class McapFile:
         footer = records.Footer(summary_start=start, summary_offset_start=0, summary_crc=0)
         self._put(footer)
         self._write(MAGIC)
-        self.flush()
         self._stream.close()
 
     def close(self) -> None:
@@ -187,14 +180,17 @@ class McapFile:
         self._write(builder.end())
 
     def _write(self, data: bytes) -> None:
+        """Hand it to the operating system at once: a kill can't take it back."""
+        rest = memoryview(data)
         try:
-            self._stream.write(data)
+            while rest:
+                rest = rest[self._stream.write(rest) :]
         except OSError as error:
-            raise self._failed(error) from error
+            self._stream.close()
+            raise InfrastructureError(
+                f"can't write {self._path}: {error.strerror or error}"
+            ) from error
         self._offset += len(data)
-
-    def _failed(self, error: OSError) -> InfrastructureError:
-        return InfrastructureError(f"can't write {self._path}: {error.strerror or error}")
 
 
 def _message_index(channel: int, messages: np.ndarray) -> bytes:

@@ -98,7 +98,6 @@ class RecordWriter:
             if kind is Kind.PLANT:
                 channel = channel_id(number, Kind.POSE)
                 self._file.chunk(channel, pose_messages(channel, first, rows, self._period_ns))
-        self._file.flush()
 
     def __enter__(self) -> Self:
         return self

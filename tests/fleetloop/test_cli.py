@@ -1,0 +1,144 @@
+"""The command line as a user meets it, in a process of its own."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from configs.loading import load, shipped
+
+VERBS = ("run", "check", "report", "export", "diff", "init")
+
+
+def fleetloop(*args: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "fleetloop", *args],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env=os.environ | {"COLUMNS": "100", "PYTHONSAFEPATH": "1"},
+    )
+
+
+def test_help_names_every_verb_and_where_to_begin(tmp_path: Path) -> None:
+    done = fleetloop("--help", cwd=tmp_path)
+    assert done.returncode == 0
+    for verb in VERBS:
+        assert verb in done.stdout
+    assert "fleetloop run paper" in done.stdout
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_has_help(verb: str, tmp_path: Path) -> None:
+    done = fleetloop(verb, "--help", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "Usage" in done.stdout
+
+
+def test_check_without_a_name_lists_the_shipped_scenarios(tmp_path: Path) -> None:
+    out = fleetloop("check", cwd=tmp_path).stdout
+    for name in shipped():
+        assert name in out
+
+
+def test_check_shows_both_sides_of_46(tmp_path: Path) -> None:
+    done = fleetloop("check", "paper_ring", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "p²/q > max Im(ζ)²/Re(ζ)" in done.stdout
+    assert "4 > 1" in done.stdout
+    assert "sound" in done.stdout
+
+
+def test_check_of_an_unsound_scenario_ends_with_1(tmp_path: Path) -> None:
+    done = fleetloop("check", "paper", "--set", "control.k4=30.0", "--json", cwd=tmp_path)
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["sound"] is False
+
+
+def test_init_writes_a_scenario_that_checks_and_is_not_overwritten(tmp_path: Path) -> None:
+    assert fleetloop("init", "mine.toml", cwd=tmp_path).returncode == 0
+    assert load(tmp_path / "mine.toml").name == "my_scenario"
+    assert fleetloop("check", "mine.toml", cwd=tmp_path).returncode == 0
+    again = fleetloop("init", "mine.toml", cwd=tmp_path)
+    assert again.returncode == 2
+    assert "exists already" in again.stderr
+
+
+def test_a_bad_scenario_ends_with_2_one_line_per_problem_and_starts_nothing(tmp_path: Path) -> None:
+    done = fleetloop(
+        "run", "two_robots", "--set", "control.k1=-1", "--set", "nonsense=1", cwd=tmp_path
+    )
+    assert done.returncode == 2
+    lines = done.stderr.splitlines()
+    assert len(lines) == 2
+    assert "control.k1 = -1: must be greater than 0" in done.stderr
+    assert "nonsense = 1: unknown key" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_expectation_of_an_unknown_signal_ends_with_2(tmp_path: Path) -> None:
+    bad = 'expect=[{signal="speed", max=1.0}]'
+    done = fleetloop("run", "two_robots", "--set", bad, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "no such signal" in done.stderr
+
+
+def test_an_expectation_that_fails_ends_with_1(tmp_path: Path) -> None:
+    done = fleetloop(
+        "run",
+        "two_robots",
+        "--in-process",
+        "--no-report",
+        "--duration=0.1",
+        "--set",
+        'expect=[{signal="v_m_s", max=0.1}]',
+        cwd=tmp_path,
+    )
+    assert done.returncode == 1
+    assert "FAILED" in done.stdout
+
+
+def test_a_folder_in_use_and_a_folder_that_can_not_be_made_are_named(tmp_path: Path) -> None:
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "file").touch()
+    done = fleetloop("run", "two_robots", "--out", "full", cwd=tmp_path)
+    assert (done.returncode, "not an empty folder" in done.stderr) == (2, True)
+    done = fleetloop("run", "two_robots", "--out", "full/file/x", cwd=tmp_path)
+    assert (done.returncode, "can't write the run's folder" in done.stderr) == (3, True)
+
+
+def test_json_of_a_run_is_its_summary_and_nothing_else(tmp_path: Path) -> None:
+    done = fleetloop(
+        "run",
+        "two_robots",
+        "--in-process",
+        "--json",
+        "--no-report",
+        "--duration=0.5",
+        "--out=x",
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0
+    summary = json.loads(done.stdout)
+    assert summary["ticks"] == 250
+    assert json.loads((tmp_path / "x" / "summary.json").read_text()).items() <= summary.items()
+
+
+def test_reports_of_nothing_end_with_2(tmp_path: Path) -> None:
+    for verb in (["report", "nowhere"], ["export", "nowhere", "a.csv"], ["diff", "a", "b"]):
+        done = fleetloop(*verb, cwd=tmp_path)
+        assert done.returncode == 2
+        assert "no record.mcap there" in done.stderr
+
+
+def test_a_role_is_not_started_by_hand(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "agents"], input=b"", capture_output=True, timeout=30, cwd=tmp_path
+    )
+    assert done.returncode == 2
+    assert b"no AgentBrief" in done.stderr

@@ -1,0 +1,156 @@
+"""What a run leaves: summary, report, figures, export, and comparison of two runs."""
+
+import csv
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from configs.errors import ScenarioError
+from configs.loading import load
+from fleetloop.diff import compare, print_comparison
+from fleetloop.export import COLUMNS, export
+from fleetloop.record.reader import Record
+from fleetloop.report import write_report
+from fleetloop.run import Options, run_scenario
+
+HEADER = (
+    "t_s,robot,x_m,y_m,theta_rad,v_m_s,omega_rad_s,s,s_dot,v_r_hat,x_e_m,y_e_m,theta_e_rad,"
+    "tau_right_Nm,tau_left_Nm"
+)
+
+
+def test_the_summary_holds_what_is_promised(finished_run: Path) -> None:
+    summary = json.loads((finished_run / "summary.json").read_text())
+    assert summary["verdict"] == "held"
+    assert summary["ticks"] == 2000
+    assert summary["wall_s"] > 0
+    assert summary["real_time_factor"] == pytest.approx(4.0 / summary["wall_s"], rel=0.01)
+    assert set(summary["robots"]) == {"r1", "r2"}
+    for robot in summary["robots"].values():
+        assert (
+            set(robot["settle_s"])
+            == set(robot["final_max"])
+            == {
+                "x_e_m",
+                "y_e_m",
+                "theta_e_rad",
+            }
+        )
+        assert robot["peak_torque_Nm"] > 0
+    assert set(summary["s_spread"]) == {"peak", "settle_s", "final"}
+    assert summary["overruns"] == 0
+    # Two encoder and two torque frames per tick from tick 0 on, heartbeats, and the arming.
+    assert 8000 < summary["frames_per_bus"]["r1"] < 9000
+    assert summary["seed"] == 1
+    assert "eclipse-zenoh" in summary["versions"]
+
+
+def test_the_scenario_in_the_folder_repeats_the_run(finished_run: Path, tmp_path: Path) -> None:
+    again = tmp_path / "again"
+    scenario = str(finished_run / "scenario.toml")
+    assert load(scenario) == load("two_robots")
+    run_scenario(scenario, Options(in_process=True, out=again, figures=False, as_json=True))
+    assert (again / "record.mcap").read_bytes() == (finished_run / "record.mcap").read_bytes()
+
+
+def test_figures_are_there_and_not_empty(finished_run: Path) -> None:
+    names = {path.stem for path in (finished_run / "figures").iterdir()}
+    assert {"fig3_graph", "fig4_positions", "fig5_x_e", "fig6_y_e", "fig7_theta_e"} <= names
+    assert {"fig8_parameter_errors", "path_variables", "speed_estimates", "torques"} <= names
+    for path in (finished_run / "figures").iterdir():
+        image = imread(path)
+        assert image.shape[1] > 800
+        assert image[..., :3].std() > 0.02
+
+
+def test_the_page_stands_alone_and_says_the_verdict(finished_run: Path) -> None:
+    page = (finished_run / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == 9
+    assert 'class="verdict held"' in page
+    assert "<script" not in page
+    assert "http://" not in page
+    assert "https://" not in page
+
+
+def test_the_page_can_be_made_again_without_a_summary(finished_run: Path, tmp_path: Path) -> None:
+    shutil.copy(finished_run / "record.mcap", tmp_path)
+    page = write_report(tmp_path).read_text()
+    assert "the run left no summary.json" in page
+
+
+def test_the_table_has_the_promised_columns_and_a_row_per_tick_and_robot(
+    finished_run: Path, tmp_path: Path
+) -> None:
+    export(finished_run, tmp_path / "a.csv")
+    with (tmp_path / "a.csv").open() as stream:
+        assert stream.readline().strip() == HEADER
+        stream.seek(0)
+        table = list(csv.DictReader(stream))
+    assert len(table) == 4000
+    assert [row["robot"] for row in table[:3]] == ["r1", "r2", "r1"]
+    record = Record.open(finished_run / "record.mcap")
+    row = table[2 * 1500 + 1]
+    assert float(row["t_s"]) == 3.0
+    assert float(row["x_m"]) == record.plant["r2"]["x_m"][1500]
+    assert float(row["tau_left_Nm"]) == record.controller["r2"]["tau_left_Nm"][1500]
+
+
+def test_npz_and_csv_hold_the_same(finished_run: Path, tmp_path: Path) -> None:
+    export(finished_run, tmp_path / "a.csv")
+    export(finished_run, tmp_path / "a.npz")
+    arrays = np.load(tmp_path / "a.npz")
+    assert tuple(arrays) == COLUMNS
+    with (tmp_path / "a.csv").open() as stream:
+        table = list(csv.DictReader(stream))
+    for name in COLUMNS:
+        column = [row[name] for row in table]
+        expected = column if name == "robot" else list(map(float, column))
+        assert arrays[name].tolist() == expected
+
+
+def test_another_ending_is_refused(finished_run: Path, tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"must be \.csv or \.npz"):
+        export(finished_run, tmp_path / "a.xlsx")
+
+
+def test_a_run_is_identical_to_itself(finished_run: Path, capsys) -> None:
+    assert print_comparison(finished_run, finished_run, as_json=False) == 0
+    assert capsys.readouterr().out.startswith("identical: 2000 ticks of 2 robots")
+
+
+def test_the_first_difference_is_named_by_tick_robot_and_field(
+    finished_run: Path, tmp_path: Path, capsys
+) -> None:
+    other = tmp_path / "other"
+    changed = ("robot.r2.pose.x_m=1.951",)
+    options = Options(in_process=True, overrides=changed, out=other, figures=False, as_json=True)
+    run_scenario("two_robots", options)
+    capsys.readouterr()
+    assert print_comparison(finished_run, other, as_json=False) == 1
+    out = capsys.readouterr().out
+    assert "tick 0, robot r2, plant x_m: 1.95 in A, 1.951 in B" in out
+
+
+def test_a_single_bit_is_a_difference_and_so_is_the_sign_of_zero(finished_run: Path) -> None:
+    a = Record.open(finished_run / "record.mcap")
+    b = Record.open(finished_run / "record.mcap")
+    rows = b.controller["r1"]
+    rows["s"][0] = -0.0
+    found = compare(a, b)
+    assert (found.tick, found.robot, found.field) == (0, "r1", "s")
+    rows["s"][0] = 0.0
+    rows["mu"][1999] = np.nextafter(rows["mu"][1999], 1.0)
+    found = compare(a, b)
+    assert (found.tick, found.robot, found.field) == (1999, "r1", "mu")
+
+
+def test_a_shorter_run_differs_where_it_ends(finished_run: Path) -> None:
+    a = Record.open(finished_run / "record.mcap")
+    b = Record.open(finished_run / "record.mcap")
+    b.plant["r1"] = b.plant["r1"][:100]
+    found = compare(a, b)
+    assert (found.tick, found.field) == (100, "number of ticks")

@@ -1,0 +1,71 @@
+"""One emulated robot: bus frames in, motion and encoder frames out."""
+
+from math import pi
+
+import pytest
+
+from bridge.drives.odrive import frames as f
+from bridge.drives.odrive.frames import Command, identifier
+from bridge.frame import Frame
+from bridge.telemetry import PLANT_SIGNALS
+from configs.brief import NetworkLink
+from configs.briefing import plant_brief
+from configs.loading import load
+from plant.unit import Unit
+
+COLUMNS = [signal.name for signal in PLANT_SIGNALS]
+
+
+def unit() -> Unit:
+    scenario = load("two_robots", ("robot.r1.v_m_s=0.0", "robot.r1.pose.theta_rad=0.0"))
+    return Unit(plant_brief(scenario, network=NetworkLink("t", "", "", "")).robots[0])
+
+
+def arm(robot: Unit, right: float, left: float) -> None:
+    for node, torque in ((0, right), (1, left)):
+        robot.hear(Frame(identifier(node, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(torque)), 0)
+        robot.hear(Frame(identifier(node, Command.SET_AXIS_STATE), f.ONE_U32.pack(8)), 0)
+
+
+def test_frames_of_an_instant_come_in_order_of_arbitration() -> None:
+    identifiers = [frame.can_id for frame in unit().frames_due(0)]
+    assert identifiers == [0x001, 0x009, 0x021, 0x029]
+
+
+def test_an_idle_robot_coasts() -> None:
+    robot = unit()
+    robot.state = robot.state._replace(v=0.5)
+    robot.advance(0.0, 0.01, 2)
+    assert 0.0 < robot.state.v < 0.5
+    assert robot.state.x > 3.05
+
+
+def test_torques_on_the_bus_move_the_robot_and_its_encoders() -> None:
+    robot = unit()
+    arm(robot, 0.1, 0.1)
+    for k in range(100):
+        robot.advance(k * 0.001, 0.001, 1)
+    assert robot.state.v > 0.0
+    assert robot.state.theta == pytest.approx(0.0, abs=1e-12)
+    frames = {frame.can_id: frame.data for frame in robot.frames_due(100_000_000)}
+    turns, speed = f.TWO_FLOATS.unpack(frames[0x009])
+    assert turns == pytest.approx((robot.state.x - 3.05) / (2 * pi * 0.04), rel=1e-6)
+    assert speed == pytest.approx(robot.state.v / (2 * pi * 0.04), rel=1e-6)
+
+
+def test_the_right_wheel_turns_the_robot_to_the_left() -> None:
+    robot = unit()
+    arm(robot, 0.1, -0.1)
+    robot.advance(0.0, 0.01, 10)
+    assert robot.state.omega > 0.0
+
+
+def test_a_row_is_the_truth_and_the_torques_of_the_last_period() -> None:
+    robot = unit()
+    arm(robot, 0.1, 0.05)
+    robot.advance(0.0, 0.001, 1)
+    row = dict(zip(COLUMNS, robot.row(0.001), strict=True))
+    assert row["t_s"] == 0.001
+    assert row["v_m_s"] == robot.state.v
+    assert row["demand_right_Nm"] == row["motor_right_Nm"] == pytest.approx(0.1)
+    assert row["demand_left_Nm"] == pytest.approx(0.05)

@@ -1,0 +1,123 @@
+"""Runs of `fleetloop` as a process, for tests that look at them from outside."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import can
+import psutil
+
+WAIT_S = 60.0
+
+
+class Run:
+    """A `fleetloop run` that is going on."""
+
+    def __init__(self, folder: Path, *args: str) -> None:
+        self.folder = folder
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "fleetloop", "run", *args, "--no-report", "--out", str(folder)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"COLUMNS": "200"},
+        )
+        self.launcher = psutil.Process(self._process.pid)
+        self._family: dict[int, psutil.Process] = {}
+        self._texts = {"stdout": "", "stderr": ""}
+        self._readers = [
+            threading.Thread(target=self._read, args=(name,), daemon=True) for name in self._texts
+        ]
+        for reader in self._readers:
+            reader.start()
+
+    def _read(self, name: str) -> None:
+        self._texts[name] = getattr(self._process, name).read()
+
+    def await_bus_time(self, seconds: float) -> None:
+        """Return when the bus of r1 has reached this time: the countdown is over, rows flow."""
+        deadline = time.monotonic() + WAIT_S
+        while True:
+            assert self._process.poll() is None, self.end()
+            assert time.monotonic() < deadline
+            try:
+                bus = can.Bus(interface="fleetloop", channel="r1")
+            except can.CanInitializationError:
+                self._wait(0.02)
+            else:
+                break
+        with bus:
+            while (message := bus.recv(WAIT_S)) is not None and message.timestamp < seconds:
+                pass
+        for child in self.launcher.children(recursive=True):
+            self._family[child.pid] = child
+
+    def _wait(self, seconds: float) -> None:
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(seconds)
+
+    def children(self, module: str) -> list[psutil.Process]:
+        """Its processes of one role, in order of their start."""
+        found = [child for child in self._family.values() if module in child.cmdline()]
+        return sorted(found, key=lambda child: (child.create_time(), child.pid))
+
+    def send(self, number: signal.Signals) -> None:
+        """Send the launcher a signal."""
+        self._process.send_signal(number)
+
+    def end(self, within_s: float = WAIT_S) -> tuple[int, str]:
+        """(exit status, all it printed), at most after `within_s`."""
+        self._process.wait(within_s)
+        # Children hold its standard error too; those of a killed launcher end a little later.
+        for reader in self._readers:
+            reader.join(10.0)
+        return self._process.returncode, "".join(self._texts.values())
+
+    def survivors(self, within_s: float = 5.0) -> list[psutil.Process]:
+        """Processes of the run that still live."""
+        _, alive = psutil.wait_procs(list(self._family.values()), timeout=within_s)
+        return alive
+
+    def summary(self) -> dict[str, Any]:
+        """Its summary.json."""
+        loaded: dict[str, Any] = json.loads((self.folder / "summary.json").read_text())
+        return loaded
+
+    def kill(self) -> None:
+        """End everything that may be left, whatever happened."""
+        for process in (self.launcher, *self._family.values()):
+            if process.is_running():
+                process.kill()
+        if self._process.poll() is None:
+            self._process.wait(WAIT_S)
+        for stream in (self._process.stdout, self._process.stderr):
+            if stream is not None:
+                stream.close()
+
+
+@contextmanager
+def running(folder: Path, *args: str, bus_time_s: float = 1.3) -> Iterator[Run]:
+    """A run that has reached a bus time, and that is gone afterwards."""
+    run = Run(folder, *args)
+    try:
+        run.await_bus_time(bus_time_s)
+        yield run
+    finally:
+        run.kill()
+
+
+def completed(folder: Path, *args: str) -> tuple[int, str]:
+    """Run to the end: (exit status, all it printed)."""
+    run = Run(folder, *args)
+    try:
+        return run.end()
+    finally:
+        run.kill()

@@ -1,0 +1,51 @@
+"""Runs over processes: the same record as in one process, bit for bit."""
+
+from pathlib import Path
+
+import pytest
+from system.processes import completed, running
+
+from fleetloop.diff import print_comparison
+
+pytestmark = pytest.mark.system
+
+CYCLE = 'graph={edges=["r1 -> r2", "r2 -> r1"], leader=["r2"]}'
+
+
+@pytest.mark.parametrize("overrides", [(), ("--set", CYCLE)], ids=["two_robots", "cycle"])
+def test_processes_and_one_process_leave_the_same_record_bit_for_bit(
+    overrides: tuple[str, ...], tmp_path: Path, capsys
+) -> None:
+    a, b, c = (tmp_path / name for name in "abc")
+    assert completed(a, "two_robots", *overrides)[0] == 0
+    assert completed(b, "two_robots", "--in-process", *overrides)[0] == 0
+    assert completed(c, "two_robots", *overrides)[0] == 0
+    assert print_comparison(a, b, as_json=False) == 0
+    assert print_comparison(a, c, as_json=False) == 0
+    assert "identical: 2000 ticks of 2 robots" in capsys.readouterr().out
+    assert (a / "record.mcap").read_bytes() == (b / "record.mcap").read_bytes()
+
+
+def test_four_robots_are_at_least_six_processes_under_two_gibibytes(tmp_path: Path) -> None:
+    with running(tmp_path / "a", "paper", "--duration", "2") as run:
+        roles = [len(run.children(m)) for m in ("agents", "plant", "fleetloop.recorder")]
+        family = [run.launcher, *(p for m in ("agents", "plant") for p in run.children(m))]
+        memory = sum(process.memory_info().rss for process in family)
+        status, out = run.end()
+    assert roles == [4, 1, 1]
+    assert memory < 2 * 2**30
+    assert status == 0, out
+    summary = run.summary()
+    assert summary["ticks"] == 2000
+    assert summary["real_time_factor"] > 0
+    # Each bus carries four frames at every tick: two encoders, two torques.
+    assert all(count > 4 * 2000 for count in summary["frames_per_bus"].values())
+    assert set(summary["frames_per_bus"]) == {"r1", "r2", "r3", "r4"}
+
+
+def test_a_run_held_to_a_speed_takes_its_time(tmp_path: Path) -> None:
+    args = ("two_robots", "--duration", "1", "--speed", "1")
+    with running(tmp_path / "a", *args, bus_time_s=0.3) as run:
+        status, out = run.end()
+    assert status == 0, out
+    assert run.summary()["wall_s"] >= 0.99
