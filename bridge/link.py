@@ -2,8 +2,7 @@
 
 Promises of every link: a message put on a key reaches every link that subscribes to it once, in the
 order of its publisher, and never the link that put it; nothing is lost while both live; `receive`
-waits a bounded time and wakes at once. `bridge.zenoh_link` carries it over Zenoh, `MemoryNetwork`
-within one process.
+waits a bounded time and wakes at once. `bridge.zenoh_link` carries it over Zenoh.
 """
 
 from queue import Empty, SimpleQueue
