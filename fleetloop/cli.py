@@ -9,12 +9,9 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import click
 import typer
 
 from configs.errors import FleetloopError
-
-INTERRUPTED = 130
 
 app = typer.Typer(
     name="fleetloop",
@@ -185,17 +182,7 @@ def main() -> None:
     """Run the command line; every error that a user can cause is one line and an exit status."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        status = app(standalone_mode=False)
-    except click.exceptions.ClickException as error:
-        error.show()
-        sys.exit(error.exit_code)
+        app()
     except FleetloopError as error:
         sys.stderr.write(f"fleetloop: {error}\n")
         sys.exit(error.exit_code)
-    except (KeyboardInterrupt, click.exceptions.Abort):
-        sys.stderr.write("fleetloop: interrupted\n")
-        sys.exit(INTERRUPTED)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(0)
-    sys.exit(status if isinstance(status, int) else 0)
