@@ -14,7 +14,7 @@ from bridge.barrier import Hellos, await_hellos
 from bridge.link import Link
 from bridge.messages import Report, Rows
 from bridge.process import Stop, serve, settle_memory
-from bridge.telemetry import RowBuffer
+from bridge.telemetry import AGENT_ROW, RowBuffer
 from bridge.zenoh_link import open_client
 from configs.brief import AgentBrief
 from configs.errors import InfrastructureError
@@ -39,7 +39,8 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> None:
     telemetry = link.publisher(keys.telemetry(name, robot))
     report = link.publisher(keys.report(name, f"agent/{robot}"))
     rows = RowBuffer(
-        lambda first, count, block, final: telemetry.put(Rows(first, count, block, final).encode())
+        AGENT_ROW,
+        lambda first, count, block, final: telemetry.put(Rows(first, count, block, final).encode()),
     )
     agent = Agent(brief, rows)
     link.subscribe(keys.pose(name, robot), "pose")

@@ -53,7 +53,8 @@ class Agent:
         self._path = robot_path(brief.path, brief.offset)
         self._law = LAWS[brief.law](brief.gains, brief.wheels, self._h)
         self._law_state: LawState | None = None
-        self._localiser = Localiser(brief.localisation, brief.wheels)
+        self._pose_delay = brief.schedule.pose_delay_ticks
+        self._localiser = Localiser(brief.localisation, brief.wheels, self._pose_delay)
         self._neighbours = Neighbours(
             brief.hears, brief.coordination, self._h, brief.schedule.share_every * self._h
         )
@@ -61,27 +62,31 @@ class Agent:
         start = brief.coordination
         self._coordination = CoordinationState(start.v_hat_0, start.mu_0, start.s_0)
         self._leader: LeaderSpeed | None = None
-        self._fix: PoseFix | None = None
-        self._heard_at = dict.fromkeys(brief.hears, -2)
+        self._start_fix: PoseFix | None = None
+        self._fixes: dict[int, PoseFix] = {}  # by tick, until due
+        self._states: dict[int, dict[str, PathState]] = {}  # by tick, until due
+        self._unheard = set(brief.hears)
+        self.hear = self._drives.hear
+        """Take one frame from the bus: identifier, data, bus time [ns] at which it came."""
+        self.complete = self._drives.complete
+        """Whether both encoder frames of a bus time [ns] are here: the tick may be computed."""
 
     # --- what arrives ------------------------------------------------------------------------
 
-    def hear(self, frame: Frame, now_ns: int) -> None:
-        """Take one frame from the bus, received at bus time `now_ns`."""
-        self._drives.hear(frame, now_ns)
-
-    def complete(self, now_ns: int) -> bool:
-        """Whether both encoder frames of bus time `now_ns` are here: the tick may be computed."""
-        return self._drives.complete(now_ns)
-
     def take_pose(self, fix: PoseFix) -> None:
-        """Take a pose from the localisation system."""
-        self._fix = fix
+        """Take a pose from the localisation system; ticks below 0: where the robot starts."""
+        if fix.tick < 0:
+            self._start_fix = fix
+        else:
+            self._fixes[fix.tick] = fix
 
     def take_path(self, robot: str, state: PathState) -> None:
-        """Take what an in-neighbour says of its path variable."""
-        self._heard_at[robot] = state.tick
-        self._neighbours.hear(robot, state.t_ns, state.s, state.v_hat)
+        """Take what an in-neighbour says of its path variable; ticks below 0: where it starts."""
+        self._unheard.discard(robot)
+        if state.tick < 0:
+            self._neighbours.hear(robot, state.t_ns, state.s, state.v_hat)
+        else:
+            self._states.setdefault(state.tick, {})[robot] = state
 
     def take_leader(self, speed: LeaderSpeed) -> None:
         """Take the virtual leader's speed, now and to come."""
@@ -89,8 +94,8 @@ class Agent:
 
     def missing_to_start(self) -> list[str]:
         """Whom the robot has to hear before the run, and has not yet."""
-        missing = [f"the path variable of {r}" for r, tick in self._heard_at.items() if tick < -1]
-        if self._fix is None:
+        missing = [f"the path variable of {robot}" for robot in sorted(self._unheard)]
+        if self._start_fix is None:
             missing.append("the localisation system")
         if self._leader is None and self.brief.hears_leader:
             missing.append("the leader")
@@ -99,17 +104,18 @@ class Agent:
     def missing(self, tick: int) -> list[str]:
         """What the schedule says is due at this tick and has not arrived."""
         missing = []
-        if self._schedule.localises(tick) and (self._fix is None or self._fix.tick < tick):
+        pose_tick = tick - self._pose_delay
+        if self._schedule.localises(pose_tick) and pose_tick not in self._fixes:
             missing.append("pose")
         if self._schedule.shares(tick):
-            late = (robot for robot, heard in self._heard_at.items() if heard < tick)
-            missing += [f"path state of {robot}" for robot in late]
+            heard = self._states.get(tick, {})
+            missing += [f"path state of {r}" for r in self.brief.hears if r not in heard]
         return missing
 
     # --- one period --------------------------------------------------------------------------
 
     def share(self, tick: int) -> PathState:
-        """What the out-neighbours hear at this tick."""
+        """What the out-neighbours hear at this tick; known as soon as the tick before is done."""
         v_hat, _, s = self._coordination
         return PathState(tick, tick * self._schedule.period_ns, s, v_hat)
 
@@ -119,23 +125,33 @@ class Agent:
         Raises:
             InfrastructureError: the drives were not armed when control had to start.
         """
-        right, left = self._drives.right, self._drives.left
-        if right is None or left is None:
+        motion = self._drives.motion()
+        if motion is None:
             return self._arm(tick)
-        sense = self._localiser.wheels(
-            right.angle_rad, left.angle_rad, right.speed_rad_s, left.speed_rad_s
-        )
-        fix = self._fix
-        if fix is not None and (fix.tick == tick or tick <= 0):
-            sense = self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad)
-        if tick < 0:
-            return self._arm(tick)
+        sense = self._localiser.wheels(*motion)
+        if tick <= 0:
+            if self._start_fix is not None:
+                start = self._start_fix
+                sense = self._localiser.fix(start.x_m, start.y_m, start.theta_rad)
+            if tick < 0:
+                return self._arm(tick)
+        if self._schedule.owes(tick):
+            sense = self._take_due(tick, sense)
         if tick >= self._schedule.ticks:
             self.phase = Phase.DONE
             return self._drives.disarm()
         if self.phase is not Phase.DRIVING:
             self._begin(tick)
         return self._control(tick, sense)
+
+    def _take_due(self, tick: int, sense: Sense) -> Sense:
+        """Use what is due at this tick, in the order of names whatever the order of arrival."""
+        for robot, state in sorted(self._states.pop(tick, {}).items()):
+            self._neighbours.hear(robot, state.t_ns, state.s, state.v_hat)
+        fix = self._fixes.pop(tick - self._pose_delay, None)
+        if fix is None:
+            return sense
+        return self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad, self._pose_delay)
 
     def _arm(self, tick: int) -> Sequence[Frame]:
         bus_ns = self._schedule.bus_time_ns(tick)
@@ -166,7 +182,6 @@ class Agent:
         n, sum_s, sum_v = self._neighbours.sums(t_ns)
         v_r = self._leader.at(t_ns) if self._leader is not None else 0.0
         self._coordination = self._coordinator.advance(coordination, n, sum_s, sum_v, v_r)
-        used = out.used
         self._rows.add(
             tick,
             (
@@ -180,17 +195,7 @@ class Agent:
                 reference.x,
                 reference.y,
                 reference.theta,
-                out.x_e,
-                out.y_e,
-                out.theta_e,
-                used.alpha_theta,
-                used.alpha_v,
-                used.alpha_omega,
-                out.xi_e1,
-                out.xi_e2,
-                *used.theta_1,
-                *used.theta_2,
-                used.kappa,
+                *out.signals,
                 *self._drives.sent,
             ),
         )

@@ -37,17 +37,12 @@ class LawState(NamedTuple):
 
 
 class LawOutput(NamedTuple):
-    """One step of a law: torques, next state, and the values used at this tick."""
+    """One step of a law: torques, next state, and what is recorded of this tick."""
 
     tau_right: float  # [N·m]
     tau_left: float  # [N·m]
     state: LawState  # at the next tick
-    used: LawState  # at this tick
-    x_e: float
-    y_e: float
-    theta_e: float
-    xi_e1: float  # v − α_v [m/s]
-    xi_e2: float  # ω − α_ω [rad/s]
+    signals: tuple[float, ...]  # those of `bridge.telemetry.LAW_SIGNALS`, in that order
 
 
 Law = Callable[[LawState | None, Sense, Reference, float], LawOutput]
@@ -93,8 +88,12 @@ def adaptive_dsc(gains: Gains, wheels: Wheels, period_s: float) -> Law:
         e_1, e_2 = v - alpha_v, omega - alpha_omega  # (30)
         f_1 = (omega * omega, -v, -omega, -rate_v)  # (32)
         f_2 = (-v * omega, -v, -omega, -rate_omega)
-        u_1 = -k4 * e_1 - _dot(f_1, theta_1) - kappa * tanh(e_1 / width)  # (34)
-        u_2 = -k4 * e_2 - _dot(f_2, theta_2) - kappa * tanh(e_2 / width)
+        t1, t2, t3, t4 = theta_1
+        t5, t6, t7, t8 = theta_2
+        known_1 = f_1[0] * t1 - v * t2 - omega * t3 - rate_v * t4
+        known_2 = f_2[0] * t5 - v * t6 - omega * t7 - rate_omega * t8
+        u_1 = -k4 * e_1 - known_1 - kappa * tanh(e_1 / width)  # (34)
+        u_2 = -k4 * e_2 - known_2 - kappa * tanh(e_2 / width)
         tau_right, tau_left = wheel_torques(u_1, u_2, radius, half_track)
         after = LawState(
             alpha_theta + a1 * (bar_theta - alpha_theta),
@@ -104,13 +103,10 @@ def adaptive_dsc(gains: Gains, wheels: Wheels, period_s: float) -> Law:
             adapt(theta_2, f_2, e_2, rates_2, bounds),
             keep * kappa + gain * hypot(e_1, e_2),  # (36)
         )
-        return LawOutput(tau_right, tau_left, after, state, x_e, y_e, theta_e, e_1, e_2)
+        signals = (x_e, y_e, theta_e, alpha_theta, alpha_v, alpha_omega, e_1, e_2)
+        return LawOutput(tau_right, tau_left, after, (*signals, *theta_1, *theta_2, kappa))
 
     return step
 
 
 LAWS: Mapping[str, Callable[[Gains, Wheels, float], Law]] = {"adaptive_dsc": adaptive_dsc}
-
-
-def _dot(a: Row, b: Row) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]

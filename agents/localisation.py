@@ -1,18 +1,21 @@
 """Where the robot believes it is: from the localisation system, from wheel odometry, or both.
 
-    fused      the newest fix, carried forward by odometry until the next one
+    fused      the newest fix, carried on by odometry from its own instant
     external   the newest fix, held
-    odometry   the first fix, carried forward by odometry for ever
+    odometry   the first fix, carried on by odometry for ever
 
 Odometry over one period, from wheel angle increments δ_R, δ_L:
 
     d = r (δ_R + δ_L)/2,  φ = r (δ_R − δ_L)/(2 b)
     x += d cos(θ + φ/2),  y += d sin(θ + φ/2),  θ += φ
 
-Speeds always come from the wheels: v = r (ν_R + ν_L)/2, ω = r (ν_R − ν_L)/(2 b), the inverse of
-(3). The heading isn't wrapped: a fix is taken as the nearest angle of its direction.
+A fix F of an instant at which odometry stood at O, and stands at P now, gives F ⊕ (P ⊖ O): a fix
+may be late by some periods, and nothing of the motion since is lost. Speeds always come from the
+wheels: v = r (ν_R + ν_L)/2, ω = r (ν_R − ν_L)/(2 b), the inverse of (3). The heading isn't wrapped:
+a fix is taken as the nearest angle of its direction.
 """
 
+from collections import deque
 from math import cos, pi, sin
 
 from agents.laws import Sense
@@ -20,49 +23,79 @@ from configs.brief import Wheels
 
 
 class Localiser:
-    """Keeps the pose estimate of one robot. Wheels first, then a fix of the same instant."""
+    """Keeps the pose estimate of one robot. Wheels first, then a fix."""
 
-    __slots__ = ("_fixed", "_half", "_half_over_b", "_left", "_mode", "_right", "_sense")
+    __slots__ = (
+        "_anchor",
+        "_fixed",
+        "_half",
+        "_half_over_b",
+        "_held",
+        "_left",
+        "_mode",
+        "_odometry",
+        "_past",
+        "_right",
+        "_speeds",
+    )
 
-    def __init__(self, mode: str, wheels: Wheels) -> None:
+    def __init__(self, mode: str, wheels: Wheels, delay_ticks: int = 0) -> None:
         self._mode = mode
         self._half = 0.5 * wheels.radius_m
         self._half_over_b = 0.5 * wheels.radius_m / wheels.half_track_m
         self._right: float | None = None
         self._left = 0.0
         self._fixed = False
-        self._sense = Sense(0.0, 0.0, 0.0, 0.0, 0.0)
+        self._speeds = (0.0, 0.0)
+        self._odometry = (0.0, 0.0, 0.0)
+        self._past = deque([self._odometry], maxlen=delay_ticks + 1)
+        self._held = mode == "external"
+        # Fix, odometry at its instant, and the turn from odometry's axes to the world's.
+        self._anchor = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
     def wheels(
         self, right_angle: float, left_angle: float, right_speed: float, left_speed: float
     ) -> Sense:
         """Take wheel angles [rad] and speeds [rad/s]; return the motion now."""
-        x, y, theta, _, _ = self._sense
-        if self._right is not None and self._mode != "external":
+        if self._right is not None:
+            x, y, theta = self._odometry
             right, left = right_angle - self._right, left_angle - self._left
             distance = self._half * (right + left)
             turn = self._half_over_b * (right - left)
             middle = theta + 0.5 * turn
-            x += distance * cos(middle)
-            y += distance * sin(middle)
-            theta += turn
+            self._odometry = (
+                x + distance * cos(middle),
+                y + distance * sin(middle),
+                theta + turn,
+            )
         self._right, self._left = right_angle, left_angle
-        self._sense = Sense(
-            x,
-            y,
-            theta,
+        self._past.append(self._odometry)
+        self._speeds = (
             self._half * (right_speed + left_speed),
             self._half_over_b * (right_speed - left_speed),
         )
-        return self._sense
+        return self._sense()
 
-    def fix(self, x: float, y: float, theta: float) -> Sense:
-        """Take a pose of this instant from the localisation system; return the motion now."""
+    def fix(self, x: float, y: float, theta: float, ticks_ago: int = 0) -> Sense:
+        """Take a pose of now, or of some periods ago; return the motion now."""
         if self._fixed and self._mode == "odometry":
-            return self._sense
+            return self._sense()
+        o_x, o_y, o_theta = self._past[-1 - ticks_ago]
         if self._fixed:
-            turns = round((self._sense.theta - theta) / (2.0 * pi))
-            theta += 2.0 * pi * turns
+            then = self._anchor[2] + (o_theta - self._anchor[5])
+            theta += 2.0 * pi * round((then - theta) / (2.0 * pi))
         self._fixed = True
-        self._sense = Sense(x, y, theta, self._sense.v, self._sense.omega)
-        return self._sense
+        turned = theta - o_theta
+        self._anchor = (x, y, theta, o_x, o_y, o_theta, cos(turned), sin(turned))
+        return self._sense()
+
+    def _sense(self) -> Sense:
+        f_x, f_y, f_theta, o_x, o_y, o_theta, c, s = self._anchor
+        v, omega = self._speeds
+        if self._held:
+            return Sense(f_x, f_y, f_theta, v, omega)
+        x, y, theta = self._odometry
+        dx, dy = x - o_x, y - o_y
+        return Sense(
+            f_x + (c * dx - s * dy), f_y + (s * dx + c * dy), f_theta + (theta - o_theta), v, omega
+        )

@@ -1,8 +1,9 @@
 """One controller in lockstep: the bus is the clock.
 
 Both encoder frames of an instant are the tick; then come the pose and the in-neighbours' path
-states that the schedule says are due. A robot speaks before it listens, so a graph with cycles
-can't deadlock. The torque frames are the answer.
+states that the schedule says are due. The torque frames are the answer. A path state is said as
+soon as it is known, at the end of the tick before the one that it is due at: so it travels while
+others still compute, and a graph with cycles can't deadlock.
 """
 
 import time
@@ -12,7 +13,7 @@ import can
 
 from agents.agent import Agent, Phase
 from bridge.barrier import Hellos
-from bridge.frame import EFF, ERR, RTR, Frame
+from bridge.can_bus.convert import can_id_of, to_message
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import LeaderSpeed, PathState, PoseFix
 from bridge.process import Stop
@@ -103,7 +104,7 @@ class LockstepLoop:
         asked_ns = time.monotonic_ns()
         while message is not None:
             now_ns = round(message.timestamp * 1e9)
-            agent.hear(_frame(message), now_ns)
+            agent.hear(can_id_of(message), message.data, now_ns)
             # Replies to somebody else may follow at an instant that is answered already.
             if now_ns > answered_ns and agent.complete(now_ns):
                 answered_ns = now_ns
@@ -111,8 +112,10 @@ class LockstepLoop:
                 tick = self._schedule.tick_of(now_ns)
                 self._listen(tick, stop)
                 heard_ns = time.monotonic_ns()
-                for frame in agent.step(tick) if not stop.requested else agent.leave():
-                    self._bus.send(_message(frame))
+                for can_id, data in agent.step(tick) if not stop.requested else agent.leave():
+                    self._bus.send(to_message(can_id, data))
+                if self._schedule.shares(tick + 1):
+                    self._path.put(agent.share(tick + 1).encode())
                 counters.bus_ns += came_ns - asked_ns
                 counters.listen_ns += heard_ns - came_ns
                 asked_ns = time.monotonic_ns()
@@ -127,11 +130,9 @@ class LockstepLoop:
         )
 
     def _listen(self, tick: int, stop: Stop) -> None:
-        """Share when due, then wait for what the schedule owes this tick, or for a stop."""
+        """Wait for what the schedule owes this tick, or for a stop."""
         agent = self._agent
-        if self._schedule.shares(tick):
-            self._path.put(agent.share(tick).encode())
-        elif not self._schedule.localises(tick):
+        if not self._schedule.owes(tick):
             return
         deadline = time.monotonic() + LISTEN_SHARE * self._schedule.tick_deadline_s
         while (missing := agent.missing(tick)) and not stop.requested:
@@ -152,19 +153,3 @@ class LockstepLoop:
             raise PeerLostError(
                 f"{self._robot}: lost its bus after {self.counters.ticks} ticks: {error}"
             ) from error
-
-
-def _frame(message: can.Message) -> Frame:
-    can_id = message.arbitration_id
-    if message.is_extended_id:
-        can_id |= EFF
-    if message.is_error_frame:
-        can_id |= ERR
-    if message.is_remote_frame:
-        return Frame(can_id | RTR, bytes(message.dlc))
-    return Frame(can_id, bytes(message.data))
-
-
-def _message(frame: Frame) -> can.Message:
-    can_id, data = frame
-    return can.Message(arbitration_id=can_id, data=data, is_extended_id=False)

@@ -15,23 +15,9 @@ A filter's rate is α' = (bar − α)/γ; over one period h with its input held 
 """
 
 from math import cos, exp, pi, sin
-from typing import NamedTuple
 
-
-class PathErrors(NamedTuple):
-    """Where the robot is, seen from itself, relative to where it should be: (8)."""
-
-    x: float  # [m]
-    y: float  # [m]
-    theta: float  # [rad], in (−π, π]
-
-
-class Filters(NamedTuple):
-    """States of the three filters."""
-
-    theta: float  # α_θ [rad]
-    v: float  # α_v [m/s]
-    omega: float  # α_ω [rad/s]
+PathErrors = tuple[float, float, float]
+"""(8): where the robot is, seen from itself, against its reference: x_e, y_e [m], θ_e [rad]."""
 
 
 def wrap(angle: float) -> float:
@@ -48,7 +34,7 @@ def path_errors(
     """Errors (8) of a robot at (x, y, θ) against its reference."""
     c, s = cos(theta), sin(theta)
     dx, dy = x - x_d, y - y_d
-    return PathErrors(c * dx + s * dy, c * dy - s * dx, wrap(theta - theta_d))
+    return c * dx + s * dy, c * dy - s * dx, wrap(theta - theta_d)
 
 
 def smoothing(period_s: float, time_constant_s: float) -> float:

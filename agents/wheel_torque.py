@@ -27,6 +27,7 @@ Row = tuple[float, float, float, float]
 class Projection(NamedTuple):
     """The bounds of one parameter estimate."""
 
+    sigma: float  # σ_M
     square: float  # σ_M²
     span: float  # k² + 2 k σ_M
     limit: float  # σ_M + k
@@ -34,7 +35,8 @@ class Projection(NamedTuple):
     @classmethod
     def of(cls, sigma_max: float, margin: float) -> "Projection":
         """Bounds from σ_M and k."""
-        return cls(sigma_max**2, margin**2 + 2.0 * margin * sigma_max, sigma_max + margin)
+        span = margin**2 + 2.0 * margin * sigma_max
+        return cls(sigma_max, sigma_max**2, span, sigma_max + margin)
 
 
 def project(drive: float, estimate: float, bounds: Projection) -> float:
@@ -51,13 +53,30 @@ def adapt(row: Row, regressor: Row, error: float, gains: Row, bounds: Projection
     t1, t2, t3, t4 = row
     f1, f2, f3, f4 = regressor
     g1, g2, g3, g4 = gains
+    sigma = bounds[0]
+    if (
+        -sigma <= t1 <= sigma
+        and -sigma <= t2 <= sigma
+        and -sigma <= t3 <= sigma
+        and -sigma <= t4 <= sigma
+    ):
+        t1 += g1 * (f1 * error)
+        t2 += g2 * (f2 * error)
+        t3 += g3 * (f3 * error)
+        t4 += g4 * (f4 * error)
+        if (
+            -sigma <= t1 <= sigma
+            and -sigma <= t2 <= sigma
+            and -sigma <= t3 <= sigma
+            and -sigma <= t4 <= sigma
+        ):
+            return t1, t2, t3, t4
+    else:
+        t1 += g1 * project(f1 * error, t1, bounds)
+        t2 += g2 * project(f2 * error, t2, bounds)
+        t3 += g3 * project(f3 * error, t3, bounds)
+        t4 += g4 * project(f4 * error, t4, bounds)
     limit = bounds.limit
-    t1 += g1 * project(f1 * error, t1, bounds)
-    t2 += g2 * project(f2 * error, t2, bounds)
-    t3 += g3 * project(f3 * error, t3, bounds)
-    t4 += g4 * project(f4 * error, t4, bounds)
-    if max(t1, t2, t3, t4) <= limit and min(t1, t2, t3, t4) >= -limit:
-        return t1, t2, t3, t4
     return _clip(t1, limit), _clip(t2, limit), _clip(t3, limit), _clip(t4, limit)
 
 

@@ -7,8 +7,7 @@ figures and diff go by name.
 """
 
 import struct
-from array import array
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 
@@ -34,21 +33,7 @@ PLANT_SIGNALS: tuple[Signal, ...] = (
 )
 """Truth of one robot at one tick, before the controller answers."""
 
-AGENT_SIGNALS: tuple[Signal, ...] = (
-    Signal("t_s", "s", "scenario time of the tick"),
-    Signal("x_hat_m", "m", "position that the controller used"),
-    Signal("y_hat_m", "m", "position that the controller used"),
-    Signal("theta_hat_rad", "rad", "heading that the controller used"),
-    Signal("v_hat_m_s", "m/s", "forward speed that the controller used"),
-    Signal("omega_hat_rad_s", "rad/s", "turn rate that the controller used"),
-    Signal("s", "m", "path variable"),
-    Signal("s_dot", "m/s", "its rate, mu + v_r_hat"),
-    Signal("mu", "m/s", "coordination state of (40)"),
-    Signal("v_r_hat", "m/s", "estimate of the reference speed, (38)"),
-    Signal("neighbours", "1", "in-neighbours that counted in the sums"),
-    Signal("x_d_m", "m", "reference position, (1)"),
-    Signal("y_d_m", "m", "reference position, (1)"),
-    Signal("theta_d_rad", "rad", "reference heading, (8)"),
+LAW_SIGNALS: tuple[Signal, ...] = (
     Signal("x_e_m", "m", "path following error, (8)"),
     Signal("y_e_m", "m", "path following error, (8)"),
     Signal("theta_e_rad", "rad", "path following error, (8), in (−π, π]"),
@@ -66,6 +51,25 @@ AGENT_SIGNALS: tuple[Signal, ...] = (
     Signal("theta_hat_7", "N·m·s", "estimate of d̄_22"),
     Signal("theta_hat_8", "kg·m²", "estimate of m̄_2"),
     Signal("kappa_hat", "N·m", "estimate of the disturbance bound, (36)"),
+)
+"""What a law says of one tick."""
+
+AGENT_SIGNALS: tuple[Signal, ...] = (
+    Signal("t_s", "s", "scenario time of the tick"),
+    Signal("x_hat_m", "m", "position that the controller used"),
+    Signal("y_hat_m", "m", "position that the controller used"),
+    Signal("theta_hat_rad", "rad", "heading that the controller used"),
+    Signal("v_hat_m_s", "m/s", "forward speed that the controller used"),
+    Signal("omega_hat_rad_s", "rad/s", "turn rate that the controller used"),
+    Signal("s", "m", "path variable"),
+    Signal("s_dot", "m/s", "its rate, mu + v_r_hat"),
+    Signal("mu", "m/s", "coordination state of (40)"),
+    Signal("v_r_hat", "m/s", "estimate of the reference speed, (38)"),
+    Signal("neighbours", "1", "in-neighbours that counted in the sums"),
+    Signal("x_d_m", "m", "reference position, (1)"),
+    Signal("y_d_m", "m", "reference position, (1)"),
+    Signal("theta_d_rad", "rad", "reference heading, (8)"),
+    *LAW_SIGNALS,
     Signal("tau_right_Nm", "N·m", "torque commanded, as float32 on the bus"),
     Signal("tau_left_Nm", "N·m", "torque commanded, as float32 on the bus"),
 )
@@ -85,21 +89,26 @@ class RowBuffer:
     and a last, perhaps empty one from `finish`.
     """
 
-    __slots__ = ("_count", "_first_tick", "_hand_on", "_rows")
+    __slots__ = ("_block", "_count", "_first_tick", "_hand_on", "_pack_into", "_size")
 
-    def __init__(self, hand_on: Callable[[int, int, bytes, bool], None]) -> None:
+    def __init__(
+        self, row: struct.Struct, hand_on: Callable[[int, int, bytes, bool], None]
+    ) -> None:
         self._hand_on = hand_on
-        self._rows = array("d")
+        self._pack_into = row.pack_into
+        self._size = row.size
+        self._block = bytearray(BLOCK_TICKS * row.size)
         self._first_tick = 0
         self._count = 0
 
-    def add(self, tick: int, row: Iterable[float]) -> None:
+    def add(self, tick: int, row: Sequence[float]) -> None:
         """Add the row of one tick."""
-        if self._count == 0:
+        count = self._count
+        if count == 0:
             self._first_tick = tick
-        self._rows.extend(row)
-        self._count += 1
-        if self._count == BLOCK_TICKS:
+        self._pack_into(self._block, count * self._size, *row)
+        self._count = count = count + 1
+        if count == BLOCK_TICKS:
             self._flush(final=False)
 
     def finish(self) -> None:
@@ -107,7 +116,7 @@ class RowBuffer:
         self._flush(final=True)
 
     def _flush(self, *, final: bool) -> None:
-        self._hand_on(self._first_tick, self._count, self._rows.tobytes(), final)
+        rows = bytes(memoryview(self._block)[: self._count * self._size])
+        self._hand_on(self._first_tick, self._count, rows, final)
         self._first_tick += self._count
         self._count = 0
-        self._rows = array("d")

@@ -177,8 +177,9 @@ class Schedule:
     period_ns: int
     ticks: int  # control ticks 0 .. ticks − 1; tick `ticks` closes the run
     countdown_ticks: int  # the run's first tick is −countdown_ticks
-    share_every: int  # path states are shared at ticks k ≥ 0 with k % share_every == 0
-    localise_every: int  # poses are sent at ticks k ≥ 0 with k % localise_every == 0
+    share_every: int  # path states are due at ticks k ≥ 0 with k % share_every == 0
+    localise_every: int  # poses are taken at ticks k ≥ 0 with k % localise_every == 0
+    pose_delay_ticks: int  # and reach the robots this many ticks later
     tick_deadline_s: float  # how long anybody waits for anybody within one tick [wall s]
     start_deadline_s: float  # how long everybody has to become ready [wall s]
 
@@ -188,12 +189,16 @@ class Schedule:
         return self.period_ns * 1e-9
 
     def shares(self, tick: int) -> bool:
-        """Whether path states are exchanged at this tick."""
+        """Whether path states are due at this tick."""
         return tick >= 0 and tick % self.share_every == 0
 
     def localises(self, tick: int) -> bool:
-        """Whether the localisation system sends poses at this tick."""
+        """Whether the localisation system takes poses at this tick."""
         return tick >= 0 and tick % self.localise_every == 0
+
+    def owes(self, tick: int) -> bool:
+        """Whether a pose or path states are due at this tick."""
+        return self.shares(tick) or self.localises(tick - self.pose_delay_ticks)
 
     def bus_time_ns(self, tick: int) -> int:
         """Bus time of a tick: nanoseconds since power-up, 0 at the first tick of the countdown."""

@@ -40,12 +40,14 @@ def schedule(scenario: Scenario, speed: float = 0.0) -> Schedule:
     """The ticks of a run; held to a slow `speed`, everybody waits longer for the next tick."""
     clock = scenario.clock
     h = clock.control_period_s
+    delay_s = scenario.localisation.delay_s
     return Schedule(
         period_ns=round(h * 1e9),
         ticks=round(scenario.duration_s / h),
         countdown_ticks=round(clock.countdown_s / h),
         share_every=round(clock.share_period_s / h),
         localise_every=round(clock.localisation_period_s / h),
+        pose_delay_ticks=1 if delay_s is None else round(delay_s / h),
         tick_deadline_s=clock.tick_deadline_s + (h / speed if speed > 0 else 0.0),
         start_deadline_s=clock.start_deadline_s,
     )

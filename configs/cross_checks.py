@@ -66,9 +66,11 @@ def _periods(scenario: Scenario) -> Iterator[Problem]:
         "clock.countdown_s": clock.countdown_s,
         "duration_s": scenario.duration_s,
     }
+    if scenario.localisation.delay_s is not None:
+        multiples["localisation.delay_s"] = scenario.localisation.delay_s
     for key, value in multiples.items():
         ratio = value / clock.control_period_s
-        least = 0 if key == "clock.countdown_s" else 1
+        least = 0 if key in ("clock.countdown_s", "localisation.delay_s") else 1
         if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < least:
             below = max(int(ratio), 1) * clock.control_period_s
             yield Problem(

@@ -33,7 +33,7 @@ class Clock(Section):
     control_period_s: Positive = Field(0.001, description="one tick: sense, decide, act")
     share_period_s: Positive = Field(0.02, description="path variables go to the out-neighbours")
     localisation_period_s: Positive = Field(0.01, description="poses go to the robots")
-    plant_step_s: Positive = Field(0.0005, description="longest integration step of the plant")
+    plant_step_s: Positive = Field(0.001, description="longest integration step of the plant")
     countdown_s: NotNegative = Field(0.25, description="for arming the drives, before t = 0")
     tick_deadline_s: Positive = Field(2.0, description="longest wait within a tick, wall clock")
     start_deadline_s: Positive = Field(20.0, description="longest wait for everybody to be ready")
@@ -283,7 +283,12 @@ class Drive(Section):
 class Localisation(Section):
     """Where a controller has its pose from."""
 
-    source: Literal["fused", "external", "odometry"] = "fused"
+    source: Literal["fused", "external", "odometry"] = Field(
+        "fused", description="fixes carried on by wheel odometry, fixes alone, or odometry alone"
+    )
+    delay_s: NotNegative | None = Field(
+        None, description="from a pose to its arrival; one control period if not given"
+    )
 
 
 class Network(Section):

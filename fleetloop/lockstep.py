@@ -11,7 +11,7 @@ from functools import partial
 from agents.agent import Agent
 from bridge.messages import LeaderSpeed, PathState, PoseFix, Progress
 from bridge.process import Stop
-from bridge.telemetry import RowBuffer
+from bridge.telemetry import AGENT_ROW, PLANT_ROW, RowBuffer
 from configs.brief import AgentBrief, LeaderBrief, PlantBrief
 from fleetloop.record.writer import RecordWriter, Source
 from plant.unit import Unit
@@ -34,10 +34,12 @@ class InProcessRun:
         self._schedule = plant.schedule
         self._units = [Unit(robot) for robot in plant.robots]
         self._truths = [
-            RowBuffer(partial(_write, writer, unit.brief.robot, "plant")) for unit in self._units
+            RowBuffer(PLANT_ROW, partial(_write, writer, unit.brief.robot, "plant"))
+            for unit in self._units
         ]
         self._telemetry = [
-            RowBuffer(partial(_write, writer, brief.robot, "controller")) for brief in agents
+            RowBuffer(AGENT_ROW, partial(_write, writer, brief.robot, "controller"))
+            for brief in agents
         ]
         self._agents = [
             Agent(brief, rows) for brief, rows in zip(agents, self._telemetry, strict=True)
@@ -93,7 +95,7 @@ class InProcessRun:
             frames = unit.frames_due(bus_ns)
             self.frames[unit.brief.bus] += len(frames)
             for frame in frames:
-                agent.hear(frame, bus_ns)
+                agent.hear(*frame, bus_ns)
         if schedule.shares(tick):
             self._exchange_paths(tick)
         recorded = 0 <= tick < schedule.ticks
@@ -102,7 +104,7 @@ class InProcessRun:
             self.frames[unit.brief.bus] += len(answers)
             for frame in answers:
                 for reply in unit.hear(frame, bus_ns):
-                    agent.hear(reply, bus_ns)
+                    agent.hear(*reply, bus_ns)
             if recorded:
                 truth.add(tick, unit.row(t_s))
                 unit.advance(t_s, schedule.period_s, self._brief.substeps)

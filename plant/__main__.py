@@ -16,7 +16,7 @@ from bridge.can_bus.hub import Hub
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import PoseFix, Progress, Report, Rows
 from bridge.process import Stop, serve, settle_memory
-from bridge.telemetry import RowBuffer
+from bridge.telemetry import PLANT_ROW, RowBuffer
 from bridge.zenoh_link import open_client
 from configs.brief import PlantBrief
 from configs.errors import InfrastructureError
@@ -50,7 +50,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> Counters:
     units = [Unit(robot) for robot in brief.robots]
     poses = [link.publisher(keys.pose(name, unit.brief.robot)) for unit in units]
     truths = [link.publisher(keys.truth(name, unit.brief.robot)) for unit in units]
-    rows = [RowBuffer(partial(_put_rows, truth)) for truth in truths]
+    rows = [RowBuffer(PLANT_ROW, partial(_put_rows, truth)) for truth in truths]
     progress = link.publisher(keys.progress(name, "plant"))
     report = link.publisher(keys.report(name, "plant"))
     link.subscribe(keys.go(name), "go")

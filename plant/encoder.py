@@ -5,9 +5,5 @@ The ideal encoder has no resolution of its own; the drive's protocol rounds to f
 
 from math import pi
 
-_PER_RADIAN = 1.0 / (2.0 * pi)
-
-
-def revolutions(angle_rad: float) -> float:
-    """Revolutions for a wheel angle; also rev/s for rad/s."""
-    return angle_rad * _PER_RADIAN
+PER_RADIAN = 1.0 / (2.0 * pi)
+"""Revolutions per radian; also rev/s per rad/s."""

@@ -16,20 +16,20 @@ def rk4(
     x, y, theta, v, omega, right_angle, left_angle = state
     accelerations = robot.accelerations
     half = 0.5 * step_s
-    d_right, d_left = robot.disturbance(t_s)
-    a1, w1 = accelerations(v, omega, tau_right - d_right, tau_left - d_left)
-
+    if robot.disturbed:
+        right_1, left_1 = robot.net(tau_right, tau_left, t_s)
+        right_2, left_2 = robot.net(tau_right, tau_left, t_s + half)
+        right_4, left_4 = robot.net(tau_right, tau_left, t_s + step_s)
+    else:
+        right_1 = right_2 = right_4 = tau_right
+        left_1 = left_2 = left_4 = tau_left
+    a1, w1 = accelerations(v, omega, right_1, left_1)
     v2, omega2, theta2 = v + half * a1, omega + half * w1, theta + half * omega
-    d_right, d_left = robot.disturbance(t_s + half)
-    right, left = tau_right - d_right, tau_left - d_left
-    a2, w2 = accelerations(v2, omega2, right, left)
-
+    a2, w2 = accelerations(v2, omega2, right_2, left_2)
     v3, omega3, theta3 = v + half * a2, omega + half * w2, theta + half * omega2
-    a3, w3 = accelerations(v3, omega3, right, left)
-
+    a3, w3 = accelerations(v3, omega3, right_2, left_2)
     v4, omega4, theta4 = v + step_s * a3, omega + step_s * w3, theta + step_s * omega3
-    d_right, d_left = robot.disturbance(t_s + step_s)
-    a4, w4 = accelerations(v4, omega4, tau_right - d_right, tau_left - d_left)
+    a4, w4 = accelerations(v4, omega4, right_4, left_4)
 
     sixth = step_s / 6.0
     travel = sixth * (v + 2.0 * (v2 + v3) + v4)

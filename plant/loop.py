@@ -1,8 +1,8 @@
 """The lockstep clock: the plant owns time, everybody else answers.
 
-    tick k   poses to Zenoh (when the schedule localises), every drive's frames to its bus;
-             wait until every controller has answered; hand the answers to the drives;
-             integrate to t_{k+1} with the torques held
+    tick k   every drive's frames to its bus, poses to Zenoh when the schedule localises;
+             as each controller answers: hand its torques to the drives, integrate its robot to
+             t_{k+1} with the torques held; until all have answered
 
 Bus time runs from power-up; scenario time is 0 when control starts, after the countdown in which
 the controllers arm their drives and the bodies are held as the scenario puts them. The run ends
@@ -60,6 +60,10 @@ class LockstepLoop:
         self._report = report
         self._limit_s = ANSWER_SHARE * brief.schedule.tick_deadline_s
         self._robot_of = {unit.brief.bus: unit.brief.robot for unit in units}
+        self._by_bus = {
+            unit.brief.bus: (unit, rows) for unit, rows in zip(units, self._rows, strict=True)
+        }
+        self._frames = {unit.brief.bus: unit.frames_due(0) for unit in units}
         self.counters = Counters()
 
     def run(self, stop: Stop) -> None:
@@ -91,52 +95,64 @@ class LockstepLoop:
 
     def _tick(self, tick: int, stop: Stop) -> None:
         schedule = self._brief.schedule
-        t_ns = tick * schedule.period_ns
-        t_s = t_ns * 1e-9
         bus_ns = schedule.bus_time_ns(tick)
-        hub = self._hub
+        deliver = self._hub.deliver
+        for bus, frames in self._frames.items():
+            deliver(bus, bus_ns, frames)
         if schedule.localises(tick):
+            t_ns = tick * schedule.period_ns
             for unit, pose in zip(self._units, self._poses, strict=True):
                 state = unit.state
                 pose.put(PoseFix(tick, t_ns, state.x, state.y, state.theta).encode())
-        for unit in self._units:
-            hub.deliver(unit.brief.bus, bus_ns, unit.frames_due(bus_ns))
         self._collect(tick, bus_ns, stop)
-        if stop.requested:
-            return
-        if not 0 <= tick < schedule.ticks:
-            return
-        for unit, rows in zip(self._units, self._rows, strict=True):
-            rows.add(tick, unit.row(t_s))
-            unit.advance(t_s, schedule.period_s, self._brief.substeps)
 
     def _collect(self, tick: int, bus_ns: int, stop: Stop) -> None:
-        """Wait for all answers; what drives reply to requests goes out within the same instant."""
+        """Until all have answered, take each robot on to the next tick as its answer comes."""
         hub = self._hub
         closing = tick >= self._brief.schedule.ticks
-        began_ns = time.monotonic_ns()
-        deadline_ns = began_ns + int(self._limit_s * 1e9)
-        answered = False
-        while not answered:
-            left_s = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)
-            late = hub.collect(left_s)
-            if stop.requested:
-                return
-            if (late and left_s <= 0.0) or (hub.left() and not closing):
-                self._name_the_absent(tick, late)
-            answered = not late and not self._reply(bus_ns)
-        self.counters.waited_ns += time.monotonic_ns() - began_ns
+        waiting = len(self._by_bus)
+        deadline_ns = 0
+        waited_ns = 0
+        while waiting:
+            before_ns = time.monotonic_ns()
+            if not deadline_ns:
+                deadline_ns = before_ns + int(self._limit_s * 1e9)
+            left_s = (deadline_ns - before_ns) * 1e-9
+            answered = hub.collect(max(0.0, left_s))
+            waited_ns += time.monotonic_ns() - before_ns
+            for bus in answered:
+                if not self._reply(bus, bus_ns):
+                    self._take_on(bus, tick)
+                    waiting -= 1
+            if not answered:
+                if stop.requested:
+                    break
+                if left_s <= 0.0 or (hub.left() and not closing):
+                    self._name_the_absent(tick, hub.debtors())
+                if closing and not hub.debtors():
+                    break
+        self.counters.waited_ns += waited_ns
 
-    def _reply(self, bus_ns: int) -> bool:
-        """Hand the drives what the clients sent; return whether any drive replied."""
-        replied = False
-        for unit in self._units:
-            bus = unit.brief.bus
-            replies = [r for frame in self._hub.take(bus) for r in unit.hear(frame, bus_ns)]
-            if replies:
-                replied = True
-                self._hub.deliver(bus, bus_ns, replies)
-        return replied
+    def _reply(self, bus: str, bus_ns: int) -> bool:
+        """Hand the drives what came over their bus; return whether they replied anything.
+
+        Replies go out within the same instant, so their bus is waited for once more.
+        """
+        unit, _ = self._by_bus[bus]
+        replies = [r for frame in self._hub.take(bus) for r in unit.hear(frame, bus_ns)]
+        if replies:
+            self._hub.deliver(bus, bus_ns, replies)
+        return bool(replies)
+
+    def _take_on(self, bus: str, tick: int) -> None:
+        """One robot from this tick to the next."""
+        schedule = self._brief.schedule
+        unit, rows = self._by_bus[bus]
+        if 0 <= tick < schedule.ticks:
+            t_s = tick * schedule.period_ns * 1e-9
+            rows.add(tick, unit.row(t_s))
+            unit.advance(t_s, schedule.period_s, self._brief.substeps)
+        self._frames[bus] = unit.frames_due(schedule.bus_time_ns(tick + 1))
 
     def _name_the_absent(self, tick: int, late: Sequence[str]) -> None:
         when = f"tick {tick} (t = {tick * self._brief.schedule.period_ns * 1e-9:.3f} s)"

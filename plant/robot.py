@@ -14,10 +14,13 @@ m̄_2 ω' = −(c/b) v ω   − D̄_21 v − D̄_22 ω + r/(2b) (τ_R − τ_L �
 x, y [m]   θ [rad]   v [m/s]   ω [rad/s]   ν wheel speeds [rad/s]   τ, Δ [N·m] at the wheels
 """
 
+from collections.abc import Callable
 from math import cos, sin
 from typing import NamedTuple
 
 from configs.brief import Body, Disturbance
+
+Accelerations = Callable[[float, float, float, float], tuple[float, float]]
 
 
 class State(NamedTuple):
@@ -35,26 +38,6 @@ class State(NamedTuple):
 class Robot:
     """Constants of (4) for one robot."""
 
-    __slots__ = (
-        "_amplitude",
-        "_c_b_over_m1",
-        "_c_over_b_m2",
-        "_d11",
-        "_d12",
-        "_d21",
-        "_d22",
-        "_g1",
-        "_g2",
-        "_phase",
-        "_rate",
-        "b",
-        "c",
-        "inv_r",
-        "mbar_1",
-        "mbar_2",
-        "r",
-    )
-
     def __init__(self, body: Body, disturbance: Disturbance) -> None:
         r, b, a = body.wheel_radius_m, body.half_track_m, body.com_offset_m
         mass = body.body_mass_kg + body.wheels_in_mass * body.wheel_mass_kg
@@ -71,14 +54,15 @@ class Robot:
         self.c = r * r * body.body_mass_kg * a / (2.0 * b)
         self.mbar_1, self.mbar_2 = m11 + m12, m11 - m12
         right, left = body.damping_right_N_m_s, body.damping_left_N_m_s
-        self._c_b_over_m1 = self.c * b / self.mbar_1
-        self._c_over_b_m2 = self.c / b / self.mbar_2
-        self._d11 = 0.5 * (right + left) / self.mbar_1
-        self._d12 = 0.5 * b * (right - left) / self.mbar_1
-        self._d21 = 0.5 * (right - left) / b / self.mbar_2
-        self._d22 = 0.5 * (right + left) / self.mbar_2
-        self._g1 = 0.5 * r / self.mbar_1
-        self._g2 = 0.5 * r / b / self.mbar_2
+        self._damping = (
+            0.5 * (right + left) / self.mbar_1,
+            0.5 * b * (right - left) / self.mbar_1,
+            0.5 * (right - left) / b / self.mbar_2,
+            0.5 * (right + left) / self.mbar_2,
+        )
+        self.accelerations = self._equations()
+        """(v, ω, right, left) ↦ (v', ω') under net wheel torques τ − Δ [N·m]."""
+        self.disturbed = disturbance.amplitude_N_m != 0.0
         self._amplitude = disturbance.amplitude_N_m
         self._rate, self._phase = disturbance.rate_rad_s, disturbance.phase_rad
 
@@ -89,22 +73,27 @@ class Robot:
 
     def disturbance(self, t_s: float) -> tuple[float, float]:
         """Δ(t) at the (right, left) wheel [N·m]; zero before t = 0."""
-        if self._amplitude == 0.0 or t_s < 0.0:
+        if not self.disturbed or t_s < 0.0:
             return 0.0, 0.0
         angle = self._rate * t_s + self._phase
         return self._amplitude * sin(angle), self._amplitude * cos(angle)
 
-    def accelerations(
-        self, v: float, omega: float, right: float, left: float
-    ) -> tuple[float, float]:
-        """(v', ω') under net wheel torques τ − Δ [N·m]."""
-        return (
-            self._c_b_over_m1 * omega * omega
-            - self._d11 * v
-            - self._d12 * omega
-            + self._g1 * (right + left),
-            -self._c_over_b_m2 * v * omega
-            - self._d21 * v
-            - self._d22 * omega
-            + self._g2 * (right - left),
-        )
+    def net(self, right: float, left: float, t_s: float) -> tuple[float, float]:
+        """τ − Δ(t) at the (right, left) wheel [N·m]."""
+        d_right, d_left = self.disturbance(t_s)
+        return right - d_right, left - d_left
+
+    def _equations(self) -> Accelerations:
+        """(v', ω') of (4), its constants bound once."""
+        centrifugal, coriolis = self.c * self.b / self.mbar_1, self.c / self.b / self.mbar_2
+        d11, d12, d21, d22 = self._damping
+        g1 = 0.5 * self.r / self.mbar_1
+        g2 = 0.5 * self.r / self.b / self.mbar_2
+
+        def accelerations(v: float, omega: float, right: float, left: float) -> tuple[float, float]:
+            return (
+                centrifugal * omega * omega - d11 * v - d12 * omega + g1 * (right + left),
+                -coriolis * v * omega - d21 * v - d22 * omega + g2 * (right - left),
+            )
+
+        return accelerations

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from bridge.drives import DRIVES
 from bridge.frame import Frame
 from configs.brief import RobotBrief
-from plant.encoder import revolutions
+from plant.encoder import PER_RADIAN
 from plant.integrate import rk4
 from plant.motor import Motor
 from plant.robot import Robot, State
@@ -54,15 +54,16 @@ class Unit:
         """What both drives send at this instant, in order of arbitration."""
         state = self.state
         right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
-        self._right.feed(revolutions(state.right_angle), revolutions(right_speed))
-        self._left.feed(revolutions(state.left_angle), revolutions(left_speed))
+        self._right.feed(state.right_angle * PER_RADIAN, right_speed * PER_RADIAN)
+        self._left.feed(state.left_angle * PER_RADIAN, left_speed * PER_RADIAN)
         frames = [*self._right.due(now_ns), *self._left.due(now_ns)]
         frames.sort()
         return frames
 
     def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Give one frame from the bus to both drives and return their replies."""
-        return [*self._right.hear(frame, now_ns), *self._left.hear(frame, now_ns)]
+        right, left = self._right.hear(frame, now_ns), self._left.hear(frame, now_ns)
+        return [*right, *left] if right or left else ()
 
     def advance(self, t_s: float, period_s: float, substeps: int) -> None:
         """Integrate one control period from scenario time `t_s`, torques held."""
@@ -72,6 +73,9 @@ class Unit:
         self._demand_left = self._left.torque_demand()
         right = self._torque_right = self._motor_right.torque(self._demand_right, right_speed)
         left = self._torque_left = self._motor_left.torque(self._demand_left, left_speed)
+        if substeps == 1:
+            self.state = rk4(self._body, state, right, left, t_s, period_s)
+            return
         step = period_s / substeps
         for n in range(substeps):
             state = rk4(self._body, state, right, left, t_s + n * step, step)

@@ -1,7 +1,7 @@
 """The hub: all buses of the plant's process, between the emulated drives and their clients.
 
     deliver    frames of the drives, at one instant, to every client of a bus
-    collect    wait until every paced client has said all it had to say until that instant
+    collect    wait until paced clients have said all they had to say until that instant
     take       what the clients of a bus sent since the last take
 
 A *paced* client (a controller in lockstep) owes an answer to every packet; bus time stands still
@@ -51,7 +51,7 @@ class _Client:
 
 
 class _Bus:
-    __slots__ = ("clients", "counters", "listener", "name", "stamp_ns", "taken")
+    __slots__ = ("clients", "counters", "listener", "name", "owing", "stamp_ns", "taken")
 
     def __init__(self, name: str, listener: socket.socket) -> None:
         self.name = name
@@ -59,6 +59,7 @@ class _Bus:
         self.stamp_ns = -1  # not powered up yet
         self.clients: list[_Client] = []
         self.taken: list[Frame] = []
+        self.owing = 0
         self.counters = Counters()
 
 
@@ -69,7 +70,7 @@ class Hub:
         self._buses = {name: _Bus(name, sock) for name, sock in listeners.items()}
         self._epoll = select.epoll()
         self._readers: dict[int, _Client | _Bus | None] = {}
-        self._owing = 0
+        self._answered: list[str] = []
         self._left: list[str] = []
         for bus in self._buses.values():
             bus.listener.setblocking(False)
@@ -92,36 +93,29 @@ class Hub:
             if client.paced:
                 if not client.owes:
                     client.owes = True
-                    self._owing += 1
+                    bus.owing += 1
                 self._send(client, together)
             else:
                 # One frame a packet: a readable descriptor must mean one more frame.
                 for frame in frames:
                     self._send(client, wire.encode_frames(0, stamp_ns, (frame,)))
 
-    def collect(self, timeout_s: float) -> tuple[str, ...]:
-        """Wait until no paced client owes an answer; return the buses that still owe one.
+    def collect(self, timeout_s: float) -> list[str]:
+        """Buses whose paced clients have all answered what was delivered, since the last call.
 
-        Everything else that happens on the buses is handled meanwhile. Returns early when a paced
-        client leaves or the wake-up descriptor is readable.
+        Waits until there is one, at most `timeout_s`; returns with none as well when a paced client
+        left or the wake-up descriptor is readable. Whatever else happens on the buses is handled.
         """
-        if not self._owing:
-            self._handle(0.0)
-            return ()
-        deadline = None
-        leavers = len(self._left)
-        while self._owing:
-            woken = self._handle(timeout_s)
-            if not self._owing:
-                break
-            if woken or len(self._left) > leavers:
-                return self._debtors()
-            now = time.monotonic()
-            if deadline is None:
-                deadline = now + timeout_s
-            elif now >= deadline:
-                return self._debtors()
-        return ()
+        if not self._answered:
+            self._handle(timeout_s)
+        answered = self._answered
+        if answered:
+            self._answered = []
+        return answered
+
+    def debtors(self) -> tuple[str, ...]:
+        """Buses with a paced client that owes an answer."""
+        return tuple(bus.name for bus in self._buses.values() if bus.owing)
 
     def take(self, name: str) -> list[Frame]:
         """What the clients of a bus sent since the last take, in order."""
@@ -210,8 +204,14 @@ class Hub:
             if client.own or len(bus.clients) > 1:
                 self._forward(client, frames)
         if client.owes and packet.flags & wire.DONE and packet.stamp_ns == bus.stamp_ns:
-            client.owes = False
-            self._owing -= 1
+            self._settle(client)
+
+    def _settle(self, client: _Client) -> None:
+        client.owes = False
+        bus = client.bus
+        bus.owing -= 1
+        if not bus.owing:
+            self._answered.append(bus.name)
 
     def _forward(self, sender: _Client, frames: Sequence[Frame]) -> None:
         bus = sender.bus
@@ -293,7 +293,7 @@ class Hub:
             client.bus.clients.remove(client)
         if client.owes:
             client.owes = False
-            self._owing -= 1
+            client.bus.owing -= 1
         if client.paced:
             self._left.append(client.bus.name)
 
@@ -303,8 +303,3 @@ class Hub:
 
     def _has_paced(self, name: str) -> bool:
         return any(client.paced for client in self._buses[name].clients)
-
-    def _debtors(self) -> tuple[str, ...]:
-        return tuple(
-            bus.name for bus in self._buses.values() if any(client.owes for client in bus.clients)
-        )

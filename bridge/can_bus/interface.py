@@ -22,7 +22,8 @@ from can.typechecking import AutoDetectedConfig, CanFilters
 
 from bridge.can_bus import packet as wire
 from bridge.can_bus import places
-from bridge.frame import EFF, ERR, ID_MASK_11, ID_MASK_29, RTR, Frame
+from bridge.can_bus.convert import to_frame, to_message
+from bridge.frame import Frame
 
 _TIMEVAL = struct.Struct("ll")
 _IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ignore_config"})
@@ -124,7 +125,9 @@ class FleetloopBus(can.BusABC):
         Raises:
             can.CanOperationError: FD frame, the bus is gone, or no room within `timeout`.
         """
-        frame = _to_frame(msg)
+        if msg.is_fd:
+            raise can.CanOperationError("the bus is classic CAN: no FD frames")
+        frame = to_frame(msg)
         if self._paced:
             self._outbox.append(frame)
             return
@@ -188,8 +191,13 @@ class FleetloopBus(can.BusABC):
             self._owes = self._paced
             timestamp = packet.stamp_ns / 1e9
             is_rx = not packet.flags & wire.OWN
-            for frame in packet.frames:
-                self._inbox.append(_to_message(frame, timestamp, self.channel, is_rx))
+            channel = self.channel
+            self._inbox.extend(
+                [
+                    to_message(can_id, frame, timestamp=timestamp, channel=channel, is_rx=is_rx)
+                    for can_id, frame in packet.frames
+                ]
+            )
         elif packet is not None and packet.kind == wire.BYE:
             self._closed_because = packet.text
             raise can.CanOperationError(f"bus {self.channel!r} closed: {packet.text}")
@@ -221,34 +229,3 @@ class FleetloopBus(can.BusABC):
                 raise can.CanOperationError(f"bus {self.channel!r}: {error}") from error
             return
         raise can.CanOperationError(f"bus {self.channel!r}: transmit buffer full")
-
-
-def _to_frame(msg: can.Message) -> Frame:
-    if msg.is_fd:
-        raise can.CanOperationError("the bus is classic CAN: no FD frames")
-    can_id = msg.arbitration_id
-    if msg.is_extended_id:
-        can_id |= EFF
-    if msg.is_error_frame:
-        can_id |= ERR
-    if msg.is_remote_frame:
-        return Frame(can_id | RTR, bytes(msg.dlc))
-    return Frame(can_id, bytes(msg.data))
-
-
-def _to_message(frame: Frame, timestamp: float, channel: str, is_rx: bool) -> can.Message:
-    can_id, data = frame
-    extended = bool(can_id & EFF)
-    remote = bool(can_id & RTR)
-    error = bool(can_id & ERR)
-    return can.Message(
-        timestamp=timestamp,
-        arbitration_id=can_id & (ID_MASK_29 if extended or error else ID_MASK_11),
-        is_extended_id=extended,
-        is_remote_frame=remote,
-        is_error_frame=error,
-        channel=channel,
-        dlc=len(data),
-        data=None if remote else data,
-        is_rx=is_rx,
-    )

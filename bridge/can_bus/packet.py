@@ -26,6 +26,7 @@ PACED, OWN, DONE = 1, 2, 4
 MAX_FRAMES = 1024
 MAX_BYTES = 16 + 16 * MAX_FRAMES
 
+_new = tuple.__new__  # of the named tuples below, past their constructor: this is the hot path
 _HEADER = struct.Struct("<BBHIq")
 _FRAME = struct.Struct("<IB3x8s")
 _ONE = struct.Struct("<BBHIqIB3x8s")
@@ -72,8 +73,8 @@ def decode(packet: bytes) -> Packet | None:
         kind, flags, count, _, stamp, id_1, n_1, data_1, id_2, n_2, data_2 = _TWO.unpack(packet)
         if n_1 > MAX_DATA or n_2 > MAX_DATA:
             return None
-        both = (Frame(id_1, data_1[:n_1]), Frame(id_2, data_2[:n_2]))
-        return Packet(kind, flags, count, stamp, both, "")
+        both = (_new(Frame, (id_1, data_1[:n_1])), _new(Frame, (id_2, data_2[:n_2])))
+        return _new(Packet, (kind, flags, count, stamp, both, ""))
     if size < _HEADER.size:
         return None
     kind, flags, count, _, stamp = _HEADER.unpack_from(packet)

@@ -7,7 +7,7 @@ and the emulated drive of one wheel. Both ends are pure: frames in, frames out, 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from bridge.drives.odrive.client import OdriveClient, WheelReading
+from bridge.drives.odrive.client import Motion, OdriveClient
 from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import Frame
 from configs.brief import DriveLink, DriveModel
@@ -19,19 +19,14 @@ class DriveClient(Protocol):
     armed: bool
     sent: tuple[float, float]
 
-    @property
-    def right(self) -> WheelReading | None:
-        """What the right wheel's drive last said."""
-
-    @property
-    def left(self) -> WheelReading | None:
-        """What the left wheel's drive last said."""
-
-    def hear(self, frame: Frame, now_ns: int) -> None:
+    def hear(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         """Take any frame from the bus."""
 
     def complete(self, now_ns: int) -> bool:
         """Whether both wheels' encoder frames of this instant are here."""
+
+    def motion(self) -> Motion | None:
+        """The newest wheel angles and speeds, None before both wheels were heard."""
 
     def arm(self, now_ns: int) -> Sequence[Frame]:
         """What to send next on the way to `armed`; call once per period."""

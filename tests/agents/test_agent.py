@@ -27,7 +27,7 @@ class Bench:
         brief = replace(agent_brief(SCENARIO, robot, network=NOWHERE, bus=()), **changes)
         model = plant_brief(SCENARIO, network=NOWHERE).robots[0].drive
         self.rows: list[tuple[float, ...]] = []
-        self.agent = Agent(brief, RowBuffer(self._keep))
+        self.agent = Agent(brief, RowBuffer(AGENT_ROW, self._keep))
         self.axes = [OdriveNode(model, 0, 1), OdriveNode(model, 1, 2)]
         self.schedule = brief.schedule
         self.agent.take_pose(PoseFix(-1, 0, 1.95, 0.05, 1.57))
@@ -40,7 +40,7 @@ class Bench:
         now_ns = self.schedule.bus_time_ns(tick)
         for axis in self.axes:
             for frame in axis.due(now_ns):
-                self.agent.hear(frame, now_ns)
+                self.agent.hear(*frame, now_ns)
         frames = list(self.agent.step(tick))
         for frame in frames:
             for axis in self.axes:
@@ -109,17 +109,18 @@ def test_the_closing_tick_disarms() -> None:
 
 def test_what_is_missing_is_named() -> None:
     brief = agent_brief(SCENARIO, "r1", network=NOWHERE, bus=())
-    agent = Agent(brief, RowBuffer(lambda *_: None))
+    agent = Agent(brief, RowBuffer(AGENT_ROW, lambda *_: None))
     assert agent.missing_to_start() == ["the localisation system", "the leader"]
     agent.take_leader(LeaderSpeed(((0, 0.6),)))
     agent.take_pose(PoseFix(-1, 0, 0.0, 0.0, 0.0))
     assert agent.missing_to_start() == []
     bench = Bench("r2")
-    assert bench.agent.missing(0) == ["pose", "path state of r1"]
-    assert bench.agent.missing(1) == []
+    assert bench.agent.missing(0) == ["path state of r1"]
+    assert bench.agent.missing(1) == ["pose"]  # of tick 0, a period late
+    assert bench.agent.missing(2) == []
     bench.agent.take_path("r1", PathState(0, 0, 0.0, 0.6))
     bench.agent.take_pose(PoseFix(0, 0, 0.0, 0.0, 0.0))
-    assert bench.agent.missing(0) == []
+    assert bench.agent.missing(0) == bench.agent.missing(1) == []
 
 
 def test_a_row_holds_what_was_used_and_commanded() -> None:

@@ -42,3 +42,19 @@ def test_a_fix_is_taken_as_the_nearest_angle_of_its_direction() -> None:
     localiser.fix(0.0, 0.0, 3.0)
     localiser.wheels(1.0, -1.0, 0.0, 0.0)  # on to 3.4
     assert localiser.fix(0.0, 0.0, 3.4 - 2 * pi).theta == pytest.approx(3.4)
+
+
+def test_a_late_fix_loses_nothing_of_the_motion_since() -> None:
+    punctual, late = Localiser("fused", WHEELS), Localiser("fused", WHEELS, delay_ticks=3)
+    for localiser in (punctual, late):
+        localiser.wheels(0.0, 0.0, 0.0, 0.0)
+        localiser.fix(1.0, 2.0, 0.5)
+    angles = [(1.0, 0.8), (2.1, 1.5), (3.0, 2.9), (4.2, 3.3), (5.0, 4.9)]
+    for n, (right, left) in enumerate(angles):
+        punctual.wheels(right, left, 0.0, 0.0)
+        late.wheels(right, left, 0.0, 0.0)
+        if n == 1:
+            punctual.fix(-3.0, 1.0, -0.7)
+        if n == 4:
+            now = late.fix(-3.0, 1.0, -0.7, ticks_ago=3)
+    assert now == pytest.approx(punctual.wheels(*angles[-1], 0.0, 0.0))

@@ -12,7 +12,7 @@ def test_signal_names_are_unique_and_have_units() -> None:
 
 def test_blocks_are_consecutive_whole_and_end_with_a_final_one() -> None:
     blocks: list[tuple[int, int, bytes, bool]] = []
-    buffer = RowBuffer(lambda *block: blocks.append(block))
+    buffer = RowBuffer(PLANT_ROW, lambda *block: blocks.append(block))
     for tick in range(2 * BLOCK_TICKS + 3):
         buffer.add(tick, [float(tick)] * len(PLANT_SIGNALS))
     buffer.finish()

@@ -14,7 +14,6 @@ else.
 from collections.abc import Sequence
 from enum import Enum, auto
 from math import pi
-from typing import NamedTuple
 
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisError, AxisState, Command, ControlMode, InputMode
@@ -26,15 +25,14 @@ HEARTBEAT_LIMIT_NS = 500_000_000
 """A drive whose heartbeat is older than this has dropped out."""
 ENCODER_PERIODS_LIMIT = 10
 """A drive whose encoder frame is older than this many periods has dropped out."""
+NEVER = -(1 << 62)
+FLOAT32_MAX = 3.4e38
 _TURN = 2.0 * pi
+_PACK_TWO = f.TWO_FLOATS.pack
+_UNPACK_TWO = f.TWO_FLOATS.unpack
 
-
-class WheelReading(NamedTuple):
-    """What one wheel's drive last said of its motion."""
-
-    angle_rad: float
-    speed_rad_s: float
-    stamp_ns: int
+Motion = tuple[float, float, float, float]
+"""(right, left) wheel angle [rad], then (right, left) wheel speed [rad/s]."""
 
 
 class _Step(Enum):
@@ -47,24 +45,21 @@ class _Axis:
     """What is known of one drive."""
 
     __slots__ = (
+        "angle_rad",
         "closed_loop",
-        "encoder_id",
         "errors",
         "heard_ns",
-        "heartbeat_id",
         "name",
         "node",
-        "reading",
-        "torque_id",
+        "speed_rad_s",
+        "stamp_ns",
     )
 
     def __init__(self, name: str, node: int) -> None:
         self.name = f"{name} drive (node {node})"
         self.node = node
-        self.encoder_id = f.identifier(node, Command.GET_ENCODER_ESTIMATES)
-        self.heartbeat_id = f.identifier(node, Command.HEARTBEAT)
-        self.torque_id = f.identifier(node, Command.SET_INPUT_TORQUE)
-        self.reading: WheelReading | None = None
+        self.angle_rad = self.speed_rad_s = 0.0
+        self.stamp_ns = NEVER
         self.heard_ns: int | None = None
         self.closed_loop = False
         self.errors = AxisError(0)
@@ -72,7 +67,7 @@ class _Axis:
     def frame(self, command: Command, data: bytes) -> Frame:
         return Frame(f.identifier(self.node, command), data)
 
-    def hear_heartbeat(self, data: bytes, now_ns: int) -> None:
+    def hear_heartbeat(self, data: bytes | bytearray, now_ns: int) -> None:
         heartbeat = f.decode_heartbeat(data)
         self.heard_ns = now_ns
         self.errors = heartbeat.errors
@@ -90,46 +85,40 @@ class OdriveClient:
         self._right = _Axis("right", link.right_node)
         self._left = _Axis("left", link.left_node)
         self._axes = (self._right, self._left)
+        self._encoders = self._by_id(Command.GET_ENCODER_ESTIMATES)
+        self._heartbeats = self._by_id(Command.HEARTBEAT)
+        self._torque_ids = tuple(self._by_id(Command.SET_INPUT_TORQUE))
         self._step = _Step.CLEAR
         self._asked_ns: int | None = None
         self.armed = False
         self.sent = (0.0, 0.0)
         """(right, left) torque last sent [N·m], as float32 carries it."""
 
-    @property
-    def right(self) -> WheelReading | None:
-        """What the right wheel's drive last said."""
-        return self._right.reading
-
-    @property
-    def left(self) -> WheelReading | None:
-        """What the left wheel's drive last said."""
-        return self._left.reading
-
-    def hear(self, frame: Frame, now_ns: int) -> None:
+    def hear(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         """Take any frame from the bus."""
-        can_id, data = frame
-        for axis in self._axes:
-            if can_id == axis.encoder_id:
-                if len(data) == 8:
-                    angle, speed = f.TWO_FLOATS.unpack(data)
-                    axis.reading = WheelReading(angle * _TURN, speed * _TURN, now_ns)
-                return
-            if can_id == axis.heartbeat_id:
-                if len(data) == 8:
-                    axis.hear_heartbeat(data, now_ns)
-                    self._note_heartbeat(now_ns)
-                return
+        axis = self._encoders.get(can_id)
+        if axis is not None:
+            if len(data) == 8:
+                angle, speed = _UNPACK_TWO(data)
+                axis.angle_rad = angle * _TURN
+                axis.speed_rad_s = speed * _TURN
+                axis.stamp_ns = now_ns
+            return
+        axis = self._heartbeats.get(can_id)
+        if axis is not None and len(data) == 8:
+            axis.hear_heartbeat(data, now_ns)
+            self._note_heartbeat(now_ns)
 
     def complete(self, now_ns: int) -> bool:
         """Whether both wheels' encoder frames of this instant are here."""
-        right, left = self._right.reading, self._left.reading
-        return (
-            right is not None
-            and left is not None
-            and right.stamp_ns == now_ns
-            and left.stamp_ns == now_ns
-        )
+        return self._right.stamp_ns == now_ns and self._left.stamp_ns == now_ns
+
+    def motion(self) -> Motion | None:
+        """The newest wheel angles and speeds, None before both wheels were heard."""
+        right, left = self._right, self._left
+        if right.stamp_ns == NEVER or left.stamp_ns == NEVER:
+            return None
+        return right.angle_rad, left.angle_rad, right.speed_rad_s, left.speed_rad_s
 
     def arm(self, now_ns: int) -> Sequence[Frame]:
         """What to send next on the way to `armed`; call once per period."""
@@ -182,15 +171,19 @@ class OdriveClient:
                 return f"{axis.name} dropped out: left closed loop without an error"
             if now_ns - axis.heard_ns > HEARTBEAT_LIMIT_NS:
                 return f"{axis.name}: no heartbeat for {(now_ns - axis.heard_ns) * 1e-9:.1f} s"
-            if axis.reading is None or now_ns - axis.reading.stamp_ns > encoder_limit_ns:
+            if now_ns - axis.stamp_ns > encoder_limit_ns:
                 return f"{axis.name}: no encoder frames any more"
         return None
 
     def torque(self, right_Nm: float, left_Nm: float) -> tuple[Frame, Frame]:
         """Set-points for both wheels [N·m]; beyond float32 they saturate."""
-        right, left = _packed(right_Nm), _packed(left_Nm)
-        self.sent = (_unpacked(right), _unpacked(left))
-        return Frame(self._right.torque_id, right), Frame(self._left.torque_id, left)
+        try:
+            both = _PACK_TWO(right_Nm, left_Nm)
+        except OverflowError:
+            both = _PACK_TWO(_saturated(right_Nm), _saturated(left_Nm))
+        self.sent = _UNPACK_TWO(both)
+        right_id, left_id = self._torque_ids
+        return Frame(right_id, both[:4]), Frame(left_id, both[4:])
 
     def disarm(self) -> Sequence[Frame]:
         """Torque 0 and idle for both wheels."""
@@ -208,18 +201,13 @@ class OdriveClient:
         self.armed = False
         return [axis.frame(Command.ESTOP, b"") for axis in self._axes]
 
+    def _by_id(self, command: Command) -> dict[int, _Axis]:
+        return {f.identifier(axis.node, command): axis for axis in self._axes}
+
     def _note_heartbeat(self, now_ns: int) -> None:
         if self._asked_ns is not None and now_ns > self._asked_ns and not self.armed:
             self.armed = self._right.ready() and self._left.ready()
 
 
-def _packed(torque: float) -> bytes:
-    try:
-        return f.ONE_FLOAT.pack(torque)
-    except OverflowError:
-        return f.ONE_FLOAT.pack(3.4e38 if torque > 0 else -3.4e38)
-
-
-def _unpacked(data: bytes) -> float:
-    (value,) = f.ONE_FLOAT.unpack(data)
-    return float(value)
+def _saturated(torque: float) -> float:
+    return min(max(torque, -FLOAT32_MAX), FLOAT32_MAX)

@@ -157,24 +157,24 @@ def is_request(frame: Frame) -> bool:
     return bool(frame.can_id & RTR) or not frame.data
 
 
-def padded(data: bytes, size: int) -> bytes:
+def padded(data: bytes | bytearray, size: int) -> bytes | bytearray:
     """The first `size` bytes of data, missing ones zero."""
     return data[:size].ljust(size, b"\0")
 
 
-def decode_heartbeat(data: bytes) -> Heartbeat:
+def decode_heartbeat(data: bytes | bytearray) -> Heartbeat:
     """The content of a heartbeat."""
     errors, state, result, flags, _ = HEARTBEAT.unpack(padded(data, HEARTBEAT.size))
     return Heartbeat(AxisError(errors), state, result, bool(flags & 1))
 
 
-def decode_floats(data: bytes) -> tuple[float, float]:
+def decode_floats(data: bytes | bytearray) -> tuple[float, float]:
     """The two floats of a message."""
     first, second = TWO_FLOATS.unpack(data if len(data) == 8 else padded(data, 8))
     return first, second
 
 
-def decode_float(data: bytes) -> float:
+def decode_float(data: bytes | bytearray) -> float:
     """The first float of a message."""
     (value,) = ONE_FLOAT.unpack(data if len(data) == 4 else padded(data, 4))
     return float(value)

@@ -28,6 +28,8 @@ from configs.brief import DriveModel
 
 _NONE: Sequence[Frame] = ()
 _HARDWARE = (2, 4, 4, 58, 0, 6, 10, 0)  # protocol, hardware line, version, variant, firmware
+_UNPACK_FLOAT = f.ONE_FLOAT.unpack
+_PACK_TWO = f.TWO_FLOATS.pack
 _TEMPERATURE_C = 25.0
 _BUS_V = 24.0
 
@@ -59,6 +61,7 @@ class OdriveNode:
         self._offset = 0.0
         self._fed_ns = 0
         self._next_heartbeat_ns = self._next_encoder_ns = self._next_torques_ns = 0
+        self._next_other_ns = 0
         self._encoder_id = f.identifier(node_id, Command.GET_ENCODER_ESTIMATES)
         self._torque_id = f.identifier(node_id, Command.SET_INPUT_TORQUE)
 
@@ -86,26 +89,39 @@ class OdriveNode:
     def due(self, now_ns: int) -> Sequence[Frame]:
         """Cyclic frames due at this instant; the watchdog is looked at first."""
         self._supervise(now_ns)
-        if now_ns < self._next_encoder_ns and now_ns < self._next_heartbeat_ns:
-            return _NONE
+        encoder = now_ns >= self._next_encoder_ns
+        if now_ns < self._next_other_ns:
+            if not encoder:
+                return _NONE
+            self._next_encoder_ns = _after(now_ns, self._model.encoder_period_ns)
+            return (self._encoder_estimates(),)
         model = self._model
         frames = []
         if now_ns >= self._next_heartbeat_ns:
             self._next_heartbeat_ns = _after(now_ns, model.heartbeat_period_ns)
             frames.append(self._heartbeat())
-        if now_ns >= self._next_encoder_ns:
+        if encoder:
             self._next_encoder_ns = _after(now_ns, model.encoder_period_ns)
             frames.append(self._encoder_estimates())
         if model.torques_period_ns and now_ns >= self._next_torques_ns:
             self._next_torques_ns = _after(now_ns, model.torques_period_ns)
             frames.append(self._torques())
+        others = [self._next_heartbeat_ns]
+        if model.torques_period_ns:
+            others.append(self._next_torques_ns)
+        self._next_other_ns = min(others)
         return frames
 
     def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Take one frame from the bus; return the replies."""
         can_id, data = frame
         if can_id == self._torque_id and len(data) == 4:
-            self._set_torque(f.decode_float(data), now_ns)
+            (torque,) = _UNPACK_FLOAT(data)
+            if isfinite(torque):
+                self._fed_ns = now_ns
+                self.input_torque = torque
+            else:
+                self._set_torque(torque, now_ns)
             return _NONE
         if can_id & (EFF | ERR) or not self._is_mine(can_id):
             return _NONE
@@ -258,7 +274,7 @@ class OdriveNode:
     def _on_reboot(self, data: bytes, now_ns: int) -> None:
         if self.state is AxisState.IDLE and not f.padded(data, 1)[0]:
             self._start(self.node_id)
-            self._next_heartbeat_ns = self._next_encoder_ns = now_ns
+            self._next_heartbeat_ns = self._next_encoder_ns = self._next_other_ns = now_ns
 
     def _on_address(self, frame: Frame, _: int) -> Sequence[Frame]:
         data = frame.data
@@ -291,7 +307,11 @@ class OdriveNode:
         return self._frame(Command.HEARTBEAT, data)
 
     def _encoder_estimates(self) -> Frame:
-        return Frame(self._encoder_id, f.TWO_FLOATS.pack(self._position, self._velocity))
+        try:
+            data = _PACK_TWO(self._position, self._velocity)
+        except OverflowError:  # a robot that diverges
+            data = _floats(self._position, self._velocity)
+        return Frame(self._encoder_id, data)
 
     def _version(self) -> Frame:
         return self._frame(Command.GET_VERSION, f.VERSION.pack(*_HARDWARE))

@@ -203,6 +203,11 @@ def test_shutdown_twice_is_once(running, join) -> None:
 LEAVE = 0x7FF
 
 
+def answered(hub: Hub) -> bool:
+    """Whether the bus answers within ten seconds."""
+    return any(hub.collect(0.01) for _ in range(1000))
+
+
 # --- lockstep -------------------------------------------------------------------------------------
 
 
@@ -240,7 +245,7 @@ def test_collect_returns_with_all_that_a_paced_client_had_to_say(paced) -> None:
     for k in range(200):
         data = k.to_bytes(4, "little") + bytes(4)
         hub.deliver("r1", k, (Frame(0x009, data),))
-        assert hub.collect(10.0) == ()
+        assert answered(hub)
         frames = hub.take("r1")
         assert [frame.can_id & 0x7FF for frame in frames] == [0x00E, 0x02E]
         assert frames[0].data == k.to_bytes(4, "little")
@@ -249,7 +254,7 @@ def test_collect_returns_with_all_that_a_paced_client_had_to_say(paced) -> None:
 def test_a_paced_client_with_nothing_to_say_still_answers(paced) -> None:
     hub = paced
     hub.deliver("r1", 0, (Frame(0x001, bytes(8)),))
-    assert hub.collect(10.0) == ()
+    assert answered(hub)
     assert hub.take("r1") == []
 
 
@@ -264,7 +269,7 @@ def test_a_listener_beside_a_paced_client_changes_nothing(paced) -> None:
         hub.collect(0.0)
     for k in range(50):
         hub.deliver("r1", k, (Frame(0x009, bytes(8)),))
-        assert hub.collect(10.0) == ()
+        assert answered(hub)
         assert len(hub.take("r1")) == 2
     heard = [listener[0].recv(5.0).arbitration_id & 0x7FF for _ in range(150)]
     assert heard == [0x009, 0x00E, 0x02E] * 50
@@ -278,7 +283,7 @@ def test_a_paced_client_that_leaves_is_named_and_waited_for_no_longer(paced) -> 
     while not hub.left():
         hub.collect(0.0)
     hub.deliver("r1", 1, (Frame(0x009, bytes(8)),))
-    assert hub.collect(10.0) == ()
+    assert hub.debtors() == ()
     assert hub.left() == ("r1",)
 
 

@@ -34,7 +34,7 @@ class Robot:
         self.now_ns += MS
         for axis in self.axes:
             for frame in axis.due(self.now_ns):
-                self.client.hear(frame, self.now_ns)
+                self.client.hear(*frame, self.now_ns)
 
     def arm(self) -> int:
         for count in range(1000):
@@ -83,9 +83,7 @@ def test_readings_are_radians(robot: Robot) -> None:
     robot.tick()
     assert robot.client.complete(robot.now_ns)
     assert not robot.client.complete(robot.now_ns + MS)
-    right, left = robot.client.right, robot.client.left
-    assert (right.angle_rad, right.speed_rad_s) == pytest.approx((3 * pi, pi / 2))
-    assert (left.angle_rad, left.speed_rad_s) == pytest.approx((-2 * pi, pi))
+    assert robot.client.motion() == pytest.approx((3 * pi, -2 * pi, pi / 2, pi))
 
 
 def test_a_drive_that_trips_is_named_with_its_error(robot: Robot) -> None:
@@ -124,9 +122,9 @@ def test_a_torque_beyond_float32_saturates() -> None:
 
 
 def test_frames_of_wrong_length_are_no_readings(robot: Robot) -> None:
-    robot.client.hear(Frame(identifier(0, Command.GET_ENCODER_ESTIMATES), bytes(4)), 5)
-    robot.client.hear(Frame(identifier(0, Command.HEARTBEAT), bytes(3)), 5)
-    assert robot.client.right is None
+    robot.client.hear(identifier(0, Command.GET_ENCODER_ESTIMATES), bytes(4), 5)
+    robot.client.hear(identifier(0, Command.HEARTBEAT), bytes(3), 5)
+    assert robot.client.motion() is None
     assert "no heartbeat heard yet" in robot.client.fault(5)
 
 

@@ -174,6 +174,14 @@ def test_no_torque_that_is_not_finite_ever_reaches_the_motor(value: float) -> No
         assert isfinite(node.torque_demand())
 
 
+def test_motion_beyond_what_the_wire_can_hold_saturates() -> None:
+    node = axis(torque_limiters=False)
+    node.feed(1e60, -1e60)
+    (frame,) = [frame for frame in node.due(0) if len(frame.data) == 8 and frame.can_id & 1][1:]
+    position, speed = f.TWO_FLOATS.unpack(frame.data)
+    assert (position, speed) == (pytest.approx(3.4e38), pytest.approx(-3.4e38))
+
+
 def test_velocity_and_position_set_points_overwrite_torque_by_their_feed_forward() -> None:
     node = arm(axis())
     tell(node, Command.SET_INPUT_VEL, f.TWO_FLOATS.pack(3.0, 0.125))
