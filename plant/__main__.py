@@ -14,7 +14,7 @@ from bridge.barrier import Hellos, await_hellos
 from bridge.can_bus import places
 from bridge.can_bus.hub import Hub
 from bridge.link import Arrival, Link, Publisher
-from bridge.messages import PoseFix, Progress, Report, Rows
+from bridge.messages import PoseFix, Report, Rows
 from bridge.process import Stop, serve, settle_memory
 from bridge.telemetry import PLANT_ROW, RowBuffer
 from bridge.zenoh_link import open_client
@@ -79,11 +79,8 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> Counters:
     finally:
         for buffer in rows:
             buffer.finish()
+        progress.put(loop.progress().encode())
         counters = loop.counters
-        period_ns = brief.schedule.period_ns
-        progress.put(
-            Progress(counters.ticks, counters.ticks * period_ns, counters.wall_ns).encode()
-        )
         values: dict[str, int | float | str] = {
             "ticks": counters.ticks,
             "wall_ns": counters.wall_ns,

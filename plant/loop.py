@@ -1,8 +1,12 @@
 """The lockstep clock: the plant owns time, everybody else answers.
 
-    tick k   every drive's frames to its bus, poses to Zenoh when the schedule localises;
-             as each controller answers: hand its torques to the drives, integrate its robot to
-             t_{k+1} with the torques held; until all have answered
+    robot's tick k   its drives' frames to its bus, its pose to Zenoh when the schedule localises;
+                     when its controller has answered: its torques to the drives, its body to
+                     t_{k+1} with the torques held, and on to its tick k + 1
+
+Robots meet only in their controllers' messages, for which each controller waits by tick. So a robot
+need not wait for all others at every tick: it may be up to `WINDOW_TICKS` ahead of the slowest,
+which keeps all cores at work and changes no value. Held to a speed, all go tick by tick together.
 
 Bus time runs from power-up; scenario time is 0 when control starts, after the countdown in which
 the controllers arm their drives and the bodies are held as the scenario puts them. The run ends
@@ -22,7 +26,10 @@ from configs.brief import PlantBrief
 from configs.errors import InfrastructureError, PeerLostError
 from plant.unit import Unit
 
-PROGRESS_EVERY_S = 0.1
+WINDOW_TICKS = 8
+REPORT_EVERY_NS = 100_000_000
+WAIT_S = 0.1
+"""Longest wait for an answer before somebody who doesn't answer is looked for."""
 ANSWER_SHARE = 0.9
 """Part of the tick deadline that the plant waits for answers: before that, controllers name who is
 silent; after it, the launcher names the plant."""
@@ -36,8 +43,22 @@ class Counters:
     wall_ns: int = 0
     waited_ns: int = 0
     overruns: int = 0
-    reason: str = ""
     frames: dict[str, int] = field(default_factory=dict)
+
+
+class _Lane:
+    """One robot on its way through the ticks."""
+
+    __slots__ = ("asked_ns", "bus", "done", "pose", "rows", "tick", "unit")
+
+    def __init__(self, unit: Unit, pose: Publisher, rows: RowBuffer, tick: int) -> None:
+        self.bus = unit.brief.bus
+        self.unit = unit
+        self.pose = pose
+        self.rows = rows
+        self.tick = tick
+        self.asked_ns = 0  # when its controller was asked to answer; 0: it was not
+        self.done = False
 
 
 class LockstepLoop:
@@ -52,18 +73,22 @@ class LockstepLoop:
         rows: Sequence[RowBuffer],
         report: Callable[[Progress], None],
     ) -> None:
-        self._brief = brief
-        self._units = units
+        self._schedule = schedule = brief.schedule
+        self._substeps = brief.substeps
+        self._tick_wall_ns = int(schedule.period_ns / brief.speed) if brief.speed > 0.0 else 0
+        self._window = 0 if self._tick_wall_ns else WINDOW_TICKS
+        self._limit_s = ANSWER_SHARE * schedule.tick_deadline_s
         self._hub = hub
-        self._poses = poses
-        self._rows = rows
         self._report = report
-        self._limit_s = ANSWER_SHARE * brief.schedule.tick_deadline_s
-        self._robot_of = {unit.brief.bus: unit.brief.robot for unit in units}
-        self._by_bus = {
-            unit.brief.bus: (unit, rows) for unit, rows in zip(units, self._rows, strict=True)
+        first = -schedule.countdown_ticks
+        self._lanes = {
+            unit.brief.bus: _Lane(unit, pose, buffer, first)
+            for unit, pose, buffer in zip(units, poses, rows, strict=True)
         }
-        self._frames = {unit.brief.bus: unit.frames_due(0) for unit in units}
+        self._slowest = first
+        self._at_slowest = len(units)
+        self._held: list[_Lane] = []
+        self._start_ns = 0
         self.counters = Counters()
 
     def run(self, stop: Stop) -> None:
@@ -73,109 +98,127 @@ class LockstepLoop:
             InfrastructureError: a controller did not answer within the tick deadline.
             PeerLostError: a controller left its bus.
         """
-        schedule = self._brief.schedule
-        counters = self.counters
-        start_ns = next_report_ns = time.monotonic_ns()
-        for tick in range(-schedule.countdown_ticks, schedule.ticks + 1):
-            if stop.requested:
-                counters.reason = stop.reason
-                break
-            if tick == 0:
-                start_ns = time.monotonic_ns()
-            now_ns = self._pace(tick, start_ns) if tick > 0 else time.monotonic_ns()
-            if now_ns >= next_report_ns:
-                next_report_ns = now_ns + int(PROGRESS_EVERY_S * 1e9)
-                self._report(Progress(tick, tick * schedule.period_ns, now_ns - start_ns))
-            self._tick(tick, stop)
-            counters.ticks = max(tick, 0)
-        counters.wall_ns = time.monotonic_ns() - start_ns
-        for bus in self._robot_of:
-            crossed = self._hub.counters(bus)
-            counters.frames[bus] = crossed.from_drives + crossed.from_clients
-
-    def _tick(self, tick: int, stop: Stop) -> None:
-        schedule = self._brief.schedule
-        bus_ns = schedule.bus_time_ns(tick)
-        deliver = self._hub.deliver
-        for bus, frames in self._frames.items():
-            deliver(bus, bus_ns, frames)
-        if schedule.localises(tick):
-            t_ns = tick * schedule.period_ns
-            for unit, pose in zip(self._units, self._poses, strict=True):
-                state = unit.state
-                pose.put(PoseFix(tick, t_ns, state.x, state.y, state.theta).encode())
-        self._collect(tick, bus_ns, stop)
-
-    def _collect(self, tick: int, bus_ns: int, stop: Stop) -> None:
-        """Until all have answered, take each robot on to the next tick as its answer comes."""
+        self._start_ns = now_ns = next_report_ns = time.monotonic_ns()
         hub = self._hub
-        closing = tick >= self._brief.schedule.ticks
-        waiting = len(self._by_bus)
-        deadline_ns = 0
-        waited_ns = 0
-        while waiting:
-            before_ns = time.monotonic_ns()
-            if not deadline_ns:
-                deadline_ns = before_ns + int(self._limit_s * 1e9)
-            left_s = (deadline_ns - before_ns) * 1e-9
-            answered = hub.collect(max(0.0, left_s))
-            waited_ns += time.monotonic_ns() - before_ns
+        for lane in self._lanes.values():
+            self._ask(lane, now_ns)
+        while self._at_slowest and not stop.requested:
+            answered = hub.collect(WAIT_S)
+            after_ns = time.monotonic_ns()
+            self.counters.waited_ns += after_ns - now_ns
             for bus in answered:
-                if not self._reply(bus, bus_ns):
-                    self._take_on(bus, tick)
-                    waiting -= 1
+                lane = self._lanes[bus]
+                if not self._reply(lane):
+                    self._take_on(lane)
+            now_ns = time.monotonic_ns()
             if not answered:
-                if stop.requested:
-                    break
-                if left_s <= 0.0 or (hub.left() and not closing):
-                    self._name_the_absent(tick, hub.debtors())
-                if closing and not hub.debtors():
-                    break
-        self.counters.waited_ns += waited_ns
+                self._look_for_the_absent(now_ns)
+            elif now_ns >= next_report_ns:
+                next_report_ns = now_ns + REPORT_EVERY_NS
+                self._report(self.progress())
+        self.counters.wall_ns = time.monotonic_ns() - self._start_ns
+        for bus in self._lanes:
+            crossed = hub.counters(bus)
+            self.counters.frames[bus] = crossed.from_drives + crossed.from_clients
 
-    def _reply(self, bus: str, bus_ns: int) -> bool:
+    def progress(self) -> Progress:
+        """How far the slowest robot is."""
+        tick = self._slowest
+        self.counters.ticks = max(tick, 0)
+        return Progress(tick, tick * self._schedule.period_ns, time.monotonic_ns() - self._start_ns)
+
+    # --- one robot -----------------------------------------------------------------------------
+
+    def _ask(self, lane: _Lane, now_ns: int) -> None:
+        """Begin a robot's tick: its frames are the tick, its pose follows when one is due."""
+        schedule, unit = self._schedule, lane.unit
+        tick = lane.tick
+        bus_ns = schedule.bus_time_ns(tick)
+        lane.asked_ns = now_ns
+        self._hub.deliver(lane.bus, bus_ns, unit.frames_due(bus_ns))
+        if schedule.localises(tick):
+            state = unit.state
+            t_ns = tick * schedule.period_ns
+            lane.pose.put(PoseFix(tick, t_ns, state.x, state.y, state.theta).encode())
+
+    def _reply(self, lane: _Lane) -> bool:
         """Hand the drives what came over their bus; return whether they replied anything.
 
         Replies go out within the same instant, so their bus is waited for once more.
         """
-        unit, _ = self._by_bus[bus]
-        replies = [r for frame in self._hub.take(bus) for r in unit.hear(frame, bus_ns)]
+        bus, hear = lane.bus, lane.unit.hear
+        bus_ns = self._schedule.bus_time_ns(lane.tick)
+        replies = [reply for frame in self._hub.take(bus) for reply in hear(frame, bus_ns)]
         if replies:
             self._hub.deliver(bus, bus_ns, replies)
         return bool(replies)
 
-    def _take_on(self, bus: str, tick: int) -> None:
-        """One robot from this tick to the next."""
-        schedule = self._brief.schedule
-        unit, rows = self._by_bus[bus]
+    def _take_on(self, lane: _Lane) -> None:
+        """A robot from its tick to the next, and on as far as the slowest allows."""
+        schedule = self._schedule
+        tick = lane.tick
         if 0 <= tick < schedule.ticks:
             t_s = tick * schedule.period_ns * 1e-9
-            rows.add(tick, unit.row(t_s))
-            unit.advance(t_s, schedule.period_s, self._brief.substeps)
-        self._frames[bus] = unit.frames_due(schedule.bus_time_ns(tick + 1))
+            lane.rows.add(tick, lane.unit.row(t_s))
+            lane.unit.advance(t_s, schedule.period_s, self._substeps)
+        lane.asked_ns = 0
+        lane.tick = tick + 1
+        lane.done = lane.tick > schedule.ticks
+        if not lane.done:
+            self._held.append(lane)
+        if tick == self._slowest:
+            self._at_slowest -= 1
+            if not self._at_slowest:
+                self._next_tick()
+        self._release()
 
-    def _name_the_absent(self, tick: int, late: Sequence[str]) -> None:
-        when = f"tick {tick} (t = {tick * self._brief.schedule.period_ns * 1e-9:.3f} s)"
-        gone = [f"{self._robot_of[bus]} left its bus" for bus in self._hub.left()]
-        if gone:
-            raise PeerLostError(f"{when}: the controller of {', of '.join(gone)}")
-        names = ", ".join(self._robot_of[bus] for bus in late)
-        raise InfrastructureError(
-            f"{when}: no answer from the controller of {names} within {self._limit_s:g} s"
-        )
+    # --- all of them ---------------------------------------------------------------------------
 
-    def _pace(self, tick: int, start_ns: int) -> int:
-        """Wait for the tick's wall time when the run is held to a speed; return the wall time."""
-        now_ns = time.monotonic_ns()
-        if self._brief.speed <= 0.0:
-            return now_ns
-        due_ns = start_ns + int(tick * self._brief.schedule.period_ns / self._brief.speed)
-        if now_ns > due_ns + self._brief.schedule.period_ns / self._brief.speed:
-            self.counters.overruns += 1
-        while now_ns < due_ns:
-            time.sleep(min((due_ns - now_ns) * 1e-9, PROGRESS_EVERY_S))
+    def _next_tick(self) -> None:
+        """The slowest have gone on; with nobody left at all, the run is over."""
+        ticks = [lane.tick for lane in self._lanes.values() if not lane.done]
+        if not ticks:
+            self._slowest = self._schedule.ticks
+            return
+        self._slowest = min(ticks)
+        self._at_slowest = ticks.count(self._slowest)
+        if self._slowest <= 0:
+            self._start_ns = time.monotonic_ns()
+        elif self._tick_wall_ns:
+            self._pace()
+
+    def _release(self) -> None:
+        """Ask the controllers of all robots that the window lets go on."""
+        latest = self._slowest + self._window
+        if any(lane.tick <= latest for lane in self._held):
             now_ns = time.monotonic_ns()
-        return now_ns
+            going = [lane for lane in self._held if lane.tick <= latest]
+            self._held = [lane for lane in self._held if lane.tick > latest]
+            for lane in going:
+                self._ask(lane, now_ns)
+
+    def _pace(self) -> None:
+        """Wait for the wall time of the slowest's tick; the buses are served meanwhile."""
+        due_ns = self._start_ns + self._slowest * self._tick_wall_ns
+        left_ns = due_ns - time.monotonic_ns()
+        if left_ns < -self._tick_wall_ns:
+            self.counters.overruns += 1
+        while left_ns > 0:
+            self._hub.serve(left_ns * 1e-9)
+            left_ns = due_ns - time.monotonic_ns()
+
+    def _look_for_the_absent(self, now_ns: int) -> None:
+        left = set(self._hub.left())
+        limit_ns = int(self._limit_s * 1e9)
+        for bus, lane in self._lanes.items():
+            when = f"tick {lane.tick} (t = {lane.tick * self._schedule.period_ns * 1e-9:.3f} s)"
+            robot = lane.unit.brief.robot
+            if bus in left and not lane.done:
+                raise PeerLostError(f"{when}: the controller of {robot} left its bus")
+            if lane.asked_ns and now_ns - lane.asked_ns > limit_ns:
+                raise InfrastructureError(
+                    f"{when}: no answer from the controller of {robot} within {self._limit_s:g} s"
+                )
 
 
 def bus_frames(counters: Counters) -> Mapping[str, int]:

@@ -113,6 +113,10 @@ class Hub:
             self._answered = []
         return answered
 
+    def serve(self, timeout_s: float) -> None:
+        """Handle what happens on the buses, waiting for it at most `timeout_s`."""
+        self._handle(timeout_s)
+
     def debtors(self) -> tuple[str, ...]:
         """Buses with a paced client that owes an answer."""
         return tuple(bus.name for bus in self._buses.values() if bus.owing)
