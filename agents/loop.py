@@ -102,19 +102,21 @@ class LockstepLoop:
         message: can.Message | None = first
         answered_ns = -1
         asked_ns = time.monotonic_ns()
+        hear, complete, schedule, send = agent.hear, agent.complete, self._schedule, self._bus.send
         while message is not None:
             now_ns = round(message.timestamp * 1e9)
-            agent.hear(can_id_of(message), message.data, now_ns)
+            hear(can_id_of(message), message.data, now_ns)
             # Replies to somebody else may follow at an instant that is answered already.
-            if now_ns > answered_ns and agent.complete(now_ns):
+            if now_ns > answered_ns and complete(now_ns):
                 answered_ns = now_ns
                 came_ns = time.monotonic_ns()
-                tick = self._schedule.tick_of(now_ns)
-                self._listen(tick, stop)
+                tick = schedule.tick_of(now_ns)
+                if schedule.owes(tick):
+                    self._listen(tick, stop)
                 heard_ns = time.monotonic_ns()
                 for can_id, data in agent.step(tick) if not stop.requested else agent.leave():
-                    self._bus.send(to_message(can_id, data))
-                if self._schedule.shares(tick + 1):
+                    send(to_message(can_id, data))
+                if schedule.shares(tick + 1):
                     self._path.put(agent.share(tick + 1).encode())
                 counters.bus_ns += came_ns - asked_ns
                 counters.listen_ns += heard_ns - came_ns
@@ -132,8 +134,6 @@ class LockstepLoop:
     def _listen(self, tick: int, stop: Stop) -> None:
         """Wait for what the schedule owes this tick, or for a stop."""
         agent = self._agent
-        if not self._schedule.owes(tick):
-            return
         deadline = time.monotonic() + LISTEN_SHARE * self._schedule.tick_deadline_s
         while (missing := agent.missing(tick)) and not stop.requested:
             left_s = deadline - time.monotonic()

@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from bridge.can_bus.hub import Hub
+from bridge.frame import Frame
 from bridge.link import Publisher
 from bridge.messages import PoseFix, Progress
 from bridge.process import Stop
@@ -74,6 +75,8 @@ class LockstepLoop:
         report: Callable[[Progress], None],
     ) -> None:
         self._schedule = schedule = brief.schedule
+        self._period_ns, self._period_s = schedule.period_ns, schedule.period_s
+        self._countdown, self._ticks = schedule.countdown_ticks, schedule.ticks
         self._substeps = brief.substeps
         self._tick_wall_ns = int(schedule.period_ns / brief.speed) if brief.speed > 0.0 else 0
         self._window = 0 if self._tick_wall_ns else WINDOW_TICKS
@@ -109,7 +112,7 @@ class LockstepLoop:
             for bus in answered:
                 lane = self._lanes[bus]
                 if not self._reply(lane):
-                    self._take_on(lane)
+                    self._take_on(lane, after_ns)
             now_ns = time.monotonic_ns()
             if not answered:
                 self._look_for_the_absent(now_ns)
@@ -131,14 +134,13 @@ class LockstepLoop:
 
     def _ask(self, lane: _Lane, now_ns: int) -> None:
         """Begin a robot's tick: its frames are the tick, its pose follows when one is due."""
-        schedule, unit = self._schedule, lane.unit
-        tick = lane.tick
-        bus_ns = schedule.bus_time_ns(tick)
+        unit, tick = lane.unit, lane.tick
+        bus_ns = (tick + self._countdown) * self._period_ns
         lane.asked_ns = now_ns
         self._hub.deliver(lane.bus, bus_ns, unit.frames_due(bus_ns))
-        if schedule.localises(tick):
+        if self._schedule.localises(tick):
             state = unit.state
-            t_ns = tick * schedule.period_ns
+            t_ns = tick * self._period_ns
             lane.pose.put(PoseFix(tick, t_ns, state.x, state.y, state.theta).encode())
 
     def _reply(self, lane: _Lane) -> bool:
@@ -147,30 +149,36 @@ class LockstepLoop:
         Replies go out within the same instant, so their bus is waited for once more.
         """
         bus, hear = lane.bus, lane.unit.hear
-        bus_ns = self._schedule.bus_time_ns(lane.tick)
-        replies = [reply for frame in self._hub.take(bus) for reply in hear(frame, bus_ns)]
+        bus_ns = (lane.tick + self._countdown) * self._period_ns
+        replies: list[Frame] = []
+        for frame in self._hub.take(bus):
+            replies += hear(frame, bus_ns)
         if replies:
             self._hub.deliver(bus, bus_ns, replies)
-        return bool(replies)
+            return True
+        return False
 
-    def _take_on(self, lane: _Lane) -> None:
+    def _take_on(self, lane: _Lane, now_ns: int) -> None:
         """A robot from its tick to the next, and on as far as the slowest allows."""
-        schedule = self._schedule
         tick = lane.tick
-        if 0 <= tick < schedule.ticks:
-            t_s = tick * schedule.period_ns * 1e-9
+        if 0 <= tick < self._ticks:
+            t_s = tick * self._period_ns * 1e-9
             lane.rows.add(tick, lane.unit.row(t_s))
-            lane.unit.advance(t_s, schedule.period_s, self._substeps)
+            lane.unit.advance(t_s, self._period_s, self._substeps)
         lane.asked_ns = 0
         lane.tick = tick + 1
-        lane.done = lane.tick > schedule.ticks
-        if not lane.done:
-            self._held.append(lane)
+        lane.done = tick >= self._ticks
         if tick == self._slowest:
             self._at_slowest -= 1
             if not self._at_slowest:
                 self._next_tick()
-        self._release()
+                self._release(now_ns)
+        if lane.done:
+            return
+        if lane.tick <= self._slowest + self._window:
+            self._ask(lane, now_ns)
+        else:
+            self._held.append(lane)
 
     # --- all of them ---------------------------------------------------------------------------
 
@@ -187,12 +195,11 @@ class LockstepLoop:
         elif self._tick_wall_ns:
             self._pace()
 
-    def _release(self) -> None:
+    def _release(self, now_ns: int) -> None:
         """Ask the controllers of all robots that the window lets go on."""
         latest = self._slowest + self._window
-        if any(lane.tick <= latest for lane in self._held):
-            now_ns = time.monotonic_ns()
-            going = [lane for lane in self._held if lane.tick <= latest]
+        going = [lane for lane in self._held if lane.tick <= latest]
+        if going:
             self._held = [lane for lane in self._held if lane.tick > latest]
             for lane in going:
                 self._ask(lane, now_ns)

@@ -8,32 +8,34 @@ import can
 
 from bridge.frame import EFF, ERR, ID_MASK_11, ID_MASK_29, RTR, Frame
 
+_Message = can.Message
+_new = object.__new__
+
 
 def to_message(
     can_id: int,
     data: bytes,
-    *,
     timestamp: float = 0.0,
     channel: str | None = None,
     is_rx: bool = False,
 ) -> can.Message:
     """The message of a frame."""
-    message = can.Message.__new__(can.Message)
-    extended = bool(can_id & EFF)
-    error = bool(can_id & ERR)
-    remote = bool(can_id & RTR)
+    message = _new(_Message)
     message.timestamp = timestamp
-    message.arbitration_id = can_id & (ID_MASK_29 if extended or error else ID_MASK_11)
-    message.is_extended_id = extended
-    message.is_remote_frame = remote
-    message.is_error_frame = error
     message.channel = channel
     message.dlc = len(data)
-    message.data = bytearray() if remote else bytearray(data)
-    message.is_fd = False
     message.is_rx = is_rx
-    message.bitrate_switch = False
-    message.error_state_indicator = False
+    message.is_fd = message.bitrate_switch = message.error_state_indicator = False
+    if can_id <= ID_MASK_11:
+        message.arbitration_id = can_id
+        message.is_extended_id = message.is_remote_frame = message.is_error_frame = False
+        message.data = bytearray(data)
+        return message
+    extended = message.is_extended_id = bool(can_id & EFF)
+    error = message.is_error_frame = bool(can_id & ERR)
+    remote = message.is_remote_frame = bool(can_id & RTR)
+    message.arbitration_id = can_id & (ID_MASK_29 if extended or error else ID_MASK_11)
+    message.data = bytearray() if remote else bytearray(data)
     return message
 
 

@@ -89,7 +89,9 @@ class Hub:
         if not clients:
             return
         together = wire.encode_frames(0, stamp_ns, frames)
-        for client in tuple(clients) if len(clients) > 1 else clients:
+        if len(clients) > 1:
+            clients = clients.copy()
+        for client in clients:
             if client.paced:
                 if not client.owes:
                     client.owes = True
@@ -169,6 +171,9 @@ class Hub:
         for fd, event in self._epoll.poll(timeout_s):
             reader = self._readers.get(fd)
             if isinstance(reader, _Client):
+                if event == _READ:
+                    self._read(reader)
+                    continue
                 if event & _WRITE:
                     self._drain(reader)
                 if event & ~_WRITE:
@@ -190,10 +195,11 @@ class Hub:
             self._drop(client)
             return
         packet = wire.decode(data)
+        if packet is not None and packet[0] == wire.FRAMES and client.joined:
+            self._take_frames(client, packet)
+            return
         if packet is None or (packet.kind == wire.FRAMES) != client.joined:
             client.bus.counters.garbage += 1
-        elif packet.kind == wire.FRAMES:
-            self._take_frames(client, packet)
         elif packet.kind == wire.HELLO:
             self._welcome(client, packet)
         else:
@@ -201,13 +207,13 @@ class Hub:
 
     def _take_frames(self, client: _Client, packet: wire.Packet) -> None:
         bus = client.bus
-        frames = packet.frames
+        _, flags, _, stamp_ns, frames, _ = packet
         if frames:
             bus.taken += frames
             bus.counters.from_clients += len(frames)
             if client.own or len(bus.clients) > 1:
                 self._forward(client, frames)
-        if client.owes and packet.flags & wire.DONE and packet.stamp_ns == bus.stamp_ns:
+        if client.owes and flags & wire.DONE and stamp_ns == bus.stamp_ns:
             self._settle(client)
 
     def _settle(self, client: _Client) -> None:

@@ -104,6 +104,8 @@ class FleetloopBus(can.BusABC):
             can.CanOperationError: the bus is gone; everything received before was handed out.
         """
         inbox = self._inbox
+        if inbox and self._filters is None:
+            return inbox.popleft()
         deadline = None
         while True:
             while inbox:
@@ -191,13 +193,8 @@ class FleetloopBus(can.BusABC):
             self._owes = self._paced
             timestamp = packet.stamp_ns / 1e9
             is_rx = not packet.flags & wire.OWN
-            channel = self.channel
-            self._inbox.extend(
-                [
-                    to_message(can_id, frame, timestamp=timestamp, channel=channel, is_rx=is_rx)
-                    for can_id, frame in packet.frames
-                ]
-            )
+            for can_id, frame in packet.frames:
+                self._inbox.append(to_message(can_id, frame, timestamp, self.channel, is_rx))
         elif packet is not None and packet.kind == wire.BYE:
             self._closed_because = packet.text
             raise can.CanOperationError(f"bus {self.channel!r} closed: {packet.text}")
