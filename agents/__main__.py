@@ -13,7 +13,7 @@ from bridge import keys
 from bridge.barrier import Hellos, await_hellos
 from bridge.link import Link
 from bridge.messages import Report, Rows
-from bridge.process import Stop, serve, settle_memory
+from bridge.process import Stop, name_process, serve, settle_memory
 from bridge.telemetry import AGENT_ROW, RowBuffer
 from bridge.zenoh_link import open_client
 from configs.brief import AgentBrief
@@ -22,6 +22,7 @@ from configs.errors import InfrastructureError
 
 def run(brief: AgentBrief, stop: Stop) -> None:
     """Wire one agent to its bus and the network, wait for its peers, and run."""
+    name_process(brief.robot)
     with open_client(brief.network, brief.schedule.start_deadline_s) as link:
         try:
             # Verbatim from the deployment: python-can checks what its interface takes.
@@ -83,5 +84,10 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> None:
         report.put(Report(values).encode())
 
 
+def main() -> int:
+    """Serve as a controller; return the exit status."""
+    return serve(AgentBrief, run, name="agent")
+
+
 if __name__ == "__main__":
-    raise SystemExit(serve(AgentBrief, run, name="agent"))
+    raise SystemExit(main())

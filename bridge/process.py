@@ -12,6 +12,7 @@ SIGTERM asks for an orderly stop; SIGINT is the launcher's business. A process t
 `GRACE_S` after its lifeline broke ends itself the hard way, so a killed launcher leaves no orphan.
 """
 
+import contextlib
 import gc
 import json
 import os
@@ -22,6 +23,7 @@ import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import BinaryIO, TypeVar
 
 from configs.errors import FleetloopError, PeerLostError
@@ -91,6 +93,7 @@ def serve(kind: type[_Brief], body: Callable[[_Brief, Stop], str | None], *, nam
     if not isinstance(brief, kind):
         print(f"{name}: no {kind.__name__} on standard input", file=sys.stderr)  # noqa: T201
         return 2
+    name_process(name)
     stop = Stop()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: stop.request("asked to stop"))
@@ -108,6 +111,12 @@ def serve(kind: type[_Brief], body: Callable[[_Brief, Stop], str | None], *, nam
     if word and stop.reason == LAUNCHER_GONE:
         print(f"{name}: {LAUNCHER_GONE}; {word}", file=sys.stderr)  # noqa: T201
     return 0
+
+
+def name_process(name: str) -> None:
+    """What `ps` and `top` call this process; the kernel keeps 15 characters."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/comm").write_text(f"fl-{name}", "utf-8")
 
 
 def settle_memory() -> None:

@@ -1,4 +1,4 @@
-"""The processes that a run starts: spawn them, hear why they ended, end them within a bound.
+"""The processes that a run starts: bear them, hear why they ended, end them within a bound.
 
 Only processes started here are ever signalled, by their own id. They run in their own session, so a
 Ctrl-C at the terminal reaches the launcher alone; their standard input is their lifeline.
@@ -6,9 +6,8 @@ Ctrl-C at the terminal reaches the launcher alone; their standard input is their
 
 import contextlib
 import os
+import select
 import signal
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterable, Sequence
@@ -16,6 +15,7 @@ from pathlib import Path
 
 from bridge.process import Status, pack_brief
 from configs.errors import InfrastructureError
+from fleetloop.nursery import Nursery
 
 TERM_GRACE_S = 1.0
 """From asking a process to stop until it is killed."""
@@ -24,36 +24,53 @@ TERM_GRACE_S = 1.0
 class Child:
     """One process of the run."""
 
-    def __init__(self, name: str, module: str, brief: object, fds: Sequence[int] = ()) -> None:
+    def __init__(
+        self, nursery: Nursery, name: str, module: str, brief: object, fds: Sequence[int] = ()
+    ) -> None:
         self.name = name
         self.status: Status | None = None
-        # -P: a folder named like one of our packages in the current directory must not shadow it.
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", module],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            pass_fds=tuple(fds),
-            start_new_session=True,
-        )
+        self._code: int | None = None
+        stdin, self._stdin = os.pipe()
+        self._stdout, stdout = os.pipe()
+        try:
+            self._pid = nursery.bear(module, stdin, stdout, fds)
+        except InfrastructureError:
+            os.close(self._stdin)
+            os.close(self._stdout)
+            raise
+        finally:
+            os.close(stdin)
+            os.close(stdout)
         self._reader = threading.Thread(target=self._read_status, daemon=True)
         self._reader.start()
-        assert self._process.stdin is not None  # noqa: S101 - asked for two lines above
-        with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.write(pack_brief(brief))
-            self._process.stdin.flush()
+        with (
+            contextlib.suppress(BrokenPipeError),
+            os.fdopen(self._stdin, "wb", closefd=False) as lifeline,
+        ):
+            lifeline.write(pack_brief(brief))
 
     @property
     def pid(self) -> int:
         """Its process id."""
-        return self._process.pid
+        return self._pid
 
     def ended(self) -> bool:
         """Whether the process has ended."""
-        return self._process.poll() is not None
+        return self._poll(os.WNOHANG) is not None
+
+    def _poll(self, options: int) -> int | None:
+        if self._code is None:
+            try:
+                pid, status = os.waitpid(self._pid, options)
+            except ChildProcessError:  # still the nursery's
+                return None
+            if pid:
+                self._code = os.waitstatus_to_exitcode(status)
+        return self._code
 
     def failure(self) -> "Failure | None":
         """Why it ended, None if it has not or if it ended well."""
-        code = self._process.poll()
+        code = self._poll(os.WNOHANG)
         if code is None or code == 0:
             return None
         self._reader.join(1.0)
@@ -67,28 +84,25 @@ class Child:
     def ask_to_stop(self) -> None:
         """Send SIGTERM, if it still runs."""
         if not self.ended():
-            self._process.terminate()
+            os.kill(self._pid, signal.SIGTERM)
 
     def kill(self) -> None:
         """Send SIGKILL, if it still runs."""
         if not self.ended():
-            self._process.kill()
+            os.kill(self._pid, signal.SIGKILL)
 
     def close(self) -> None:
         """Cut the lifeline and reap."""
-        if self._process.stdin is not None:
-            with contextlib.suppress(OSError):
-                self._process.stdin.close()
-        self._process.wait()
+        if self._stdin >= 0:
+            os.close(self._stdin)
+            self._stdin = -1
+        self._poll(0)
         self._reader.join(1.0)
-        if self._process.stdout is not None:
-            self._process.stdout.close()
 
     def _read_status(self) -> None:
-        if self._process.stdout is None:
-            return
-        for line in self._process.stdout:
-            self.status = Status.from_line(line) or self.status
+        with os.fdopen(self._stdout, "rb") as lines:
+            for line in lines:
+                self.status = Status.from_line(line) or self.status
 
 
 class Failure:
@@ -119,8 +133,6 @@ def await_end(children: Iterable[Child], within_s: float) -> list[Child]:
     deadline = time.monotonic() + within_s
     fds = {os.pidfd_open(child.pid): child for child in children if not child.ended()}
     try:
-        import select
-
         poller = select.poll()
         for fd in fds:
             poller.register(fd, select.POLLIN)

@@ -28,6 +28,7 @@ from configs.errors import InfrastructureError
 from configs.loading import to_toml
 from configs.scenario import Scenario
 from fleetloop.children import Child, Failure, await_end, cause, end, refuse_shadowed_roles
+from fleetloop.nursery import FIRST_FD, Nursery
 from fleetloop.record.writer import finish_truncated
 
 WATCH_EVERY_S = 0.05
@@ -120,26 +121,6 @@ class LockstepRun:
             return NetworkLink(run, link.endpoint, user, plan.passwords[user])
 
         ticks = schedule(scenario, self._speed)
-        listeners = places.listen(folder, self._robots)
-        try:
-            plant = plant_brief(
-                scenario,
-                network=network("plant"),
-                runtime_folder=str(folder),
-                speed=self._speed,
-            )
-            fds = tuple((bus, listener.fileno()) for bus, listener in listeners.items())
-            plant = replace(plant, listeners=fds)
-            self._children.append(Child("plant", "plant", plant, [fd for _, fd in fds]))
-            for robot in self._robots:
-                channel = str(places.socket_path(folder, robot))
-                bus = (("channel", channel), ("interface", "fleetloop"), ("paced", True))
-                user = network(access.agent_user(robot))
-                brief = agent_brief(scenario, robot, network=user, bus=bus, speed=self._speed)
-                self._children.append(Child(f"agent/{robot}", "agents", brief))
-        finally:
-            for listener in listeners.values():
-                listener.close()
         recorder = RecorderBrief(
             str(self._record),
             self._robots,
@@ -148,7 +129,27 @@ class LockstepRun:
             ticks.start_deadline_s,
             network("recorder"),
         )
-        self._children.append(Child("recorder", "fleetloop.recorder", recorder))
+        plant = plant_brief(
+            scenario, network=network("plant"), runtime_folder=str(folder), speed=self._speed
+        )
+        buses = tuple((bus, FIRST_FD + n) for n, bus in enumerate(self._robots))
+        plant = replace(plant, listeners=buses)
+        listeners = places.listen(folder, self._robots)
+        fds = [listeners[bus].fileno() for bus in self._robots]
+        try:
+            with Nursery() as nursery:
+                self._children.append(Child(nursery, "plant", "plant", plant, fds))
+                for robot in self._robots:
+                    channel = str(places.socket_path(folder, robot))
+                    bus = (("channel", channel), ("interface", "fleetloop"), ("paced", True))
+                    user = network(access.agent_user(robot))
+                    brief = agent_brief(scenario, robot, network=user, bus=bus, speed=self._speed)
+                    self._children.append(Child(nursery, f"agent/{robot}", "agents", brief))
+                module = "fleetloop.recorder"
+                self._children.append(Child(nursery, "recorder", module, recorder))
+        finally:
+            for listener in listeners.values():
+                listener.close()
 
     def _await_ready(self, link: Link, stop: Stop) -> Failure | None:
         """Say the leader's speed until all tokens are there, then go until the plant ticks."""

@@ -118,5 +118,10 @@ def _await_controllers(brief: PlantBrief, hub: Hub, hellos: Hellos, stop: Stop) 
     )
 
 
+def main() -> int:
+    """Serve as the plant; return the exit status."""
+    return serve(PlantBrief, run, name="plant")
+
+
 if __name__ == "__main__":
-    raise SystemExit(serve(PlantBrief, run, name="plant"))
+    raise SystemExit(main())

@@ -64,10 +64,14 @@ class Run:
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(seconds)
 
-    def children(self, module: str) -> list[psutil.Process]:
-        """Its processes of one role, in order of their start."""
-        found = [child for child in self._family.values() if module in child.cmdline()]
-        return sorted(found, key=lambda child: (child.create_time(), child.pid))
+    def child(self, name: str) -> psutil.Process:
+        """Its process of that name: plant, recorder, or a robot's controller."""
+        (found,) = (child for child in self._family.values() if child.name() == f"fl-{name}")
+        return found
+
+    def names(self) -> list[str]:
+        """Names of all its processes but the launcher, sorted."""
+        return sorted(child.name().removeprefix("fl-") for child in self._family.values())
 
     def send(self, number: signal.Signals) -> None:
         """Send the launcher a signal."""

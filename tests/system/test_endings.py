@@ -36,19 +36,14 @@ def test_a_signal_ends_a_run_in_order(number: signal.Signals, tmp_path, runtime_
 
 
 @pytest.mark.parametrize(
-    ("module", "which", "name"),
-    [
-        ("plant", 0, "plant"),
-        ("fleetloop.recorder", 0, "recorder"),
-        ("agents", 0, "agent/r1"),
-        ("agents", 3, "agent/r4"),
-    ],
+    ("child", "name"),
+    [("plant", "plant"), ("recorder", "recorder"), ("r1", "agent/r1"), ("r4", "agent/r4")],
 )
 def test_a_killed_process_is_named_with_the_tick(
-    module: str, which: int, name: str, tmp_path, runtime_folder
+    child: str, name: str, tmp_path, runtime_folder
 ) -> None:
     with running(tmp_path / "a", "paper") as run:
-        run.children(module)[which].kill()
+        run.child(child).kill()
         status, out = run.end(within_s=5.0)
         assert status == 3
         assert f"{name} was killed by SIGKILL, at tick " in out
@@ -67,20 +62,20 @@ def test_a_killed_launcher_leaves_nothing_and_the_plant_says_the_tick(
 
 
 @pytest.mark.parametrize(
-    ("module", "which", "words"),
+    ("child", "words"),
     [
-        ("plant", 0, "plant: no progress for"),
-        ("fleetloop.recorder", 0, "recorder: no progress for"),
-        ("agents", 1, "no answer from the controller of r2 within"),
+        ("plant", "plant: no progress for"),
+        ("recorder", "recorder: no progress for"),
+        ("r2", "no answer from the controller of r2 within"),
     ],
 )
 def test_a_wedged_process_is_named_within_the_tick_deadline(
-    module: str, which: int, words: str, tmp_path, runtime_folder
+    child: str, words: str, tmp_path, runtime_folder
 ) -> None:
     deadline = ("--set", "clock.tick_deadline_s=1.0")
     with running(tmp_path / "a", "paper", *deadline) as run:
         began = time.monotonic()
-        run.children(module)[which].suspend()
+        run.child(child).suspend()
         status, out = run.end(within_s=10.0)
         took_s = time.monotonic() - began
         assert status == 3
