@@ -3,21 +3,27 @@
 Started by `fleetloop run` with an `AgentBrief` on standard input.
 """
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any, NamedTuple
 
 import can
 
 from agents.agent import Agent
-from agents.loop import LockstepLoop
+from agents.loop import LockstepLoop, give
+from agents.realtime import RealtimeLoop
 from bridge import keys
 from bridge.barrier import Hellos, await_hellos
-from bridge.link import Link
+from bridge.link import Arrival, Link, Publisher
 from bridge.messages import Report, Rows
-from bridge.process import Stop, name_process, serve, settle_memory
+from bridge.process import Stop, cpu_ns, go_realtime, name_process, serve, settle_memory
 from bridge.telemetry import AGENT_ROW, RowBuffer
 from bridge.zenoh_link import open_client
 from configs.brief import AgentBrief
 from configs.errors import InfrastructureError
+
+CONTROLLER_PRIORITY = 40
+"""SCHED_FIFO, below the plant's: the drives answer whoever computes."""
 
 
 def run(brief: AgentBrief, stop: Stop) -> None:
@@ -47,23 +53,53 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> None:
     link.subscribe(keys.pose(name, robot), "pose")
     for neighbour in brief.hears:
         link.subscribe(keys.path(name, neighbour), f"path/{neighbour}")
+    link.subscribe(keys.go(name), "go")
     if brief.hears_leader:
         link.subscribe(keys.leader_speed(name), "leader")
 
     hellos = Hellos()
     hellos.add(path, agent.share(-1).encode())
     hellos.add(telemetry, Rows(0, 0, b"", False).encode())
-    loop = LockstepLoop(agent, bus, link, path, hellos)
-    await_hellos(
-        link,
-        hellos,
-        loop.take,
-        agent.missing_to_start,
-        who=robot,
-        within_s=brief.schedule.start_deadline_s,
-        stop=stop,
-    )
-    link.declare_live(keys.live(name, f"agent/{robot}"))
+    run_loop = _realtime if brief.schedule.realtime else _lockstep
+    wired = _Wired(agent, bus, link, path, hellos, rows, report)
+    run_loop(wired, stop)
+
+
+class _Wired(NamedTuple):
+    """A controller with all that it talks to."""
+
+    agent: Agent
+    bus: can.BusABC
+    link: Link
+    path: Publisher
+    hellos: Hellos
+    rows: RowBuffer
+    report: Publisher
+
+    def await_peers(self, take: Callable[[Arrival], None], stop: Stop) -> None:
+        """Wait until everybody was heard, and say that this controller is ready."""
+        brief = self.agent.brief
+        await_hellos(
+            self.link,
+            self.hellos,
+            take,
+            self.agent.missing_to_start,
+            who=brief.robot,
+            within_s=brief.schedule.start_deadline_s,
+            stop=stop,
+        )
+        self.link.declare_live(keys.live(brief.network.run, f"agent/{brief.robot}"))
+
+    def finish(self, **values: float | str) -> None:
+        """Hand on the last rows and say the last word."""
+        self.rows.finish()
+        stopped = self.agent.stopped_because
+        self.report.put(Report({**values, "stopped": stopped, "cpu_ns": cpu_ns()}).encode())
+
+
+def _lockstep(wired: _Wired, stop: Stop) -> None:
+    loop = LockstepLoop(wired.agent, wired.bus, wired.link, wired.path, wired.hellos)
+    wired.await_peers(loop.take, stop)
     first = loop.await_first_frame(stop)
     if first is None:
         return
@@ -71,17 +107,21 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> None:
     try:
         loop.run(first, stop)
     finally:
-        rows.finish()
-        counters = loop.counters
-        values: dict[str, int | float | str] = {
-            "ticks": counters.ticks,
-            "bus_ns": counters.bus_ns,
-            "listen_ns": counters.listen_ns,
-            "compute_ns": counters.compute_ns,
-            "undecodable": counters.undecodable,
-            "stopped": agent.stopped_because,
-        }
-        report.put(Report(values).encode())
+        wired.finish(**asdict(loop.counters))
+
+
+def _realtime(wired: _Wired, stop: Stop) -> None:
+    loop = RealtimeLoop(wired.agent, wired.bus, wired.link, wired.path, wired.hellos)
+    wired.await_peers(lambda arrival: (give(wired.agent, arrival), None)[1], stop)
+    settle_memory()
+    refused = go_realtime(CONTROLLER_PRIORITY)
+    epoch_ns = loop.await_go(stop)
+    if epoch_ns is None:
+        return
+    try:
+        loop.run(epoch_ns, stop)
+    finally:
+        wired.finish(**asdict(loop.counters), refused=", ".join(refused))
 
 
 def main() -> int:

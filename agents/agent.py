@@ -28,6 +28,9 @@ from bridge.telemetry import RowBuffer
 from configs.brief import AgentBrief
 from configs.errors import InfrastructureError
 
+POSE_HISTORY_TICKS = 64
+"""In real time, a fix may be this old: the odometry since is known."""
+
 
 class Phase(Enum):
     """What a controller is about."""
@@ -54,18 +57,24 @@ class Agent:
         self._law = LAWS[brief.law](brief.gains, brief.wheels, self._h)
         self._law_state: LawState | None = None
         self._pose_delay = brief.schedule.pose_delay_ticks
-        self._localiser = Localiser(brief.localisation, brief.wheels, self._pose_delay)
+        history = POSE_HISTORY_TICKS if brief.schedule.realtime else self._pose_delay
+        self._localiser = Localiser(brief.localisation, brief.wheels, history)
         self._neighbours = Neighbours(
             brief.hears, brief.coordination, self._h, brief.schedule.share_every * self._h
         )
         self._coordinator = Coordinator(brief.coordination, self._h, brief.hears_leader)
         start = brief.coordination
         self._coordination = CoordinationState(start.v_hat_0, start.mu_0, start.s_0)
+        self.heard_since = self._drives.heard_since
+        """Whether both encoder frames came after a bus time [ns]."""
         self._leader: LeaderSpeed | None = None
         self._start_fix: PoseFix | None = None
         self._fixes: dict[int, PoseFix] = {}  # by tick, until due
         self._states: dict[int, dict[str, PathState]] = {}  # by tick, until due
         self._unheard = set(brief.hears)
+        self._at_once = brief.schedule.realtime
+        self.late_s = self.round_trip_s = 0.0
+        """What the loop measured of the clock at this tick, for the record."""
         self.hear = self._drives.hear
         """Take one frame from the bus: identifier, data, bus time [ns] at which it came."""
         self.complete = self._drives.complete
@@ -83,7 +92,7 @@ class Agent:
     def take_path(self, robot: str, state: PathState) -> None:
         """Take what an in-neighbour says of its path variable; ticks below 0: where it starts."""
         self._unheard.discard(robot)
-        if state.tick < 0:
+        if state.tick < 0 or self._at_once:
             self._neighbours.hear(robot, state.t_ns, state.s, state.v_hat)
         else:
             self._states.setdefault(state.tick, {})[robot] = state
@@ -135,7 +144,9 @@ class Agent:
                 sense = self._localiser.fix(start.x_m, start.y_m, start.theta_rad)
             if tick < 0:
                 return self._arm(tick)
-        if self._schedule.owes(tick):
+        if self._at_once:
+            sense = self._take_newest(tick, sense)
+        elif self._schedule.owes(tick):
             sense = self._take_due(tick, sense)
         if tick >= self._schedule.ticks:
             self.phase = Phase.DONE
@@ -152,6 +163,17 @@ class Agent:
         if fix is None:
             return sense
         return self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad, self._pose_delay)
+
+    def _take_newest(self, tick: int, sense: Sense) -> Sense:
+        """In real time: use the newest fix, as old as it is, unless it is too old to place."""
+        if not self._fixes:
+            return sense
+        fix = self._fixes[max(self._fixes)]
+        self._fixes.clear()
+        ago = max(tick - fix.tick, 0)
+        if ago > POSE_HISTORY_TICKS:
+            return sense
+        return self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad, ago)
 
     def _arm(self, tick: int) -> Sequence[Frame]:
         bus_ns = self._schedule.bus_time_ns(tick)
@@ -197,6 +219,8 @@ class Agent:
                 reference.theta,
                 *out.signals,
                 *self._drives.sent,
+                self.late_s,
+                self.round_trip_s,
             ),
         )
         return frames

@@ -48,7 +48,7 @@ class Localiser:
         self._fixed = False
         self._speeds = (0.0, 0.0)
         self._odometry = (0.0, 0.0, 0.0)
-        self._past = deque([self._odometry], maxlen=delay_ticks + 1)
+        self._past = deque([self._odometry] * (delay_ticks + 1), maxlen=delay_ticks + 1)
         self._held = mode == "external"
         # Fix, odometry at its instant, and the turn from odometry's axes to the world's.
         self._anchor = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)

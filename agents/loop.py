@@ -56,24 +56,8 @@ class LockstepLoop:
         self.counters = Counters()
 
     def take(self, arrival: Arrival) -> None:
-        """Give one message to the agent; the tag says what it is."""
-        kind, _, robot = arrival.tag.partition("/")
-        if kind == "path":
-            state = PathState.decode(arrival.payload)
-            if state is not None:
-                self._agent.take_path(robot, state)
-                return
-        elif kind == "pose":
-            fix = PoseFix.decode(arrival.payload)
-            if fix is not None:
-                self._agent.take_pose(fix)
-                return
-        elif kind == "leader":
-            speed = LeaderSpeed.decode(arrival.payload)
-            if speed is not None:
-                self._agent.take_leader(speed)
-                return
-        self.counters.undecodable += 1
+        """Give one message to the agent; what nobody understands is counted."""
+        self.counters.undecodable += not give(self._agent, arrival)
 
     def await_first_frame(self, stop: Stop) -> can.Message | None:
         """Say hello until the plant's first frame comes; None when told to stop."""
@@ -153,3 +137,20 @@ class LockstepLoop:
             raise PeerLostError(
                 f"{self._robot}: lost its bus after {self.counters.ticks} ticks: {error}"
             ) from error
+
+
+def give(agent: Agent, arrival: Arrival) -> bool:
+    """Give one message to the agent, by its tag; return whether it was understood."""
+    kind, _, robot = arrival.tag.partition("/")
+    match kind:
+        case "path" if (state := PathState.decode(arrival.payload)) is not None:
+            agent.take_path(robot, state)
+        case "pose" if (fix := PoseFix.decode(arrival.payload)) is not None:
+            agent.take_pose(fix)
+        case "leader" if (speed := LeaderSpeed.decode(arrival.payload)) is not None:
+            agent.take_leader(speed)
+        case "go":
+            pass  # lockstep begins with the first frame
+        case _:
+            return False
+    return True

@@ -4,7 +4,8 @@ The graph *is* the network. The router refuses everything that isn't listed here
 each process is bound to its identity by a random password that it alone is given:
 
     agent-<r>   puts   its own path, telemetry, progress, report; its own token
-                hears  path of exactly its in-neighbours, its own pose, leader/speed iff h_i = 1
+                hears  path of exactly its in-neighbours, its own pose, leader/speed iff h_i = 1,
+                       @clock/go
     plant       puts   pose and truth of all robots, progress, report; its token
                 hears  @clock/go
     recorder    puts   progress, report; its token
@@ -84,7 +85,7 @@ def plan(
             heard.append(keys.leader_speed(run))
         rights[agent_user(robot)] = Rights(
             puts=(keys.path(run, robot), keys.telemetry(run, robot), *_control(run, process)),
-            hears=(keys.pose(run, robot), *heard),
+            hears=(keys.pose(run, robot), keys.go(run), *heard),
             token=keys.live(run, process),
         )
     truths = [keys.truth(run, robot) for robot in robots]

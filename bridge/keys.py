@@ -6,7 +6,7 @@
     fleetloop/<run>/robot/<name>/telemetry   the controller's rows, to the recorder
     fleetloop/<run>/leader/speed             v_r; heard by the robots with h_i = 1
     fleetloop/<run>/@live/<process>          liveliness token: "ready"
-    fleetloop/<run>/@clock/go                from the launcher to the plant
+    fleetloop/<run>/@clock/go                from the launcher to plant and controllers
     fleetloop/<run>/@progress/<process>      how far a process is, to the launcher
     fleetloop/<run>/@report/<process>        a process's last word, to the launcher
 

@@ -11,7 +11,7 @@ never an exception; the caller counts it. Times are scenario time in ns.
     Rows           [1, first_tick, length, rows, final]          robot/<name>/truth, telemetry
     Progress       [1, tick, t_ns, wall_ns]                      @progress/<process>
     Report         [1, {name: number or text, ...}]              @report/<process>
-    Go             [1]                                           @clock/go
+    Go             [1, epoch_ns]                                 @clock/go
 """
 
 from collections.abc import Mapping
@@ -179,16 +179,19 @@ class Report(NamedTuple):
 
 
 class Go(NamedTuple):
-    """Everybody is ready."""
+    """Everybody is ready; in real time, tick 0 is at this reading of the monotonic clock."""
+
+    epoch_ns: int
 
     def encode(self) -> bytes:
         """Bytes for the wire."""
-        return _pack((VERSION,))
+        return _pack((VERSION, self.epoch_ns))
 
     @classmethod
     def decode(cls, payload: bytes) -> "Go | None":
         """The message in the bytes, None if there is none."""
-        return cls() if _unpack(payload, 1) is not None else None
+        fields = _unpack(payload, 2)
+        return cls(fields[1]) if fields is not None and _ints(fields[1:]) else None
 
 
 def _pack(fields: tuple[object, ...]) -> bytes:

@@ -13,6 +13,7 @@ SIGTERM asks for an orderly stop; SIGINT is the launcher's business. A process t
 """
 
 import contextlib
+import ctypes
 import gc
 import json
 import os
@@ -21,6 +22,7 @@ import select
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,6 +34,7 @@ GRACE_S = 3.0
 LAUNCHER_GONE = "the launcher is gone"
 _SAME_CAUSE_S = 0.1
 """A peer that left may have left for a reason that is on its way here too."""
+_MCL_CURRENT, _MCL_FUTURE = 1, 2
 _LENGTH_BYTES = 8
 _Brief = TypeVar("_Brief")
 
@@ -117,6 +120,25 @@ def name_process(name: str) -> None:
     """What `ps` and `top` call this process; the kernel keeps 15 characters."""
     with contextlib.suppress(OSError):
         Path("/proc/self/comm").write_text(f"fl-{name}", "utf-8")
+
+
+def go_realtime(priority: int) -> list[str]:
+    """Ask the kernel for what real time needs; return what it refused, in the words of a user."""
+    refused = []
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except OSError:
+        refused.append("SCHED_FIFO")
+    if ctypes.CDLL(None, use_errno=True).mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
+        refused.append("memory locking")
+    with contextlib.suppress(OSError):
+        Path("/proc/self/timerslack_ns").write_text("1", "ascii")
+    return refused
+
+
+def cpu_ns() -> int:
+    """Processor time of this process so far, all threads."""
+    return time.process_time_ns()
 
 
 def settle_memory() -> None:

@@ -72,6 +72,8 @@ AGENT_SIGNALS: tuple[Signal, ...] = (
     *LAW_SIGNALS,
     Signal("tau_right_Nm", "N·m", "torque commanded, as float32 on the bus"),
     Signal("tau_left_Nm", "N·m", "torque commanded, as float32 on the bus"),
+    Signal("late_s", "s", "in real time, wall time from the tick's due time to its computation"),
+    Signal("round_trip_s", "s", "in real time, from the last torques sent to their feedback"),
 )
 """One controller at one tick: what it used and what it commanded."""
 

@@ -152,6 +152,8 @@ class Gains:
     sgn_width: float  # sgn(e) is tanh(e / sgn_width)
     theta_hat_0: tuple[float, float, float, float, float, float, float, float]
     kappa_hat_0: float
+    v_bar_limit_m_s: float  # of the robust law
+    torque_limit_N_m: float  # of the robust law
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,6 +184,7 @@ class Schedule:
     pose_delay_ticks: int  # and reach the robots this many ticks later
     tick_deadline_s: float  # how long anybody waits for anybody within one tick [wall s]
     start_deadline_s: float  # how long everybody has to become ready [wall s]
+    realtime: bool = False  # everybody keeps the wall clock; else the plant owns time
 
     @property
     def period_s(self) -> float:
@@ -256,6 +259,7 @@ class AgentBrief:
     localisation: str  # "fused" | "external" | "odometry"
     schedule: Schedule
     drives: DriveLink
+    phase_ns: int  # in real time, this much after a tick's time the controller acts
     bus: Settings  # keyword arguments of can.Bus, verbatim
     network: NetworkLink
 

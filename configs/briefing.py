@@ -50,6 +50,7 @@ def schedule(scenario: Scenario, speed: float = 0.0) -> Schedule:
         pose_delay_ticks=1 if delay_s is None else round(delay_s / h),
         tick_deadline_s=clock.tick_deadline_s + (h / speed if speed > 0 else 0.0),
         start_deadline_s=clock.start_deadline_s,
+        realtime=clock.mode == "realtime",
     )
 
 
@@ -63,6 +64,7 @@ def agent_brief(
     coordination = scenario.coordination
     graph = scenario.topology
     drive = _drive_model(scenario, 0)
+    ticks = schedule(scenario, speed)
     return AgentBrief(
         robot=name,
         law=control.law,
@@ -82,7 +84,7 @@ def agent_brief(
         hears=graph.hears[name],
         hears_leader=name in graph.leader,
         localisation=scenario.localisation.source,
-        schedule=schedule(scenario, speed),
+        schedule=ticks,
         drives=DriveLink(
             protocol=drive.protocol,
             right_node=scenario.drive.right_node,
@@ -91,6 +93,7 @@ def agent_brief(
             velocity_limit_rev_s=drive.velocity_limit_rev_s,
             current_limit_A=drive.current_limit_A,
         ),
+        phase_ns=round(scenario.names.index(name) * ticks.period_ns / len(scenario.names)),
         bus=bus,
         network=network,
     )

@@ -27,8 +27,8 @@ class Section(BaseModel):
 class Clock(Section):
     """Who waits for whom, and how often what happens."""
 
-    mode: Literal["lockstep"] = Field(
-        "lockstep", description="the plant owns time, all others answer"
+    mode: Literal["lockstep", "realtime"] = Field(
+        "lockstep", description="the plant owns time, or everybody keeps the wall clock's"
     )
     control_period_s: Positive = Field(0.001, description="one tick: sense, decide, act")
     share_period_s: Positive = Field(0.02, description="path variables go to the out-neighbours")
@@ -157,7 +157,9 @@ class Pose(Section):
 class Control(Section):
     """The law and its gains, equations (15)-(36)."""
 
-    law: Literal["adaptive_dsc"] = "adaptive_dsc"
+    law: Literal["adaptive_dsc", "adaptive_dsc_robust"] = Field(
+        "adaptive_dsc", description="the paper's law, or the one for real rates and drives"
+    )
     k1: Positive = 2.0
     k2: Positive = 3.0
     k3: Positive = 1.5
@@ -173,6 +175,8 @@ class Control(Section):
     sgn_width: Positive = Field(0.001, description="sgn(e) is tanh(e / sgn_width)")
     theta_hat_0: Eight = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     kappa_hat_0: NotNegative = 0.0
+    v_bar_limit_m_s: Positive = Field(2.0, description="approach speed of the robust law")
+    torque_limit_N_m: Positive = Field(2.0, description="per wheel, of the robust law")
 
 
 class CoordinationSection(Section):

@@ -62,6 +62,14 @@ def run(
             help="Hold the run to this multiple of real time; 0: as fast as the machine allows.",
         ),
     ] = 0.0,
+    clock: Annotated[
+        str | None,
+        typer.Option(
+            metavar="lockstep|realtime",
+            help="Instead of the file's clock.mode: fast and the same bit for bit, or by the wall"
+            " clock.",
+        ),
+    ] = None,
     duration: Annotated[
         float | None,
         typer.Option(metavar="SECONDS", help="Scenario time to run, instead of the file's."),
@@ -88,6 +96,8 @@ def run(
     from fleetloop.run import Options, run_scenario
 
     changes = list(overrides or [])
+    if clock is not None:
+        changes.append(f"clock.mode={clock!r}")
     if duration is not None:
         changes.append(f"duration_s={duration}")
     if seed is not None:

@@ -49,9 +49,8 @@ class Captioned:
 def all_figures(record: Record, scenario: Scenario) -> list[Captioned]:
     """Every figure of a run; the record holds at least one tick of every robot."""
     with mpl.rc_context(_STYLE):
-        return [
-            Captioned(name, caption, draw(record, scenario)) for name, caption, draw in _FIGURES
-        ]
+        chosen = [*_FIGURES, _CLOCK] if scenario.clock.mode == "realtime" else _FIGURES
+        return [Captioned(name, caption, draw(record, scenario)) for name, caption, draw in chosen]
 
 
 # --- the graph and the plane ----------------------------------------------------------------------
@@ -193,6 +192,23 @@ def torques(record: Record, _: Scenario) -> Figure:
     return figure
 
 
+def clock_figures(record: Record, _: Scenario) -> Figure:
+    """Histograms of wake-up lateness and round trip of a real-time run."""
+    figure = Figure(figsize=(WIDTH_IN, HEIGHT_IN), dpi=DPI, layout="constrained")
+    panels = figure.subplots(1, 2)
+    names = (("late_s", "wake-up lateness"), ("round_trip_s", "torque to feedback"))
+    for axes, (signal, title) in zip(panels, names, strict=True):
+        values = np.concatenate([rows[signal] for rows in record.controller.values()])
+        values = np.clip(values[np.isfinite(values)] * 1e6, 1.0, None)
+        axes.hist(values, bins=np.geomspace(1.0, max(values.max(), 10.0), 60), color=_COLOURS[0])
+        for share, dash in ((50, "-"), (99, "--"), (99.9, ":")):
+            at = float(np.percentile(values, share))
+            axes.axvline(at, color=_COLOURS[1], linestyle=dash, label=f"p{share:g} {at:.0f} µs")
+        axes.set(xscale="log", yscale="log", title=title, xlabel="µs", ylabel="ticks")
+        axes.legend(fontsize=7)
+    return figure
+
+
 # --- helpers --------------------------------------------------------------------------------------
 
 
@@ -292,3 +308,4 @@ _FIGURES: Sequence[tuple[str, str, Callable[[Record, Scenario], Figure]]] = (
     ("speed_estimates", "Estimates of the reference speed, equation (38).", speed_estimates),
     ("torques", "Commanded wheel torques, equation (34).", torques),
 )
+_CLOCK = ("clock", "How the wall clock was kept: all ticks of all controllers.", clock_figures)

@@ -32,6 +32,8 @@ from fleetloop.nursery import FIRST_FD, Nursery
 from fleetloop.record.writer import finish_truncated
 
 WATCH_EVERY_S = 0.05
+GO_AHEAD_NS = 200_000_000
+"""In real time, from the go to power-up: for the go to reach everybody."""
 DRAIN_S = 2.0
 """How long the recorder may take to write what is still on its way, once all others have ended."""
 
@@ -141,7 +143,8 @@ class LockstepRun:
                 self._children.append(Child(nursery, "plant", "plant", plant, fds))
                 for robot in self._robots:
                     channel = str(places.socket_path(folder, robot))
-                    bus = (("channel", channel), ("interface", "fleetloop"), ("paced", True))
+                    pace = "gathered" if ticks.realtime else "paced"
+                    bus = (("channel", channel), ("interface", "fleetloop"), (pace, True))
                     user = network(access.agent_user(robot))
                     brief = agent_brief(scenario, robot, network=user, bus=bus, speed=self._speed)
                     self._children.append(Child(nursery, f"agent/{robot}", "agents", brief))
@@ -158,6 +161,9 @@ class LockstepRun:
         go = link.publisher(keys.go(run))
         speed = LeaderSpeed(leader_brief(self._scenario).speed_steps).encode()
         deadline = time.monotonic() + self._scenario.clock.start_deadline_s
+        ticks = schedule(self._scenario)
+        countdown_ns = ticks.countdown_ticks * ticks.period_ns + GO_AHEAD_NS
+        epoch_ns = 0
         while not stop.requested:
             ready = self._alive.issuperset(self._processes)
             if ready and "plant" in self._seen:
@@ -172,7 +178,8 @@ class LockstepRun:
                 )
             leader.put(speed)
             if ready:
-                go.put(Go().encode())
+                epoch_ns = epoch_ns or time.monotonic_ns() + countdown_ns
+                go.put(Go(epoch_ns).encode())
             self._take(link.receive(0.02))
         return None
 
@@ -188,6 +195,9 @@ class LockstepRun:
                 return cause(self._children) or failure
             if all(child.ended() for child in actors):
                 return None
+            if actors[0].ended() and (left := await_end(actors, DRAIN_S)):
+                name = left[0].name
+                return Failure(2, name, f"{name}: has not ended {DRAIN_S:g} s after the plant")
             if (silent := self._silent()) is not None:
                 await_end(actors, 0.3)
                 return cause(self._children) or silent

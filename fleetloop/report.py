@@ -18,7 +18,14 @@ from configs.scenario import Scenario
 from fleetloop import run_folder
 from fleetloop.figures import Captioned, all_figures
 from fleetloop.record.reader import Record
-from fleetloop.results import claim, mark, robot_header, robot_rows, spread_line
+from fleetloop.results import (
+    claim,
+    mark,
+    realtime_lines,
+    robot_header,
+    robot_rows,
+    spread_line,
+)
 from fleetloop.summary import RunStats, Summary, summarise
 
 PAGE = "report.html"
@@ -101,6 +108,10 @@ def _facts(summary: Summary) -> Iterable[tuple[str, str]]:
     yield "overruns", f"{summary['overruns']}"
     frames = (f"{bus} {count}" for bus, count in summary["frames_per_bus"].items())
     yield "frames per bus", ", ".join(frames)
+    for text in realtime_lines(summary):
+        yield "clock", text
+    cpu = (f"{process} {seconds:g} s" for process, seconds in summary["cpu_s"].items())
+    yield "processor time", ", ".join(cpu)
     yield "seed", f"{summary['seed']}"
     versions = (f"{name} {number}" for name, number in summary["versions"].items())
     yield "versions", ", ".join(versions)

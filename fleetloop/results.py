@@ -13,6 +13,8 @@ from rich.table import Table
 from fleetloop.summary import ERRORS, Summary
 
 _MARKS = {True: "held", False: "FAILED", None: "not reached"}
+HOLDS_PERCENT = 2.0
+"""More misses than this, and the machine is said not to hold the rate."""
 _SYMBOLS = {"x_e_m": ("x_e", "m"), "y_e_m": ("y_e", "m"), "theta_e_rad": ("θ_e", "rad")}
 
 
@@ -47,6 +49,8 @@ def print_results(summary: Summary, folder: Path) -> None:
             f" (start {summary['startup_s']:.2f} s, end {summary['teardown_s']:.2f} s,"
             f" overruns {summary['overruns']})"
         )
+    for text in realtime_lines(summary):
+        line(text)
     reason = f": {summary['reason']}" if summary["reason"] else ""
     line(f"verdict  {summary['verdict']}{reason}", "bold")
     line(f"run      {folder}")
@@ -80,6 +84,27 @@ def spread_line(summary: Summary) -> str:
         f"spread of s: peak {spread['peak']:.4f} m, settled {_time(spread['settle_s'])},"
         f" final {spread['final']:.2e} m"
     )
+
+
+def realtime_lines(summary: Summary) -> Iterator[str]:
+    """How well the wall clock was kept, and what would help; nothing for a lockstep run."""
+    kept = summary.get("realtime")
+    if not kept:
+        return
+    late, trip = kept["late_us"], kept["round_trip_us"]
+    yield (
+        f"real time: misses {kept['miss_percent']:g} %, wake-up late p50 {late.get('p50', 0):.0f}"
+        f" p99 {late.get('p99', 0):.0f} max {late.get('max', 0):.0f} µs, torque to feedback p50"
+        f" {trip.get('p50', 0):.0f} p99 {trip.get('p99', 0):.0f} max {trip.get('max', 0):.0f} µs,"
+        f" processor {kept['cpu_percent_of_one_core']:g} % of one core"
+    )
+    if kept["refused"]:
+        yield f"note: refused to this user, so the clock jitters more: {', '.join(kept['refused'])}"
+    if kept["miss_percent"] > HOLDS_PERCENT:
+        yield (
+            f"WARNING: this machine does not hold the rate: {kept['miss_percent']:g} % of the ticks"
+            " had no feedback in time; lower the rate or free the machine"
+        )
 
 
 def mark(expect: dict[str, Any]) -> str:

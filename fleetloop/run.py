@@ -13,7 +13,7 @@ from bridge.messages import Progress
 from bridge.process import Stop
 from configs.brief import NetworkLink
 from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
-from configs.errors import InfrastructureError
+from configs.errors import InfrastructureError, ScenarioError
 from configs.loading import load, to_toml
 from configs.scenario import Scenario
 from fleetloop import run_folder
@@ -48,6 +48,11 @@ def run_scenario(source: str, options: Options) -> int:
         InfrastructureError: the run could not start.
     """
     scenario = load(source, options.overrides)
+    if options.in_process and scenario.clock.mode == "realtime":
+        raise ScenarioError(
+            f'{source}: clock.mode = "realtime" needs processes; add --clock lockstep to run it'
+            " in one process"
+        )
     check_expectations(scenario.expect)
     started = datetime.now(UTC).astimezone()
     folder = run_folder.create(scenario.name, options.out, now=started)
@@ -132,10 +137,16 @@ def _stats(outcome: Outcome) -> RunStats:
         waits = {
             name.removesuffix("_ns"): round(report.number(name) * 1e-9, 4)
             for name in report.values
-            if name.endswith("_ns")
+            if name.endswith("_ns") and name != "cpu_ns"
         }
         if waits:
             stats.waits_s[process] = waits
+        if "cpu_ns" in report.values:
+            stats.cpu_s[process] = round(report.number("cpu_ns") * 1e-9, 3)
+        if "misses" in report.values:
+            counts = {name: int(report.number(name)) for name in ("misses", "skipped")}
+            stats.realtime[process.removeprefix("agent/")] = counts
+        stats.refused |= set(filter(None, str(report.values.get("refused", "")).split(", ")))
         if process == "plant":
             stats.overruns = int(report.number("overruns"))
             stats.frames_per_bus = {

@@ -39,6 +39,9 @@ class RunStats:
     frames_per_bus: dict[str, int] = field(default_factory=dict)
     waits_s: dict[str, dict[str, float]] = field(default_factory=dict)
     stopped_robots: dict[str, str] = field(default_factory=dict)
+    cpu_s: dict[str, float] = field(default_factory=dict)
+    realtime: dict[str, dict[str, int]] = field(default_factory=dict)
+    refused: set[str] = field(default_factory=set)
 
 
 Summary = dict[str, Any]
@@ -87,6 +90,8 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         "overruns": stats.overruns,
         "frames_per_bus": stats.frames_per_bus,
         "waits_s": stats.waits_s,
+        "cpu_s": stats.cpu_s,
+        "realtime": _realtime(controllers, stats) if stats.realtime and ticks else None,
         "seed": scenario.seed,
         "versions": {"python": platform.python_version()}
         | {package: version(package) for package in _PACKAGES},
@@ -150,6 +155,43 @@ def _spread_of(controllers: dict[str, np.ndarray]) -> dict[str, float | None]:
         "peak": float(values.max()),
         "settle_s": settle_s(t, values),
         "final": float(values[_final(t)].max()),
+    }
+
+
+def _realtime(controllers: dict[str, np.ndarray], stats: RunStats) -> dict[str, Any]:
+    """How well the wall clock was kept: counts, and percentiles over all ticks."""
+    ticks = len(next(iter(controllers.values())))
+    robots = {
+        robot: {
+            **counts,
+            "miss_percent": round(100.0 * counts["misses"] / ticks, 4),
+            "late_us": _percentiles(controllers[robot]["late_s"]),
+            "round_trip_us": _percentiles(controllers[robot]["round_trip_s"]),
+        }
+        for robot, counts in stats.realtime.items()
+    }
+    total = sum(counts["misses"] for counts in stats.realtime.values())
+    cpu = sum(stats.cpu_s.values()) / stats.wall_s if stats.wall_s > 0 else 0.0
+    return {
+        "miss_percent": round(100.0 * total / (ticks * len(robots)), 4),
+        "late_us": _percentiles(np.concatenate([r["late_s"] for r in controllers.values()])),
+        "round_trip_us": _percentiles(
+            np.concatenate([r["round_trip_s"] for r in controllers.values()])
+        ),
+        "cpu_percent_of_one_core": round(100.0 * cpu, 1),
+        "refused": sorted(stats.refused),
+        "robots": robots,
+    }
+
+
+def _percentiles(seconds: np.ndarray) -> dict[str, float]:
+    values = seconds[np.isfinite(seconds)] * 1e6
+    if not len(values):
+        return {}
+    points = np.percentile(values, [50, 99, 99.9, 100])
+    return {
+        name: round(float(v), 1)
+        for name, v in zip(("p50", "p99", "p99.9", "max"), points, strict=True)
     }
 
 

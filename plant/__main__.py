@@ -5,6 +5,7 @@ inherited file descriptors.
 """
 
 import socket
+import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -14,15 +15,18 @@ from bridge.barrier import Hellos, await_hellos
 from bridge.can_bus import places
 from bridge.can_bus.hub import Hub
 from bridge.link import Arrival, Link, Publisher
-from bridge.messages import PoseFix, Report, Rows
-from bridge.process import Stop, serve, settle_memory
+from bridge.messages import Go, PoseFix, Progress, Report, Rows
+from bridge.process import Stop, cpu_ns, go_realtime, serve, settle_memory
 from bridge.telemetry import PLANT_ROW, RowBuffer
 from bridge.zenoh_link import open_client
 from configs.brief import PlantBrief
 from configs.errors import InfrastructureError
 from plant.loop import Counters, LockstepLoop, bus_frames
+from plant.realtime import RealtimeLoop
 from plant.unit import Unit
 
+PLANT_PRIORITY = 45
+"""SCHED_FIFO, above the controllers'."""
 EARLY = -1
 """Tick of the poses that only prove the link, before the run."""
 
@@ -60,47 +64,82 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> Counters:
         start = unit.brief.pose
         hellos.add(pose, PoseFix(EARLY, 0, start.x_m, start.y_m, start.theta_rad).encode())
         hellos.add(truth, Rows(0, 0, b"", False).encode())
-    _await_controllers(brief, hub, hellos, stop)
-    link.declare_live(keys.live(name, "plant"))
-    gone: set[str] = set()
-    await_hellos(
-        link,
-        hellos,
-        _note_go(gone),
-        lambda: () if gone else ("the launcher's go",),
-        who="plant",
-        within_s=brief.schedule.start_deadline_s,
-        stop=stop,
-    )
-    settle_memory()
-    loop = LockstepLoop(brief, units, hub, poses, rows, lambda state: progress.put(state.encode()))
+
+    def say(state: Progress) -> None:
+        progress.put(state.encode())
+
+    refused: list[str] = []
+    body: Callable[[Stop], None]
+    if brief.schedule.realtime:
+        link.declare_live(keys.live(name, "plant"))
+        epoch_ns = _serve_until_go(brief, hub, link, hellos, stop)
+        settle_memory()
+        refused = go_realtime(PLANT_PRIORITY)
+        wall = RealtimeLoop(brief, units, hub, poses, rows, say)
+        counters, progress_of = wall.counters, wall.progress
+        body = partial(wall.run, epoch_ns)
+    else:
+        _await_controllers(brief, hub, hellos, stop)
+        link.declare_live(keys.live(name, "plant"))
+        _await_go(brief, link, hellos, stop)
+        settle_memory()
+        loop = LockstepLoop(brief, units, hub, poses, rows, say)
+        counters, progress_of, body = loop.counters, loop.progress, loop.run
     try:
-        loop.run(stop)
+        body(stop)
     finally:
         for buffer in rows:
             buffer.finish()
-        progress.put(loop.progress().encode())
-        counters = loop.counters
+        say(progress_of())
         values: dict[str, int | float | str] = {
             "ticks": counters.ticks,
             "wall_ns": counters.wall_ns,
             "waited_ns": counters.waited_ns,
             "overruns": counters.overruns,
+            "cpu_ns": cpu_ns(),
+            "refused": ", ".join(refused),
             **bus_frames(counters),
         }
         report.put(Report(values).encode())
     return counters
 
 
-def _put_rows(publisher: Publisher, first: int, count: int, rows: bytes, final: bool) -> None:
-    publisher.put(Rows(first, count, rows, final).encode())
+def _await_go(brief: PlantBrief, link: Link, hellos: Hellos, stop: Stop) -> None:
+    gone: set[str] = set()
 
-
-def _note_go(gone: set[str]) -> Callable[[Arrival], None]:
-    def take(arrival: Arrival) -> None:
+    def note(arrival: Arrival) -> None:
         gone.add(arrival.tag)
 
-    return take
+    await_hellos(
+        link,
+        hellos,
+        note,
+        lambda: () if gone else ("the launcher's go",),
+        who="plant",
+        within_s=brief.schedule.start_deadline_s,
+        stop=stop,
+    )
+
+
+def _serve_until_go(brief: PlantBrief, hub: Hub, link: Link, hellos: Hellos, stop: Stop) -> int:
+    """Say hello and serve the buses until the launcher says when tick 0 is."""
+    deadline = time.monotonic() + brief.schedule.start_deadline_s
+    while time.monotonic() < deadline and not stop.requested:
+        hellos.say()
+        hub.serve(0.02)
+        while (arrival := link.receive(0.0)) is not None:
+            go = Go.decode(arrival.payload)
+            if go is not None:
+                return go.epoch_ns
+    if stop.requested:
+        return time.monotonic_ns()
+    raise InfrastructureError(
+        f"plant: not ready after {brief.schedule.start_deadline_s:g} s: no go from the launcher"
+    )
+
+
+def _put_rows(publisher: Publisher, first: int, count: int, rows: bytes, final: bool) -> None:
+    publisher.put(Rows(first, count, rows, final).encode())
 
 
 def _await_controllers(brief: PlantBrief, hub: Hub, hellos: Hellos, stop: Stop) -> None:

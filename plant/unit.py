@@ -20,10 +20,10 @@ class Unit:
     """One robot on its bus."""
 
     __slots__ = (
+        "_answered_ns",
         "_body",
         "_demand_left",
         "_demand_right",
-        "_drives",
         "_left",
         "_motor_left",
         "_motor_right",
@@ -40,7 +40,7 @@ class Unit:
         self._body = Robot(brief.body, brief.disturbance)
         self._right = node(brief.drive, brief.right_node, brief.drive.serial_number)
         self._left = node(brief.drive, brief.left_node, brief.drive.serial_number + 1)
-        self._drives = (self._right, self._left)
+        self._answered_ns = 0
         self._motor_right = Motor()
         self._motor_left = Motor()
         self._demand_right = self._demand_left = 0.0
@@ -50,12 +50,24 @@ class Unit:
             pose.x_m, pose.y_m, pose.theta_rad, brief.v_m_s, brief.omega_rad_s, 0.0, 0.0
         )
 
-    def frames_due(self, now_ns: int) -> list[Frame]:
-        """What both drives send at this instant, in order of arbitration."""
+    def _feed(self) -> None:
+        """Tell both drives what their encoders see."""
         state = self.state
         right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
         self._right.feed(state.right_angle * PER_RADIAN, right_speed * PER_RADIAN)
         self._left.feed(state.left_angle * PER_RADIAN, left_speed * PER_RADIAN)
+
+    def feedback(self, now_ns: int) -> Sequence[Frame]:
+        """Both encoder frames, once both drives have taken a set-point since the last ones."""
+        if min(self._right.fed_ns, self._left.fed_ns) <= self._answered_ns:
+            return ()
+        self._answered_ns = now_ns
+        self._feed()
+        return self._right.feedback(now_ns), self._left.feedback(now_ns)
+
+    def frames_due(self, now_ns: int) -> list[Frame]:
+        """What both drives send at this instant, in order of arbitration."""
+        self._feed()
         frames = [*self._right.due(now_ns), *self._left.due(now_ns)]
         frames.sort()
         return frames

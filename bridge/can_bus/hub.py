@@ -4,7 +4,8 @@
     collect    wait until paced clients have said all they had to say until that instant
     take       what the clients of a bus sent since the last take
 
-A *paced* client (a controller in lockstep) owes an answer to every packet; bus time stands still
+A *gathered* client takes and sends the frames of one instant together, in one packet. A *paced* one
+(a controller in lockstep) is gathered, and owes an answer to every packet: bus time stands still
 until it has answered. All others (loggers, host code under test) come, go, crash or stop reading as
 they like: what they send is taken at the next instant, what they don't read is kept for them up to
 `BACKLOG` frames and then dropped and counted. A client's frames go to all other clients of its bus,
@@ -40,13 +41,13 @@ class Counters:
 
 
 class _Client:
-    __slots__ = ("backlog", "bus", "joined", "name", "owes", "own", "paced", "sock")
+    __slots__ = ("backlog", "bus", "gathered", "joined", "name", "owes", "own", "paced", "sock")
 
     def __init__(self, sock: socket.socket, bus: "_Bus") -> None:
         self.sock = sock
         self.bus = bus
         self.name = ""
-        self.joined = self.paced = self.own = self.owes = False
+        self.joined = self.paced = self.gathered = self.own = self.owes = False
         self.backlog: deque[bytes] = deque()
 
 
@@ -92,8 +93,8 @@ class Hub:
         if len(clients) > 1:
             clients = clients.copy()
         for client in clients:
-            if client.paced:
-                if not client.owes:
+            if client.gathered:
+                if client.paced and not client.owes:
                     client.owes = True
                     bus.owing += 1
                 self._send(client, together)
@@ -116,8 +117,17 @@ class Hub:
         return answered
 
     def serve(self, timeout_s: float) -> None:
-        """Handle what happens on the buses, waiting for it at most `timeout_s`."""
-        self._handle(timeout_s)
+        """Handle what happens on the buses; waits at most `timeout_s`, to the microsecond."""
+        if select.select([self._epoll], [], [], max(timeout_s, 0.0))[0]:
+            self._handle(0.0)
+
+    def clients(self) -> int:
+        """How many clients all buses have."""
+        return sum(len(bus.clients) for bus in self._buses.values())
+
+    def heard(self) -> list[str]:
+        """Buses with something to take."""
+        return [name for name, bus in self._buses.items() if bus.taken]
 
     def debtors(self) -> tuple[str, ...]:
         """Buses with a paced client that owes an answer."""
@@ -254,6 +264,7 @@ class Hub:
             return
         client.name = hello.text
         client.paced = bool(hello.flags & wire.PACED)
+        client.gathered = client.paced or bool(hello.flags & wire.GATHERED)
         client.own = bool(hello.flags & wire.OWN)
         client.joined = True
         bus.clients.append(client)

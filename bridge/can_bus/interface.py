@@ -6,8 +6,10 @@ Works between processes, without kernel module or root; lossless and in order fo
 of own frames unless asked; classic CAN only. `Message.timestamp` is bus time: seconds since the bus
 was powered up. Linux.
 
-`paced=True` is for a controller in lockstep: the bus waits for it. What it sends is gathered and
-goes out when it next waits in `recv` with nothing left to read, which says: that was all until now.
+`gathered=True` is for a program that reads until nothing is left and then acts: frames of one
+instant come in one packet, and what it sends goes out with its next look at the bus. `paced=True`
+is for a controller in lockstep: it is gathered, the bus waits for it, and its next wait in `recv`
+with nothing left to read says: that was all until now.
 """
 
 import select
@@ -25,6 +27,8 @@ from bridge.can_bus import places
 from bridge.can_bus.convert import to_frame, to_message
 from bridge.frame import Frame
 
+FINE_S = 0.05
+"""Waits below this are kept to the microsecond; the kernel's own bound counts in its ticks."""
 _TIMEVAL = struct.Struct("ll")
 _IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ignore_config"})
 
@@ -36,6 +40,7 @@ class FleetloopBus(can.BusABC):
         channel: bus name ("r1"), run and bus ("<run>/r1"), or the path of the bus's socket.
         can_filters: see `can.BusABC.set_filters`.
         paced: bus time waits for this client.
+        gathered: frames of one instant travel together; a descriptor is readable once for all.
         receive_own_messages: frames sent come back, with `is_rx` False.
         connect_timeout: how long to wait for the bus to answer [s].
         fd: must be False; the bus is classic CAN.
@@ -50,6 +55,7 @@ class FleetloopBus(can.BusABC):
         can_filters: CanFilters | None = None,
         *,
         paced: bool = False,
+        gathered: bool = False,
         receive_own_messages: bool = False,
         connect_timeout: float = 10.0,
         fd: bool = False,
@@ -60,6 +66,7 @@ class FleetloopBus(can.BusABC):
         if fd:
             raise can.CanInitializationError(f"bus {channel!r} is classic CAN: fd must be False")
         self._paced = paced
+        self._gathered = gathered or paced
         self._inbox: deque[can.Message] = deque()
         self._outbox: list[Frame] = []
         self._stamp_ns = -1
@@ -79,7 +86,8 @@ class FleetloopBus(can.BusABC):
             path = places.find(self.channel)
             sock.settimeout(timeout_s)
             sock.connect(str(path))
-            flags = (wire.PACED if self._paced else 0) | (wire.OWN if own else 0)
+            flags = wire.PACED if self._paced else wire.GATHERED if self._gathered else 0
+            flags |= wire.OWN if own else 0
             name = socket.gethostname()
             sock.send(wire.encode_text(wire.HELLO, name, flags=flags, count=wire.VERSION))
             answer = wire.decode(sock.recv(wire.MAX_BYTES))
@@ -130,7 +138,7 @@ class FleetloopBus(can.BusABC):
         if msg.is_fd:
             raise can.CanOperationError("the bus is classic CAN: no FD frames")
         frame = to_frame(msg)
-        if self._paced:
+        if self._gathered:
             self._outbox.append(frame)
             return
         data = wire.encode_frames(0, self._stamp_ns, (frame,))
@@ -173,7 +181,9 @@ class FleetloopBus(can.BusABC):
         if self._closed_because is not None:
             raise can.CanOperationError(f"bus {self.channel!r} closed: {self._closed_because}")
         try:
-            if polling:
+            if wait_s is not None and wait_s < FINE_S:
+                if not polling:
+                    select.select([self._socket], [], [], wait_s)
                 data = self._socket.recv(wire.MAX_BYTES, socket.MSG_DONTWAIT)
             else:
                 if wait_s != self._timeout:

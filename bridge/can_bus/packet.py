@@ -4,7 +4,7 @@
     frame    can_id u32, length u8, 3 bytes padding, data 8 bytes      as Linux struct can_frame
 
     kind       from     flags, count and body
-    HELLO      client   flags PACED, OWN; count = protocol version; body = the client's name
+    HELLO      client   flags PACED, GATHERED, OWN; count = version; body = the client's name
     WELCOME    hub      stamp = bus time; count = protocol version
     REFUSED    hub      body = reason
     FRAMES     both     count frames; from the hub OWN: the client's own come back;
@@ -22,7 +22,7 @@ from bridge.frame import MAX_DATA, Frame
 
 VERSION = 1
 HELLO, WELCOME, REFUSED, FRAMES, BYE = 1, 2, 3, 4, 5
-PACED, OWN, DONE = 1, 2, 4
+PACED, OWN, DONE, GATHERED = 1, 2, 4, 8
 MAX_FRAMES = 1024
 MAX_BYTES = 16 + 16 * MAX_FRAMES
 

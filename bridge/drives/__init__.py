@@ -25,6 +25,9 @@ class DriveClient(Protocol):
     def complete(self, now_ns: int) -> bool:
         """Whether both wheels' encoder frames of this instant are here."""
 
+    def heard_since(self, bus_ns: int) -> bool:
+        """Whether both wheels' encoder frames came after this bus time."""
+
     def motion(self) -> Motion | None:
         """The newest wheel angles and speeds, None before both wheels were heard."""
 
@@ -47,11 +50,17 @@ class DriveClient(Protocol):
 class DriveNode(Protocol):
     """The emulated drive of one wheel."""
 
+    fed_ns: int
+    """When it last took a set-point, bus time."""
+
     def feed(self, revolutions: float, rev_s: float) -> None:
         """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
 
     def due(self, now_ns: int) -> Sequence[Frame]:
         """Cyclic frames due at this instant."""
+
+    def feedback(self, now_ns: int) -> Frame:
+        """The encoder frame out of its turn; the next cyclic one comes a period later."""
 
     def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Take one frame from the bus; return the replies."""

@@ -113,6 +113,10 @@ class OdriveClient:
         """Whether both wheels' encoder frames of this instant are here."""
         return self._right.stamp_ns == now_ns and self._left.stamp_ns == now_ns
 
+    def heard_since(self, bus_ns: int) -> bool:
+        """Whether both wheels' encoder frames came after this bus time."""
+        return self._right.stamp_ns > bus_ns and self._left.stamp_ns > bus_ns
+
     def motion(self) -> Motion | None:
         """The newest wheel angles and speeds, None before both wheels were heard."""
         right, left = self._right, self._left

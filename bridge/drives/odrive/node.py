@@ -59,7 +59,7 @@ class OdriveNode:
         self._current_limit = model.current_limit_A
         self._position = self._velocity = 0.0
         self._offset = 0.0
-        self._fed_ns = 0
+        self.fed_ns = 0
         self._next_heartbeat_ns = self._next_encoder_ns = self._next_torques_ns = 0
         self._next_other_ns = 0
         self._encoder_id = f.identifier(node_id, Command.GET_ENCODER_ESTIMATES)
@@ -112,13 +112,18 @@ class OdriveNode:
         self._next_other_ns = min(others)
         return frames
 
+    def feedback(self, now_ns: int) -> Frame:
+        """The encoder frame out of its turn; the next cyclic one comes a period later."""
+        self._next_encoder_ns = now_ns + 2 * self._model.encoder_period_ns
+        return self._encoder_estimates()
+
     def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Take one frame from the bus; return the replies."""
         can_id, data = frame
         if can_id == self._torque_id and len(data) == 4:
             (torque,) = _UNPACK_FLOAT(data)
             if isfinite(torque):
-                self._fed_ns = now_ns
+                self.fed_ns = now_ns
                 self.input_torque = torque
             else:
                 self._set_torque(torque, now_ns)
@@ -141,7 +146,7 @@ class OdriveNode:
         if self.state is not AxisState.CLOSED_LOOP_CONTROL:
             return
         model = self._model
-        if model.watchdog_ns and now_ns - self._fed_ns > model.watchdog_ns:
+        if model.watchdog_ns and now_ns - self.fed_ns > model.watchdog_ns:
             self._disarm(AxisError.WATCHDOG_TIMER_EXPIRED)
         overspeed = model.overspeed_ratio * self._velocity_limit
         if model.torque_limiters and abs(self._velocity) > overspeed:
@@ -160,7 +165,7 @@ class OdriveNode:
             self.input_torque = 0.0
 
     def _set_torque(self, torque: float, now_ns: int) -> None:
-        self._fed_ns = now_ns
+        self.fed_ns = now_ns
         if isfinite(torque):
             self.input_torque = torque
         elif torque != torque or not self._model.torque_limiters:
@@ -239,7 +244,7 @@ class OdriveNode:
         elif self.state is not AxisState.CLOSED_LOOP_CONTROL:
             self.result = Result.SUCCESS
             self.state = AxisState.CLOSED_LOOP_CONTROL
-            self._fed_ns = now_ns
+            self.fed_ns = now_ns
 
     def _on_controller_mode(self, data: bytes, _: int) -> None:
         control, mode = f.TWO_U32.unpack(f.padded(data, 8))

@@ -160,6 +160,33 @@ def test_a_descriptor_is_readable_once_per_frame(running, join) -> None:
     assert [message.arbitration_id for message in heard] == list(range(50))
 
 
+def test_a_gathered_client_sends_with_its_next_look_and_takes_an_instant_in_one_packet(
+    running, join
+) -> None:
+    gathered, other = join(gathered=True), join()
+    gathered.send(can.Message(arbitration_id=1, is_extended_id=False))
+    gathered.send(can.Message(arbitration_id=2, is_extended_id=False))
+    assert other.recv(0.05) is None
+    assert gathered.recv(0.0) is None
+    assert [other.recv(5.0).arbitration_id for _ in range(2)] == [1, 2]
+    running.deliver(Frame(3, b""), Frame(4, b""))
+    assert gathered.recv(5.0).arbitration_id == 3
+    assert gathered.recv(0.0).arbitration_id == 4  # it is here already
+
+
+def test_short_waits_are_kept_to_the_millisecond(running, join) -> None:
+    import time
+
+    bus = join()
+    waits = []
+    for _ in range(20):
+        began = time.monotonic()
+        assert bus.recv(0.001) is None
+        waits.append(time.monotonic() - began)
+    assert min(waits) >= 0.001
+    assert min(waits) < 0.003  # the kernel's own bound counts in steps of 4 ms
+
+
 def test_fd_frames_and_unknown_options_are_refused(running, join) -> None:
     with pytest.raises(can.CanOperationError, match="classic CAN"):
         join().send(can.Message(arbitration_id=1, is_fd=True, is_extended_id=False))

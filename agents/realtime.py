@@ -1,0 +1,128 @@
+"""One controller in real time: the wall clock is the clock, the newest data wins.
+
+    due time of tick k   epoch + k h + phase, absolute: lateness never adds up
+    until then           read the bus as frames come: feedback is seen at once, its round trip too
+    then                 take what the network brought, compute, send torques, share when due
+
+Controllers have different phases, so that they don't all wake at one instant. The controller never
+waits for feedback: a *miss* is a tick whose torques had no feedback when the next tick was due. A
+tick that could not be kept is computed late, without sending, so that the path variable keeps time.
+"""
+
+import time
+from dataclasses import dataclass
+from math import nan
+
+import can
+
+from agents.agent import Agent, Phase
+from agents.loop import give
+from bridge.barrier import Hellos
+from bridge.can_bus.convert import can_id_of, to_message
+from bridge.link import Link, Publisher
+from bridge.messages import Go
+from bridge.process import Stop
+from configs.errors import InfrastructureError, PeerLostError
+
+
+@dataclass(slots=True)
+class Counters:
+    """How well the controller kept its time."""
+
+    ticks: int = 0
+    misses: int = 0  # no feedback of its torques before the next tick was due
+    skipped: int = 0  # computed after the next tick was due, and not sent
+    undecodable: int = 0
+
+
+class RealtimeLoop:
+    """Runs one agent on its bus and its link by the wall clock."""
+
+    def __init__(
+        self, agent: Agent, bus: can.BusABC, link: Link, path: Publisher, hellos: Hellos
+    ) -> None:
+        self._agent = agent
+        self._schedule = agent.brief.schedule
+        self._robot = agent.brief.robot
+        self._bus = bus
+        self._link = link
+        self._path = path
+        self._hellos = hellos
+        self._power_up_ns = 0
+        self._sent_ns = 0  # when torques were sent that have no feedback yet; 0: there are none
+        self.counters = Counters()
+
+    def await_go(self, stop: Stop) -> int | None:
+        """Say hello until the launcher says when tick 0 is; None when told to stop."""
+        deadline = time.monotonic() + self._schedule.start_deadline_s
+        while not stop.requested:
+            self._hellos.say()
+            while (arrival := self._link.receive(0.02)) is not None:
+                if arrival.tag != "go":
+                    self.counters.undecodable += not give(self._agent, arrival)
+                elif (go := Go.decode(arrival.payload)) is not None:
+                    return go.epoch_ns
+            if time.monotonic() > deadline:
+                raise InfrastructureError(
+                    f"{self._robot}: the run did not start within"
+                    f" {self._schedule.start_deadline_s:g} s"
+                )
+        return None
+
+    def run(self, epoch_ns: int, stop: Stop) -> None:
+        """Run from the countdown to the closing tick, or until told to stop.
+
+        Raises:
+            InfrastructureError: the drives were not armed when control had to start.
+            PeerLostError: the bus closed.
+        """
+        schedule, agent = self._schedule, self._agent
+        period_ns, phase_ns = schedule.period_ns, agent.brief.phase_ns
+        self._power_up_ns = epoch_ns - schedule.countdown_ticks * period_ns
+        tick = -schedule.countdown_ticks
+        while agent.phase is not Phase.DONE:
+            due_ns = epoch_ns + tick * period_ns + phase_ns
+            self._read_until(due_ns)
+            now_ns = time.monotonic_ns()
+            agent.late_s = (now_ns - due_ns) * 1e-9
+            if self._sent_ns and tick > 0:
+                self.counters.misses += 1
+                agent.round_trip_s = nan
+            while (arrival := self._link.receive(0.0)) is not None:
+                self.counters.undecodable += not give(agent, arrival)
+            frames = agent.step(tick) if not stop.requested else agent.leave()
+            overdue = now_ns >= due_ns + period_ns and agent.phase is Phase.DRIVING
+            if overdue:
+                self.counters.skipped += 1
+            else:
+                for can_id, data in frames:
+                    self._bus.send(to_message(can_id, data))
+                self._sent_ns = time.monotonic_ns()
+            self.counters.ticks += tick >= 0
+            tick += 1
+            if schedule.shares(tick):
+                self._path.put(agent.share(tick).encode())
+
+    def _read_until(self, due_ns: int) -> None:
+        """Take frames from the bus until the due time."""
+        agent = self._agent
+        polled = False
+        while True:
+            left_ns = due_ns - time.monotonic_ns()
+            if left_ns <= 0 and polled:
+                return
+            try:
+                message = self._bus.recv(max(left_ns, 0) * 1e-9)
+            except can.CanOperationError as error:
+                raise PeerLostError(
+                    f"{self._robot}: lost its bus after {self.counters.ticks} ticks: {error}"
+                ) from error
+            polled = message is None
+            if message is None:
+                continue
+            came_ns = time.monotonic_ns()
+            bus_ns = came_ns - self._power_up_ns
+            agent.hear(can_id_of(message), message.data, bus_ns)
+            if self._sent_ns and agent.heard_since(self._sent_ns - self._power_up_ns):
+                agent.round_trip_s = (came_ns - self._sent_ns) * 1e-9
+                self._sent_ns = 0
