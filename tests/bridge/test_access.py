@@ -37,6 +37,7 @@ def test_rights_of_a_robot_are_its_graph(plan: access.AccessPlan) -> None:
     assert keys.path(RUN, "r4") in rights.puts
     assert set(rights.hears) == {
         keys.pose(RUN, "r4"),
+        keys.go(RUN),
         keys.path(RUN, "r2"),
         keys.path(RUN, "r3"),
     }

@@ -129,6 +129,15 @@ def test_json_of_a_run_is_its_summary_and_nothing_else(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "x" / "summary.json").read_text()).items() <= summary.items()
 
 
+def test_real_time_needs_processes(tmp_path: Path) -> None:
+    done = fleetloop("run", "realtime_100hz", "--in-process", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "--clock lockstep" in done.stderr
+    done = fleetloop("run", "two_robots", "--clock", "sundial", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "clock.mode" in done.stderr
+
+
 def test_reports_of_nothing_end_with_2(tmp_path: Path) -> None:
     for verb in (["report", "nowhere"], ["export", "nowhere", "a.csv"], ["diff", "a", "b"]):
         done = fleetloop(*verb, cwd=tmp_path)

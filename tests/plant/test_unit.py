@@ -69,3 +69,15 @@ def test_a_row_is_the_truth_and_the_torques_of_the_last_period() -> None:
     assert row["v_m_s"] == robot.state.v
     assert row["demand_right_Nm"] == row["motor_right_Nm"] == pytest.approx(0.1)
     assert row["demand_left_Nm"] == pytest.approx(0.05)
+
+
+def test_feedback_comes_once_both_drives_have_taken_a_set_point() -> None:
+    robot = unit()
+    arm(robot, 0.0, 0.0)
+    right = Frame(identifier(0, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(0.1))
+    left = Frame(identifier(1, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(0.1))
+    robot.hear(right, 5_000)
+    assert robot.feedback(6_000) == ()
+    robot.hear(left, 7_000)
+    assert [frame.can_id for frame in robot.feedback(8_000)] == [0x009, 0x029]
+    assert robot.feedback(9_000) == ()

@@ -1,0 +1,78 @@
+"""The robust law at real rates: random starts, a period of delay, a torque limit."""
+
+import random
+from math import cos, pi, sin
+
+import pytest
+
+from agents.laws import LAWS, Sense
+from agents.paths import robot_path
+from bridge.telemetry import LAW_SIGNALS
+from configs.brief import NetworkLink, WorldOffset
+from configs.briefing import agent_brief, plant_brief, reference_path
+from configs.loading import load
+from plant.integrate import rk4
+from plant.robot import Robot, State
+
+NOWHERE = NetworkLink("test", "", "", "")
+SEEDS = 200
+SECONDS = 14.0
+NAMES = [signal.name for signal in LAW_SIGNALS]
+
+
+def final_errors(scenario, seed: int) -> tuple[float, float]:
+    """Largest |x_e|, |y_e| of the last second, from a random start within 3 m, feedback late."""
+    draw = random.Random(seed)
+    brief = agent_brief(scenario, "r1", network=NOWHERE, bus=())
+    plant = plant_brief(scenario, network=NOWHERE).robots[0]
+    law = LAWS[scenario.control.law](brief.gains, brief.wheels, scenario.clock.control_period_s)
+    robot = Robot(plant.body, plant.disturbance)
+    path = robot_path(reference_path(scenario.path), WorldOffset(0.0, 0.0))
+    h = scenario.clock.control_period_s
+    far, where = 3.0 * draw.random() ** 0.5, draw.uniform(-pi, pi)
+    start = path(0.0)
+    state = State(
+        start.x + far * cos(where), start.y + far * sin(where), draw.uniform(-pi, pi), 0, 0, 0, 0
+    )
+    memory, seen = None, state
+    worst_x = worst_y = 0.0
+    ticks = round(SECONDS / h)
+    for k in range(ticks):
+        sense = Sense(seen.x, seen.y, seen.theta, seen.v, seen.omega)
+        out = law(memory, sense, path(0.6 * k * h), 0.6)
+        memory, seen = out.state, state
+        assert max(abs(out.tau_right), abs(out.tau_left)) <= 2.0
+        state = rk4(robot, state, out.tau_right, out.tau_left, k * h, h)
+        if k * h > SECONDS - 1.0:
+            worst_x = max(worst_x, abs(out.signals[0]))
+            worst_y = max(worst_y, abs(out.signals[1]))
+    return worst_x, worst_y
+
+
+@pytest.mark.parametrize("name", ["realtime_100hz", "realtime_200hz", "realtime_500hz"])
+def test_it_tracks_from_any_start_within_three_metres(name: str) -> None:
+    scenario = load(name)
+    finals = [final_errors(scenario, seed) for seed in range(SEEDS)]
+    assert max(x for x, _ in finals) < 0.05
+    assert max(y for _, y in finals) < 0.05
+
+
+def test_far_off_the_path_the_approach_speed_is_bounded() -> None:
+    brief = agent_brief(load("realtime_100hz"), "r1", network=NOWHERE, bus=())
+    law = LAWS["adaptive_dsc_robust"](brief.gains, brief.wheels, 0.01)
+    path = robot_path(reference_path(load("realtime_100hz").path), WorldOffset(0.0, 0.0))
+    out = law(None, Sense(-500.0, 0.0, 0.0, 0.0, 0.0), path(0.0), 0.0)
+    signals = dict(zip(NAMES, out.signals, strict=True))
+    assert signals["alpha_v_m_s"] == pytest.approx(2.0)
+    assert abs(out.tau_right) <= 2.0
+
+
+def test_estimates_hold_still_while_a_wheel_is_at_its_limit() -> None:
+    brief = agent_brief(load("realtime_100hz"), "r1", network=NOWHERE, bus=())
+    law = LAWS["adaptive_dsc_robust"](brief.gains, brief.wheels, 0.01)
+    path = robot_path(reference_path(load("realtime_100hz").path), WorldOffset(0.0, 0.0))
+    first = law(None, Sense(-9.0, 3.0, 1.0, 5.0, -9.0), path(0.0), 0.6)
+    again = law(first.state, Sense(-9.0, 3.0, 1.0, 5.0, -9.0), path(0.0), 0.6)
+    assert max(abs(again.tau_right), abs(again.tau_left)) == 2.0
+    assert again.state.theta_1 == first.state.theta_1
+    assert again.state.theta_2 == first.state.theta_2

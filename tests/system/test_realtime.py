@@ -1,0 +1,53 @@
+"""Runs by the wall clock: every tick is recorded, what the clock did is told."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from system.processes import completed, running
+
+from fleetloop.record.reader import Record
+
+pytestmark = pytest.mark.system
+
+
+def test_a_real_time_run_takes_its_time_and_records_every_tick(tmp_path: Path) -> None:
+    with running(tmp_path / "a", "realtime_100hz", "--duration", "4", bus_time_s=1.0) as run:
+        status, out = run.end()
+    assert status == 0, out
+    assert "real time: misses" in out
+    summary = run.summary()
+    assert summary["ticks"] == 400
+    assert summary["wall_s"] >= 4.0
+    clock = summary["realtime"]
+    assert set(clock["robots"]) == {"r1", "r2", "r3", "r4"}
+    assert clock["late_us"]["p50"] > 0.0
+    assert clock["round_trip_us"]["p50"] > 0.0
+    assert clock["cpu_percent_of_one_core"] > 0.0
+    assert set(summary["cpu_s"]) == {"plant", "agent/r1", "agent/r2", "agent/r3", "agent/r4"}
+    record = Record.open(tmp_path / "a" / "record.mcap")
+    for robot in record.robots:
+        assert record.plant[robot]["tick"].tolist() == list(range(400))
+        assert record.controller[robot]["tick"].tolist() == list(range(400))
+        # It goes where it should, whatever the machine was doing.
+        errors = np.hypot(record.controller[robot]["x_e_m"], record.controller[robot]["y_e_m"])
+        assert errors[-1] < 0.5 * errors[0]
+        assert np.abs(record.controller[robot]["tau_right_Nm"]).max() <= 2.0
+
+
+def test_lockstep_runs_the_same_scenario_without_the_clock(tmp_path: Path) -> None:
+    args = ("realtime_100hz", "--clock", "lockstep", "--duration", "2")
+    status, out = completed(tmp_path / "a", *args)
+    assert status == 0, out
+    rows = Record.open(tmp_path / "a" / "record.mcap").controller["r1"]
+    assert not rows["late_s"].any()
+    assert not rows["round_trip_s"].any()
+
+
+def test_a_controller_that_is_killed_ends_a_real_time_run_with_its_name(tmp_path: Path) -> None:
+    with running(tmp_path / "a", "realtime_100hz", bus_time_s=1.0) as run:
+        run.child("r3").kill()
+        status, out = run.end(within_s=5.0)
+        assert status == 3
+        assert "agent/r3 was killed by SIGKILL, at tick " in out
+        assert run.survivors() == []
