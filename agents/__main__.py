@@ -3,20 +3,24 @@
 Started by `fleetloop run` with an `AgentBrief` on standard input.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 from dataclasses import asdict
+from functools import partial
 from typing import Any, NamedTuple
 
 import can
 
 from agents.agent import Agent
-from agents.loop import LockstepLoop, give
+from agents.loop import Counters, LockstepLoop, give
+from agents.realtime import Counters as Clock
 from agents.realtime import RealtimeLoop
 from bridge import keys
 from bridge.barrier import Hellos, await_hellos
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import Report, Rows
 from bridge.process import Stop, cpu_ns, go_realtime, name_process, serve, settle_memory
+from bridge.profile import Sampler
 from bridge.telemetry import AGENT_ROW, RowBuffer
 from bridge.zenoh_link import open_client
 from configs.brief import AgentBrief
@@ -90,11 +94,24 @@ class _Wired(NamedTuple):
         )
         self.link.declare_live(keys.live(brief.network.run, f"agent/{brief.robot}"))
 
-    def finish(self, **values: float | str) -> None:
-        """Hand on the last rows and say the last word."""
-        self.rows.finish()
-        stopped = self.agent.stopped_because
-        self.report.put(Report({**values, "stopped": stopped, "cpu_ns": cpu_ns()}).encode())
+    def run(
+        self, body: Callable[[], None], counters: Counters | Clock, refused: Iterable[str] = ()
+    ) -> None:
+        """Run the loop's body; then hand on the last rows and say the last word."""
+        sampler = Sampler()
+        try:
+            with sampler if self.agent.brief.schedule.profile else nullcontext():
+                body()
+        finally:
+            self.rows.finish()
+            values: dict[str, int | float | str] = {
+                **asdict(counters),
+                **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
+                "stopped": self.agent.stopped_because,
+                "refused": ", ".join(refused),
+                "cpu_ns": cpu_ns(),
+            }
+            self.report.put(Report(values).encode())
 
 
 def _lockstep(wired: _Wired, stop: Stop) -> None:
@@ -104,10 +121,7 @@ def _lockstep(wired: _Wired, stop: Stop) -> None:
     if first is None:
         return
     settle_memory()
-    try:
-        loop.run(first, stop)
-    finally:
-        wired.finish(**asdict(loop.counters))
+    wired.run(partial(loop.run, first, stop), loop.counters)
 
 
 def _realtime(wired: _Wired, stop: Stop) -> None:
@@ -118,10 +132,7 @@ def _realtime(wired: _Wired, stop: Stop) -> None:
     epoch_ns = loop.await_go(stop)
     if epoch_ns is None:
         return
-    try:
-        loop.run(epoch_ns, stop)
-    finally:
-        wired.finish(**asdict(loop.counters), refused=", ".join(refused))
+    wired.run(partial(loop.run, epoch_ns, stop), loop.counters, refused)
 
 
 def main() -> int:

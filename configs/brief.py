@@ -185,6 +185,7 @@ class Schedule:
     tick_deadline_s: float  # how long anybody waits for anybody within one tick [wall s]
     start_deadline_s: float  # how long everybody has to become ready [wall s]
     realtime: bool = False  # everybody keeps the wall clock; else the plant owns time
+    profile: bool = False  # every process samples where its processor time goes
 
     @property
     def period_s(self) -> float:

@@ -36,7 +36,7 @@ UNLIMITED = 1e6
 SERIAL_NUMBER = 0x3858_0000_0000
 
 
-def schedule(scenario: Scenario, speed: float = 0.0) -> Schedule:
+def schedule(scenario: Scenario, speed: float = 0.0, *, profile: bool = False) -> Schedule:
     """The ticks of a run; held to a slow `speed`, everybody waits longer for the next tick."""
     clock = scenario.clock
     h = clock.control_period_s
@@ -51,11 +51,18 @@ def schedule(scenario: Scenario, speed: float = 0.0) -> Schedule:
         tick_deadline_s=clock.tick_deadline_s + (h / speed if speed > 0 else 0.0),
         start_deadline_s=clock.start_deadline_s,
         realtime=clock.mode == "realtime",
+        profile=profile,
     )
 
 
 def agent_brief(
-    scenario: Scenario, name: str, *, network: NetworkLink, bus: Settings, speed: float = 0.0
+    scenario: Scenario,
+    name: str,
+    *,
+    network: NetworkLink,
+    bus: Settings,
+    speed: float = 0.0,
+    profile: bool = False,
 ) -> AgentBrief:
     """What the controller of robot `name` is told."""
     robot = next(robot for robot in scenario.robot if robot.name == name)
@@ -64,7 +71,7 @@ def agent_brief(
     coordination = scenario.coordination
     graph = scenario.topology
     drive = _drive_model(scenario, 0)
-    ticks = schedule(scenario, speed)
+    ticks = schedule(scenario, speed, profile=profile)
     return AgentBrief(
         robot=name,
         law=control.law,
@@ -100,10 +107,15 @@ def agent_brief(
 
 
 def plant_brief(
-    scenario: Scenario, *, network: NetworkLink, runtime_folder: str = "", speed: float = 0.0
+    scenario: Scenario,
+    *,
+    network: NetworkLink,
+    runtime_folder: str = "",
+    speed: float = 0.0,
+    profile: bool = False,
 ) -> PlantBrief:
     """What the plant is told."""
-    ticks = schedule(scenario, speed)
+    ticks = schedule(scenario, speed, profile=profile)
     return PlantBrief(
         robots=tuple(_robot(scenario, n, robot) for n, robot in enumerate(scenario.robot, 1)),
         schedule=ticks,

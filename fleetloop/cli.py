@@ -88,6 +88,12 @@ def run(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print summary.json on standard output, no table.")
     ] = False,
+    profile: Annotated[
+        bool,
+        typer.Option(
+            "--profile", help="Sample where the processor time of a tick goes, and print it."
+        ),
+    ] = False,
     figures: Annotated[
         bool, typer.Option("--report/--no-report", help="Make report.html and the figures.")
     ] = True,
@@ -109,6 +115,7 @@ def run(
         out=out,
         as_json=as_json,
         figures=figures,
+        profile=profile,
     )
     raise typer.Exit(run_scenario(scenario, options))
 

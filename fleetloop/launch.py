@@ -61,8 +61,10 @@ class LockstepRun:
         run: str,
         record: Path,
         speed: float,
+        profile: bool,
         on_progress: Callable[[Progress], None],
     ) -> None:
+        self._profile = profile
         self._scenario = scenario
         self._run = run
         self._record = record
@@ -132,7 +134,11 @@ class LockstepRun:
             network("recorder"),
         )
         plant = plant_brief(
-            scenario, network=network("plant"), runtime_folder=str(folder), speed=self._speed
+            scenario,
+            network=network("plant"),
+            runtime_folder=str(folder),
+            speed=self._speed,
+            profile=self._profile,
         )
         buses = tuple((bus, FIRST_FD + n) for n, bus in enumerate(self._robots))
         plant = replace(plant, listeners=buses)
@@ -146,7 +152,14 @@ class LockstepRun:
                     pace = "gathered" if ticks.realtime else "paced"
                     bus = (("channel", channel), ("interface", "fleetloop"), (pace, True))
                     user = network(access.agent_user(robot))
-                    brief = agent_brief(scenario, robot, network=user, bus=bus, speed=self._speed)
+                    brief = agent_brief(
+                        scenario,
+                        robot,
+                        network=user,
+                        bus=bus,
+                        speed=self._speed,
+                        profile=self._profile,
+                    )
                     self._children.append(Child(nursery, f"agent/{robot}", "agents", brief))
                 module = "fleetloop.recorder"
                 self._children.append(Child(nursery, "recorder", module, recorder))

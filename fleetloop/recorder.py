@@ -10,7 +10,7 @@ from bridge import keys
 from bridge.barrier import Hellos, await_hellos
 from bridge.link import Arrival
 from bridge.messages import Progress, Report, Rows
-from bridge.process import Stop, serve
+from bridge.process import Stop, cpu_ns, serve
 from bridge.telemetry import AGENT_ROW, PLANT_ROW
 from bridge.zenoh_link import open_client
 from configs.brief import RecorderBrief
@@ -82,7 +82,8 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
             if now >= next_report:
                 next_report = now + PROGRESS_EVERY_S
                 progress.put(Progress(recorder.ticks, 0, 0).encode())
-        report.put(Report({"undecodable": recorder.undecodable}).encode())
+        values = {"undecodable": recorder.undecodable, "cpu_ns": cpu_ns()}
+        report.put(Report(values).encode())
     return f"{brief.path} is complete up to tick {recorder.ticks}"
 
 

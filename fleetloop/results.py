@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from bridge.profile import PARTS
 from fleetloop.summary import ERRORS, Summary
 
 _MARKS = {True: "held", False: "FAILED", None: "not reached"}
@@ -49,6 +50,8 @@ def print_results(summary: Summary, folder: Path) -> None:
             f" (start {summary['startup_s']:.2f} s, end {summary['teardown_s']:.2f} s,"
             f" overruns {summary['overruns']})"
         )
+    if summary["profile_us_per_tick"]:
+        console.print(_profile(summary["profile_us_per_tick"]))
     for text in realtime_lines(summary):
         line(text)
     reason = f": {summary['reason']}" if summary["reason"] else ""
@@ -57,6 +60,23 @@ def print_results(summary: Summary, folder: Path) -> None:
     if (folder / "report.html").exists():
         line(f"report   {folder / 'report.html'}")
         line(f"figures  {folder / 'figures'}")
+
+
+def _profile(profile: dict[str, dict[str, float]]) -> Table:
+    """Processor time per tick, processes by parts."""
+    parts = [part for part in PARTS if any(part in shares for shares in profile.values())]
+    title = "processor time per tick [µs]; bus with its system calls, Zenoh with its threads"
+    table = Table(title=title, box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("process", no_wrap=True)
+    for name in (*parts, "all"):
+        table.add_column(name, justify="right")
+    for process, shares in profile.items():
+        values = [shares.get(part, 0.0) for part in parts]
+        table.add_row(process, *(f"{v:.1f}" for v in (*values, sum(values))))
+    table.add_section()
+    totals = [sum(shares.get(part, 0.0) for shares in profile.values()) for part in parts]
+    table.add_row("all", *(f"{v:.1f}" for v in (*totals, sum(totals))))
+    return table
 
 
 def robot_header(*, break_lines: bool = False) -> list[str]:

@@ -38,6 +38,7 @@ class Options:
     out: Path | None = None
     as_json: bool = False
     figures: bool = True
+    profile: bool = False
 
 
 def run_scenario(source: str, options: Options) -> int:
@@ -67,7 +68,7 @@ def run_scenario(source: str, options: Options) -> int:
 
         run = _in_process if options.in_process else _over_processes
         try:
-            stats = run(scenario, folder, options.speed, on_progress, stop)
+            stats = run(scenario, folder, options, on_progress, stop)
         except InfrastructureError:
             run_folder.remove_if_unused(folder)
             raise
@@ -78,24 +79,28 @@ def run_scenario(source: str, options: Options) -> int:
 def _over_processes(
     scenario: Scenario,
     folder: Path,
-    speed: float,
+    options: Options,
     on_progress: Callable[[Progress], None],
     stop: Stop,
 ) -> RunStats:
+    began_ns = time.process_time_ns()
     run = LockstepRun(
         scenario,
         run=f"{folder.name}-{time.monotonic_ns() % 1_000_000:06d}",
         record=folder / run_folder.RECORD,
-        speed=speed,
+        speed=options.speed,
+        profile=options.profile,
         on_progress=on_progress,
     )
-    return _stats(run.run(stop))
+    stats = _stats(run.run(stop), realtime=scenario.clock.mode == "realtime")
+    stats.cpu_s["launcher"] = round((time.process_time_ns() - began_ns) * 1e-9, 3)
+    return stats
 
 
 def _in_process(
     scenario: Scenario,
     folder: Path,
-    speed: float,  # noqa: ARG001 - the reference runs as fast as it can
+    options: Options,  # noqa: ARG001 - the reference runs as fast as it can
     on_progress: Callable[[Progress], None],
     stop: Stop,
 ) -> RunStats:
@@ -124,9 +129,9 @@ def _in_process(
     )
 
 
-def _stats(outcome: Outcome) -> RunStats:
+def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
     stats = RunStats(
-        mode="lockstep",
+        mode="realtime" if realtime else "lockstep",
         ended=outcome.ended,
         reason=outcome.reason,
         wall_s=outcome.wall_s,
@@ -139,6 +144,12 @@ def _stats(outcome: Outcome) -> RunStats:
             for name in report.values
             if name.endswith("_ns") and name != "cpu_ns"
         }
+        if profile := {
+            name.removeprefix("profile."): report.number(name) * 1e-9
+            for name in report.values
+            if name.startswith("profile.") and report.number(name)
+        }:
+            stats.profile_s[process] = profile
         if waits:
             stats.waits_s[process] = waits
         if "cpu_ns" in report.values:

@@ -42,6 +42,7 @@ class RunStats:
     cpu_s: dict[str, float] = field(default_factory=dict)
     realtime: dict[str, dict[str, int]] = field(default_factory=dict)
     refused: set[str] = field(default_factory=set)
+    profile_s: dict[str, dict[str, float]] = field(default_factory=dict)
 
 
 Summary = dict[str, Any]
@@ -91,6 +92,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         "frames_per_bus": stats.frames_per_bus,
         "waits_s": stats.waits_s,
         "cpu_s": stats.cpu_s,
+        "profile_us_per_tick": _profile(stats, ticks),
         "realtime": _realtime(controllers, stats) if stats.realtime and ticks else None,
         "seed": scenario.seed,
         "versions": {"python": platform.python_version()}
@@ -181,6 +183,19 @@ def _realtime(controllers: dict[str, np.ndarray], stats: RunStats) -> dict[str, 
         "cpu_percent_of_one_core": round(100.0 * cpu, 1),
         "refused": sorted(stats.refused),
         "robots": robots,
+    }
+
+
+def _profile(stats: RunStats, ticks: int) -> dict[str, dict[str, float]] | None:
+    """Processor time per tick by process and part [µs]; None if it wasn't sampled."""
+    if not stats.profile_s or not ticks:
+        return None
+    parts = dict(stats.profile_s)
+    parts["recorder"] = {"record": stats.cpu_s.get("recorder", 0.0)}
+    parts["launcher"] = {"Zenoh": stats.cpu_s.get("launcher", 0.0)}
+    return {
+        process: {part: round(seconds / ticks * 1e6, 2) for part, seconds in shares.items()}
+        for process, shares in sorted(parts.items())
     }
 
 

@@ -7,6 +7,7 @@ inherited file descriptors.
 import socket
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from bridge.can_bus.hub import Hub
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import Go, PoseFix, Progress, Report, Rows
 from bridge.process import Stop, cpu_ns, go_realtime, serve, settle_memory
+from bridge.profile import Sampler
 from bridge.telemetry import PLANT_ROW, RowBuffer
 from bridge.zenoh_link import open_client
 from configs.brief import PlantBrief
@@ -85,8 +87,10 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> Counters:
         settle_memory()
         loop = LockstepLoop(brief, units, hub, poses, rows, say)
         counters, progress_of, body = loop.counters, loop.progress, loop.run
+    sampler = Sampler()
     try:
-        body(stop)
+        with sampler if brief.schedule.profile else nullcontext():
+            body(stop)
     finally:
         for buffer in rows:
             buffer.finish()
@@ -99,6 +103,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> Counters:
             "cpu_ns": cpu_ns(),
             "refused": ", ".join(refused),
             **bus_frames(counters),
+            **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
         }
         report.put(Report(values).encode())
     return counters
