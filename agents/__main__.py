@@ -95,7 +95,11 @@ class _Wired(NamedTuple):
         self.link.declare_live(keys.live(brief.network.run, f"agent/{brief.robot}"))
 
     def run(
-        self, body: Callable[[], None], counters: Counters | Clock, refused: Iterable[str] = ()
+        self,
+        body: Callable[[], None],
+        stop: Stop,
+        counters: Counters | Clock,
+        refused: Iterable[str] = (),
     ) -> None:
         """Run the loop's body; then hand on the last rows and say the last word."""
         sampler = Sampler()
@@ -112,6 +116,7 @@ class _Wired(NamedTuple):
                 "cpu_ns": cpu_ns(),
             }
             self.report.put(Report(values).encode())
+            stop.await_release()
 
 
 def _lockstep(wired: _Wired, stop: Stop) -> None:
@@ -121,7 +126,7 @@ def _lockstep(wired: _Wired, stop: Stop) -> None:
     if first is None:
         return
     settle_memory()
-    wired.run(partial(loop.run, first, stop), loop.counters)
+    wired.run(partial(loop.run, first, stop), stop, loop.counters)
 
 
 def _realtime(wired: _Wired, stop: Stop) -> None:
@@ -132,7 +137,7 @@ def _realtime(wired: _Wired, stop: Stop) -> None:
     epoch_ns = loop.await_go(stop)
     if epoch_ns is None:
         return
-    wired.run(partial(loop.run, epoch_ns, stop), loop.counters, refused)
+    wired.run(partial(loop.run, epoch_ns, stop), stop, loop.counters, refused)
 
 
 def main() -> int:

@@ -33,7 +33,9 @@ def run(scenario: str, *options: str) -> dict[str, Any]:
             timeout=600,
         )
         if done.returncode not in (0, 1):
-            sys.exit(f"{' '.join(command)} ended with {done.returncode}: {done.stderr}{done.stdout}")
+            sys.exit(
+                f"{' '.join(command)} ended with {done.returncode}: {done.stderr}{done.stdout}"
+            )
         summary: dict[str, Any] = json.loads(done.stdout)
         return summary
 

@@ -3,7 +3,8 @@
 A role's process is started by a launcher that holds three lines to it:
 
     standard input   the pickled brief, length first; afterwards the lifeline: its end means that
-                     the launcher is gone, and the process ends itself in an orderly way
+                     the launcher is gone, and the process ends itself in an orderly way; a byte
+                     on it means that the process's last word was heard
     standard output  status lines in JSON, one `Status` each: why the process ended
     standard error   the terminal's: tracebacks, and the last word of plant and recorder if the
                      launcher is gone
@@ -31,6 +32,7 @@ from typing import BinaryIO, TypeVar
 from configs.errors import FleetloopError, PeerLostError
 
 GRACE_S = 3.0
+LINGER_S = 2.0
 LAUNCHER_GONE = "the launcher is gone"
 _SAME_CAUSE_S = 0.1
 """A peer that left may have left for a reason that is on its way here too."""
@@ -47,6 +49,7 @@ class Stop:
     reason: str = ""
     wake_fd: int = field(default_factory=lambda: os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC))
     """Becomes readable with the request, for who waits in a poll."""
+    release_fd: int = field(default_factory=lambda: os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC))
 
     def request(self, reason: str) -> None:
         """Ask for an orderly stop; the first reason stays."""
@@ -54,6 +57,18 @@ class Stop:
             self.reason = reason
             self.requested = True
             os.eventfd_write(self.wake_fd, 1)
+
+    def release(self) -> None:
+        """The launcher has heard the last word, or will never hear it."""
+        os.eventfd_write(self.release_fd, 1)
+
+    def await_release(self) -> None:
+        """Having said the last word, stay until the launcher has it, at most `LINGER_S`.
+
+        A network session that closes may drop what it has not sent yet; order is kept, so with the
+        last word everything has arrived.
+        """
+        select.select([self.release_fd], [], [], LINGER_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,8 +172,9 @@ def _read_brief(stream: BinaryIO) -> object:
 
 def _watch_lifeline(stop: Stop) -> None:
     while os.read(0, 4096):
-        pass
+        stop.release()
     stop.request(LAUNCHER_GONE)
+    stop.release()
     threading.Event().wait(GRACE_S)
     os._exit(3)
 

@@ -81,6 +81,11 @@ class Child:
             return Failure(1, self.name, text)
         return Failure(3 if self.status.peer_lost else 2, self.name, self.status.error)
 
+    def release(self) -> None:
+        """Tell it that its last word was heard."""
+        with contextlib.suppress(OSError):
+            os.write(self._stdin, b"\n")
+
     def ask_to_stop(self) -> None:
         """Send SIGTERM, if it still runs."""
         if not self.ended():

@@ -12,7 +12,7 @@ controllers follow it, the recorder takes what still comes; who doesn't is kille
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -27,7 +27,7 @@ from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
 from configs.errors import InfrastructureError
 from configs.loading import to_toml
 from configs.scenario import Scenario
-from fleetloop.children import Child, Failure, await_end, cause, end, refuse_shadowed_roles
+from fleetloop.children import Child, Failure, cause, end, refuse_shadowed_roles
 from fleetloop.nursery import FIRST_FD, Nursery
 from fleetloop.record.writer import finish_truncated
 
@@ -204,17 +204,27 @@ class LockstepRun:
         while not stop.requested:
             self._take(link.receive(WATCH_EVERY_S))
             if (failure := cause(self._children)) is not None:
-                await_end(actors, 0.3)
+                self._settle(link, actors, 0.3)
                 return cause(self._children) or failure
             if all(child.ended() for child in actors):
                 return None
-            if actors[0].ended() and (left := await_end(actors, DRAIN_S)):
+            if actors[0].ended() and (left := self._settle(link, actors, DRAIN_S)):
                 name = left[0].name
                 return Failure(2, name, f"{name}: has not ended {DRAIN_S:g} s after the plant")
             if (silent := self._silent()) is not None:
-                await_end(actors, 0.3)
+                self._settle(link, actors, 0.3)
                 return cause(self._children) or silent
         return None
+
+    def _settle(self, link: Link, children: Sequence[Child], within_s: float) -> list[Child]:
+        """Hear last words until these have ended, at most `within_s`; return who has not."""
+        deadline = time.monotonic() + within_s
+        while left := [child for child in children if not child.ended()]:
+            left_s = deadline - time.monotonic()
+            if left_s <= 0.0:
+                break
+            self._take(link.receive(min(left_s, WATCH_EVERY_S)))
+        return left
 
     def _silent(self) -> Failure | None:
         """The process whose progress stopped, None while all are well."""
@@ -244,6 +254,9 @@ class LockstepRun:
                     self._on_progress(progress)
         elif (report := Report.decode(arrival.payload)) is not None:
             self.outcome.reports[process] = report
+            for child in self._children:
+                if child.name == process:
+                    child.release()
 
     # --- end ---------------------------------------------------------------------------------
 
@@ -259,7 +272,7 @@ class LockstepRun:
         actors = self._children[:-1]
         if outcome.ended != "completed":
             actors[0].ask_to_stop()
-            await_end(actors, 1.0)
+            self._settle(link, actors, 1.0)
         end(actors)
         if outcome.ended != "completed":
             recorder.ask_to_stop()

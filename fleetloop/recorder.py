@@ -84,6 +84,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
                 progress.put(Progress(recorder.ticks, 0, 0).encode())
         values = {"undecodable": recorder.undecodable, "cpu_ns": cpu_ns()}
         report.put(Report(values).encode())
+        stop.await_release()
     return f"{brief.path} is complete up to tick {recorder.ticks}"
 
 

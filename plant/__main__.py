@@ -22,7 +22,7 @@ from bridge.profile import Sampler
 from bridge.telemetry import PLANT_ROW, RowBuffer
 from bridge.zenoh_link import open_client
 from configs.brief import PlantBrief
-from configs.errors import InfrastructureError
+from configs.errors import FleetloopError, InfrastructureError
 from plant.loop import Counters, LockstepLoop, bus_frames
 from plant.realtime import RealtimeLoop
 from plant.unit import Unit
@@ -41,10 +41,8 @@ def run(brief: PlantBrief, stop: Stop) -> str:
             hub = Hub(listeners, stop.wake_fd)
             try:
                 counters = _run(brief, stop, link, hub)
-            except BaseException as error:
-                hub.close(str(error) or type(error).__name__)
-                raise
-            hub.close(stop.reason or "end of the run")
+            finally:
+                hub.close(stop.reason or "the plant has ended")
     finally:
         # The launcher does it too, unless it was killed.
         places.remove_run_folder(Path(brief.runtime_folder))
@@ -91,6 +89,10 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> Counters:
     try:
         with sampler if brief.schedule.profile else nullcontext():
             body(stop)
+        hub.close(stop.reason or "end of the run")
+    except FleetloopError as error:
+        hub.close(str(error))
+        raise
     finally:
         for buffer in rows:
             buffer.finish()
@@ -106,6 +108,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> Counters:
             **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
         }
         report.put(Report(values).encode())
+        stop.await_release()
     return counters
 
 

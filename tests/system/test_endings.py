@@ -1,5 +1,6 @@
 """However a run ends: in time, with the cause named, nothing left behind, the record opens."""
 
+import re
 import signal
 import time
 from pathlib import Path
@@ -66,7 +67,8 @@ def test_a_killed_launcher_leaves_nothing_and_the_plant_says_the_tick(
     [
         ("plant", "plant: no progress for"),
         ("recorder", "recorder: no progress for"),
-        ("r2", "no answer from the controller of r2 within"),
+        # Whoever misses it first: the plant, or the robot that hears r2.
+        ("r2", "no (answer from the controller|path state) of r2 within"),
     ],
 )
 def test_a_wedged_process_is_named_within_the_tick_deadline(
@@ -79,7 +81,7 @@ def test_a_wedged_process_is_named_within_the_tick_deadline(
         status, out = run.end(within_s=10.0)
         took_s = time.monotonic() - began
         assert status == 3
-        assert words in out
+        assert re.search(words, out), out
         assert took_s < 1.0 + 5.0
         check_remains(run, runtime_folder)
 
