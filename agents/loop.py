@@ -78,8 +78,8 @@ class LockstepLoop:
         """Run from the first frame to the closing tick, or until told to stop.
 
         Raises:
-            InfrastructureError: bus, pose or a neighbour was silent beyond the tick deadline.
-            PeerLostError: the bus closed.
+            InfrastructureError: the bus was silent beyond the tick deadline.
+            PeerLostError: the bus closed; a pose or a neighbour's path state did not come.
         """
         agent = self._agent
         counters = self.counters
@@ -125,7 +125,7 @@ class LockstepLoop:
             if arrival is not None:
                 self.take(arrival)
             elif left_s <= 0.0:
-                raise InfrastructureError(
+                raise PeerLostError(
                     f"{self._robot}: tick {tick}: no {', no '.join(missing)} within"
                     f" {LISTEN_SHARE * self._schedule.tick_deadline_s:g} s"
                 )

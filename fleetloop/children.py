@@ -17,6 +17,7 @@ from bridge.process import Status, pack_brief
 from configs.errors import InfrastructureError
 from fleetloop.nursery import Nursery
 
+KILLED, CRASHED, GAVE_UP, PEER_LOST = range(4)
 TERM_GRACE_S = 1.0
 """From asking a process to stop until it is killed."""
 
@@ -75,11 +76,14 @@ class Child:
             return None
         self._reader.join(1.0)
         if code < 0:
-            return Failure(0, self.name, f"{self.name} was killed by {signal.Signals(-code).name}")
+            return Failure(
+                KILLED, self.name, f"{self.name} was killed by {signal.Signals(-code).name}"
+            )
         if self.status is None:
             text = f"{self.name} crashed (exit status {code}); its traceback is above"
-            return Failure(1, self.name, text)
-        return Failure(3 if self.status.peer_lost else 2, self.name, self.status.error)
+            return Failure(CRASHED, self.name, text)
+        rank = PEER_LOST if self.status.peer_lost else GAVE_UP
+        return Failure(rank, self.name, self.status.error)
 
     def release(self) -> None:
         """Tell it that its last word was heard."""
@@ -113,7 +117,7 @@ class Child:
 class Failure:
     """Why a run ended before its time. The lowest rank is the cause, the others are consequences.
 
-    Ranks: 0 killed by a signal, 1 crashed, 2 gave up by itself, 3 lost a peer.
+    Ranks: killed by a signal, crashed, gave up by itself, lost a peer.
     """
 
     def __init__(self, rank: int, name: str, text: str) -> None:
@@ -124,7 +128,7 @@ class Failure:
     @property
     def unexpected(self) -> bool:
         """Whether the process had no chance to say when it happened."""
-        return self.rank < 2
+        return self.rank < GAVE_UP
 
 
 def cause(children: Iterable[Child]) -> Failure | None:

@@ -27,7 +27,7 @@ from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
 from configs.errors import InfrastructureError
 from configs.loading import to_toml
 from configs.scenario import Scenario
-from fleetloop.children import Child, Failure, cause, end, refuse_shadowed_roles
+from fleetloop.children import GAVE_UP, PEER_LOST, Child, Failure, cause, end, refuse_shadowed_roles
 from fleetloop.nursery import FIRST_FD, Nursery
 from fleetloop.record.writer import finish_truncated
 
@@ -204,17 +204,38 @@ class LockstepRun:
         while not stop.requested:
             self._take(link.receive(WATCH_EVERY_S))
             if (failure := cause(self._children)) is not None:
-                self._settle(link, actors, 0.3)
-                return cause(self._children) or failure
+                return self._root_of(failure, link, actors)
             if all(child.ended() for child in actors):
                 return None
             if actors[0].ended() and (left := self._settle(link, actors, DRAIN_S)):
                 name = left[0].name
-                return Failure(2, name, f"{name}: has not ended {DRAIN_S:g} s after the plant")
+                return Failure(
+                    GAVE_UP, name, f"{name}: has not ended {DRAIN_S:g} s after the plant"
+                )
             if (silent := self._silent()) is not None:
                 self._settle(link, actors, 0.3)
                 return cause(self._children) or silent
         return None
+
+    def _root_of(self, failure: Failure, link: Link, actors: Sequence[Child]) -> Failure:
+        """Who lost a peer is not the cause: let the peer be found, within its deadline."""
+        within_s = 0.3
+        if failure.rank == PEER_LOST:
+            within_s += self._limit_s()
+        deadline = time.monotonic() + within_s
+        while time.monotonic() < deadline:
+            left = self._settle(link, actors, WATCH_EVERY_S)
+            better = cause(self._children)
+            if better is not None and better.rank < failure.rank:
+                return better
+            if (silent := self._silent()) is not None:
+                return silent
+            if not left:
+                break
+        return failure
+
+    def _limit_s(self) -> float:
+        return schedule(self._scenario, self._speed).tick_deadline_s
 
     def _settle(self, link: Link, children: Sequence[Child], within_s: float) -> list[Child]:
         """Hear last words until these have ended, at most `within_s`; return who has not."""
@@ -228,14 +249,14 @@ class LockstepRun:
 
     def _silent(self) -> Failure | None:
         """The process whose progress stopped, None while all are well."""
-        limit_s = schedule(self._scenario, self._speed).tick_deadline_s
+        limit_s = self._limit_s()
         now = time.monotonic()
         for name in ("plant", "recorder"):
             child = next(child for child in self._children if child.name == name)
             tick, when = self._seen.get(name, (0, now))
             if now - when > limit_s and not child.ended():
                 text = f"{name}: no progress for {now - when:.1f} s after tick {tick}"
-                return Failure(2, name, text)
+                return Failure(GAVE_UP, name, text)
         return None
 
     def _take(self, arrival: Arrival | None) -> None:

@@ -24,7 +24,8 @@ def test_a_real_time_run_takes_its_time_and_records_every_tick(tmp_path: Path) -
     assert clock["late_us"]["p50"] > 0.0
     assert clock["round_trip_us"]["p50"] > 0.0
     assert clock["cpu_percent_of_one_core"] > 0.0
-    assert set(summary["cpu_s"]) == {"plant", "agent/r1", "agent/r2", "agent/r3", "agent/r4"}
+    agents = {f"agent/{robot}" for robot in ("r1", "r2", "r3", "r4")}
+    assert set(summary["cpu_s"]) == {"plant", "recorder", "launcher"} | agents
     record = Record.open(tmp_path / "a" / "record.mcap")
     for robot in record.robots:
         assert record.plant[robot]["tick"].tolist() == list(range(400))
