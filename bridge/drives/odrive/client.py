@@ -29,6 +29,7 @@ NEVER = -(1 << 62)
 FLOAT32_MAX = 3.4e38
 _TURN = 2.0 * pi
 _PACK_TWO = f.TWO_FLOATS.pack
+_new = tuple.__new__  # of a frame, past its constructor: this is the hot path
 _UNPACK_TWO = f.TWO_FLOATS.unpack
 
 Motion = tuple[float, float, float, float]
@@ -187,7 +188,7 @@ class OdriveClient:
             both = _PACK_TWO(_saturated(right_Nm), _saturated(left_Nm))
         self.sent = _UNPACK_TWO(both)
         right_id, left_id = self._torque_ids
-        return Frame(right_id, both[:4]), Frame(left_id, both[4:])
+        return _new(Frame, (right_id, both[:4])), _new(Frame, (left_id, both[4:]))
 
     def disarm(self) -> Sequence[Frame]:
         """Torque 0 and idle for both wheels."""
