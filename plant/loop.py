@@ -27,7 +27,7 @@ from configs.brief import PlantBrief
 from configs.errors import InfrastructureError, PeerLostError
 from plant.unit import Unit
 
-WINDOW_TICKS = 8
+WINDOW_TICKS = 16
 REPORT_EVERY_NS = 100_000_000
 WAIT_S = 0.1
 """Longest wait for an answer before somebody who doesn't answer is looked for."""
