@@ -145,7 +145,7 @@ class LockstepRun:
         listeners = places.listen(folder, self._robots)
         fds = [listeners[bus].fileno() for bus in self._robots]
         try:
-            with Nursery() as nursery:
+            with Nursery(batch=not ticks.realtime) as nursery:
                 self._children.append(Child(nursery, "plant", "plant", plant, fds))
                 for robot in self._robots:
                     channel = str(places.socket_path(folder, robot))
