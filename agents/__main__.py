@@ -32,7 +32,7 @@ CONTROLLER_PRIORITY = 40
 
 def run(brief: AgentBrief, stop: Stop) -> None:
     """Wire one agent to its bus and the network, wait for its peers, and run."""
-    name_process(brief.robot)
+    name_process(f"agent {brief.robot}")
     with open_client(brief.network, brief.schedule.start_deadline_s) as link:
         try:
             # Verbatim from the deployment: python-can checks what its interface takes.

@@ -29,6 +29,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
+import setproctitle
+
 from configs.errors import FleetloopError, PeerLostError
 
 GRACE_S = 3.0
@@ -132,9 +134,8 @@ def serve(kind: type[_Brief], body: Callable[[_Brief, Stop], str | None], *, nam
 
 
 def name_process(name: str) -> None:
-    """What `ps` and `top` call this process; the kernel keeps 15 characters."""
-    with contextlib.suppress(OSError):
-        Path("/proc/self/comm").write_text(f"fl-{name}", "utf-8")
+    """What `ps` and `pgrep -f` call this process."""
+    setproctitle.setproctitle(f"fleetloop {name}")
 
 
 def go_realtime(priority: int) -> list[str]:

@@ -66,12 +66,11 @@ class Run:
 
     def child(self, name: str) -> psutil.Process:
         """Its process of that name: plant, recorder, or a robot's controller."""
-        (found,) = (child for child in self._family.values() if child.name() == f"fl-{name}")
-        return found
+        return next(child for child in self._family.values() if _name(child) == name)
 
     def names(self) -> list[str]:
         """Names of all its processes but the launcher, sorted."""
-        return sorted(child.name().removeprefix("fl-") for child in self._family.values())
+        return sorted(_name(child) for child in self._family.values())
 
     def send(self, number: signal.Signals) -> None:
         """Send the launcher a signal."""
@@ -105,6 +104,11 @@ class Run:
         for stream in (self._process.stdout, self._process.stderr):
             if stream is not None:
                 stream.close()
+
+
+def _name(process: psutil.Process) -> str:
+    """The last word of what `ps` shows: "fleetloop plant", "fleetloop agent r1"."""
+    return process.cmdline()[0].split()[-1]
 
 
 @contextmanager
