@@ -17,7 +17,7 @@ from bridge.can_bus.convert import can_id_of, to_message
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import LeaderSpeed, PathState, PoseFix
 from bridge.process import Stop
-from configs.errors import InfrastructureError, PeerLostError
+from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
 
 LISTEN_SHARE = 0.75
 """Part of the tick deadline that a controller waits for messages: it names who is silent before the
@@ -79,7 +79,8 @@ class LockstepLoop:
 
         Raises:
             InfrastructureError: the bus was silent beyond the tick deadline.
-            PeerLostError: the bus closed; a pose or a neighbour's path state did not come.
+            PeerSilentError: a pose or a neighbour's path state did not come.
+            PeerLostError: the bus closed.
         """
         agent = self._agent
         counters = self.counters
@@ -125,7 +126,7 @@ class LockstepLoop:
             if arrival is not None:
                 self.take(arrival)
             elif left_s <= 0.0:
-                raise PeerLostError(
+                raise PeerSilentError(
                     f"{self._robot}: tick {tick}: no {', no '.join(missing)} within"
                     f" {LISTEN_SHARE * self._schedule.tick_deadline_s:g} s"
                 )

@@ -79,20 +79,20 @@ class Status:
 
     error: str
     exit_code: int
-    peer_lost: bool
+    kind: str  # name of the error's class
 
     def to_line(self) -> bytes:
         """The line, with its newline."""
-        return json.dumps([self.error, self.exit_code, self.peer_lost]).encode() + b"\n"
+        return json.dumps([self.error, self.exit_code, self.kind]).encode() + b"\n"
 
     @classmethod
     def from_line(cls, line: bytes) -> "Status | None":
         """The status that a line says, None if it says none."""
         try:
-            error, exit_code, peer_lost = json.loads(line)
+            error, exit_code, kind = json.loads(line)
         except (ValueError, TypeError):
             return None
-        return cls(str(error), int(exit_code), bool(peer_lost))
+        return cls(str(error), int(exit_code), str(kind))
 
 
 def pack_brief(brief: object) -> bytes:
@@ -125,7 +125,7 @@ def serve(kind: type[_Brief], body: Callable[[_Brief, Stop], str | None], *, nam
         if peer_lost:
             select.select([stop.wake_fd], [], [], _SAME_CAUSE_S)
         if stop.reason != LAUNCHER_GONE:
-            _say(Status(str(error), error.exit_code, peer_lost), name)
+            _say(Status(str(error), error.exit_code, type(error).__name__), name)
             return error.exit_code
         word = None if peer_lost else str(error)
     if word and stop.reason == LAUNCHER_GONE:

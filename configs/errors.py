@@ -24,5 +24,9 @@ class InfrastructureError(FleetloopError):
     exit_code = 3
 
 
+class PeerSilentError(InfrastructureError):
+    """Another process did not say what was due; the text names it."""
+
+
 class PeerLostError(InfrastructureError):
     """Another process went away; it is the cause, this is only how it was noticed."""

@@ -14,10 +14,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from bridge.process import Status, pack_brief
-from configs.errors import InfrastructureError
+from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
 from fleetloop.nursery import Nursery
 
-KILLED, CRASHED, GAVE_UP, PEER_LOST = range(4)
+KILLED, CRASHED, GAVE_UP, PEER_SILENT, PEER_LOST = range(5)
+_CONSEQUENCES = {PeerSilentError.__name__: PEER_SILENT, PeerLostError.__name__: PEER_LOST}
 TERM_GRACE_S = 1.0
 """From asking a process to stop until it is killed."""
 
@@ -82,7 +83,7 @@ class Child:
         if self.status is None:
             text = f"{self.name} crashed (exit status {code}); its traceback is above"
             return Failure(CRASHED, self.name, text)
-        rank = PEER_LOST if self.status.peer_lost else GAVE_UP
+        rank = _CONSEQUENCES.get(self.status.kind, GAVE_UP)
         return Failure(rank, self.name, self.status.error)
 
     def release(self) -> None:
@@ -117,7 +118,7 @@ class Child:
 class Failure:
     """Why a run ended before its time. The lowest rank is the cause, the others are consequences.
 
-    Ranks: killed by a signal, crashed, gave up by itself, lost a peer.
+    Ranks: killed by a signal, crashed, gave up by itself, misses a peer's word, lost a peer.
     """
 
     def __init__(self, rank: int, name: str, text: str) -> None:

@@ -27,7 +27,15 @@ from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
 from configs.errors import InfrastructureError
 from configs.loading import to_toml
 from configs.scenario import Scenario
-from fleetloop.children import GAVE_UP, PEER_LOST, Child, Failure, cause, end, refuse_shadowed_roles
+from fleetloop.children import (
+    GAVE_UP,
+    PEER_SILENT,
+    Child,
+    Failure,
+    cause,
+    end,
+    refuse_shadowed_roles,
+)
 from fleetloop.nursery import FIRST_FD, Nursery
 from fleetloop.record.writer import finish_truncated
 
@@ -220,7 +228,7 @@ class LockstepRun:
     def _root_of(self, failure: Failure, link: Link, actors: Sequence[Child]) -> Failure:
         """Who lost a peer is not the cause: let the peer be found, within its deadline."""
         within_s = 0.3
-        if failure.rank == PEER_LOST:
+        if failure.rank >= PEER_SILENT:
             within_s += self._limit_s()
         deadline = time.monotonic() + within_s
         while time.monotonic() < deadline:
