@@ -26,6 +26,7 @@ from configs.errors import InfrastructureError
 
 LEASE_MS = 1000
 """A peer that is silent for this long is gone."""
+CLOSE_S = 1.0
 _PORT_TRIES = 5
 
 
@@ -80,11 +81,23 @@ class ZenohLink:
             )
         )
 
+    stuck = False
+    """A session of this process did not close in time: the process must end without its leave."""
+
     def close(self) -> None:
-        """Close the session and all that it declared."""
+        """Close the session and all that it declared, within `CLOSE_S`.
+
+        A session that still has something for a peer that was killed while it did not read can hang
+        in its close.
+        """
         self._declared.clear()
-        if not self._session.is_closed():
-            self._session.close()
+        if self._session.is_closed():
+            return
+        closer = threading.Thread(target=self._session.close, daemon=True)
+        closer.start()
+        closer.join(CLOSE_S)
+        if closer.is_alive():
+            ZenohLink.stuck = True
 
     def __enter__(self) -> Self:
         return self

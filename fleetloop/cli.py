@@ -4,6 +4,7 @@ Exit status: 0 held, 1 an expectation failed or two runs differ, 2 usage or scen
 3 infrastructure (named), 130 interrupted.
 """
 
+import os
 import signal
 import sys
 from pathlib import Path
@@ -198,8 +199,17 @@ def init(
 def main() -> None:
     """Run the command line; every error that a user can cause is one line and an exit status."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    status: str | int | None = 0
     try:
         app()
+    except SystemExit as ended:
+        status = ended.code
     except FleetloopError as error:
         sys.stderr.write(f"fleetloop: {error}\n")
-        sys.exit(error.exit_code)
+        status = error.exit_code
+    link = sys.modules.get("bridge.zenoh_link")
+    if link is not None and link.ZenohLink.stuck:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status if isinstance(status, int) else 1)
+    sys.exit(status)

@@ -299,6 +299,9 @@ class LockstepRun:
                 outcome.reason += f", at tick {outcome.ticks} or soon after"
         recorder = self._children[-1]
         actors = self._children[:-1]
+        if failure is not None and failure.name == recorder.name:
+            # What it doesn't take any more would keep all others waiting.
+            recorder.kill()
         if outcome.ended != "completed":
             actors[0].ask_to_stop()
             self._settle(link, actors, 1.0)
