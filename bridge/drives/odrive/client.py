@@ -24,7 +24,9 @@ RETRY_NS = 200_000_000
 HEARTBEAT_LIMIT_NS = 500_000_000
 """A drive whose heartbeat is older than this has dropped out."""
 ENCODER_PERIODS_LIMIT = 10
-"""A drive whose encoder frame is older than this many periods has dropped out."""
+ENCODER_LIMIT_NS = 50_000_000
+"""A drive whose encoder frame is older than both, periods and time, has dropped out. Machines that
+are no real-time machines stand still for 10 ms now and then; drives' watchdogs allow 100 ms."""
 NEVER = -(1 << 62)
 FLOAT32_MAX = 3.4e38
 _TURN = 2.0 * pi
@@ -88,6 +90,9 @@ class OdriveClient:
         self._axes = (self._right, self._left)
         self._encoders = self._by_id(Command.GET_ENCODER_ESTIMATES)
         self._heartbeats = self._by_id(Command.HEARTBEAT)
+        self._encoder_limit_ns = max(
+            ENCODER_LIMIT_NS, ENCODER_PERIODS_LIMIT * link.encoder_period_ns
+        )
         self._torque_ids = tuple(self._by_id(Command.SET_INPUT_TORQUE))
         self._step = _Step.CLEAR
         self._asked_ns: int | None = None
@@ -166,7 +171,7 @@ class OdriveClient:
 
     def fault(self, now_ns: int) -> str | None:
         """Why the wheels can't be driven now, None if they can."""
-        encoder_limit_ns = ENCODER_PERIODS_LIMIT * self._link.encoder_period_ns
+        encoder_limit_ns = self._encoder_limit_ns
         for axis in self._axes:
             if axis.heard_ns is None:
                 return f"{axis.name}: no heartbeat heard yet"
