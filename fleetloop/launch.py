@@ -1,7 +1,7 @@
-"""A lockstep run over processes: start everybody, watch, end everybody, whatever happens.
+"""A run over processes, by either clock: start everybody, watch, end everybody, whatever happens.
 
     launcher   this process: Zenoh router with access control, operator's end of the control plane
-    plant      emulated drives and physics of all robots; owns the clock
+    plant      emulated drives and physics of all robots; in lockstep, owner of the clock
     agents     one controller per robot
     recorder   writes the record
 
@@ -59,7 +59,7 @@ class Outcome:
     reports: dict[str, Report] = field(default_factory=dict)
 
 
-class LockstepRun:
+class ProcessRun:
     """One run of a scenario over processes."""
 
     def __init__(

@@ -43,7 +43,7 @@ class Nursery:
     """
 
     def __init__(self, *, batch: bool) -> None:
-        _adopt_orphans(True)
+        _adopt_orphans()
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket = ours
         self._socket.settimeout(BIRTH_S)
@@ -88,9 +88,9 @@ class Nursery:
             self._process.wait()
 
 
-def _adopt_orphans(adopt: bool) -> None:
+def _adopt_orphans() -> None:
     """Become the parent of processes whose own parent has ended, on Linux."""
-    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, int(adopt), 0, 0, 0)
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
 # --- the nursery itself ---------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from configs.errors import InfrastructureError, ScenarioError
 from configs.loading import load, to_toml
 from configs.scenario import Scenario
 from fleetloop import run_folder
-from fleetloop.launch import LockstepRun, Outcome
+from fleetloop.launch import Outcome, ProcessRun
 from fleetloop.lockstep import InProcessRun
 from fleetloop.record.reader import Record
 from fleetloop.record.writer import RecordWriter
@@ -54,6 +54,10 @@ def run_scenario(source: str, options: Options) -> int:
             f'{source}: clock.mode = "realtime" needs processes; add --clock lockstep to run it'
             " in one process"
         )
+    if options.speed and scenario.clock.mode == "realtime":
+        raise ScenarioError(
+            f"--speed {options.speed:g}: real time has one speed; for lockstep only"
+        )
     check_expectations(scenario.expect)
     started = datetime.now(UTC).astimezone()
     folder = run_folder.create(scenario.name, options.out, now=started)
@@ -84,7 +88,7 @@ def _over_processes(
     stop: Stop,
 ) -> RunStats:
     began_ns = time.process_time_ns()
-    run = LockstepRun(
+    run = ProcessRun(
         scenario,
         run=f"{folder.name}-{time.monotonic_ns() % 1_000_000:06d}",
         record=folder / run_folder.RECORD,

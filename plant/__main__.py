@@ -1,4 +1,4 @@
-"""The plant's process: emulated drives and physics of all robots, and the clock of a lockstep run.
+"""The plant's process: emulated drives and physics of all robots, and in lockstep the clock.
 
 Started by `fleetloop run` with a `PlantBrief` on standard input and the buses' listening sockets as
 inherited file descriptors.

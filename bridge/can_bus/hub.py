@@ -129,10 +129,6 @@ class Hub:
         """Buses with something to take."""
         return [name for name, bus in self._buses.items() if bus.taken]
 
-    def debtors(self) -> tuple[str, ...]:
-        """Buses with a paced client that owes an answer."""
-        return tuple(bus.name for bus in self._buses.values() if bus.owing)
-
     def take(self, name: str) -> list[Frame]:
         """What the clients of a bus sent since the last take, in order."""
         bus = self._buses[name]

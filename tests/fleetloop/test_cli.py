@@ -133,6 +133,8 @@ def test_real_time_needs_processes(tmp_path: Path) -> None:
     done = fleetloop("run", "realtime_100hz", "--in-process", cwd=tmp_path)
     assert done.returncode == 2
     assert "--clock lockstep" in done.stderr
+    done = fleetloop("run", "realtime_100hz", "--speed", "2", cwd=tmp_path)
+    assert (done.returncode, "real time has one speed" in done.stderr) == (2, True)
     done = fleetloop("run", "two_robots", "--clock", "sundial", cwd=tmp_path)
     assert done.returncode == 2
     assert "clock.mode" in done.stderr

@@ -309,8 +309,9 @@ def test_a_paced_client_that_leaves_is_named_and_waited_for_no_longer(paced) -> 
     hub.collect(10.0)
     while not hub.left():
         hub.collect(0.0)
+    assert hub.left() == ("r1",)
+    assert hub.clients() == 0
     hub.deliver("r1", 1, (Frame(0x009, bytes(8)),))
-    assert hub.debtors() == ()
     assert hub.left() == ("r1",)
 
 
