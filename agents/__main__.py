@@ -22,7 +22,7 @@ from bridge.messages import Report, Rows
 from bridge.process import Stop, cpu_ns, go_realtime, name_process, serve, settle_memory
 from bridge.profile import Sampler
 from bridge.telemetry import AGENT_ROW, RowBuffer
-from bridge.zenoh_link import open_client
+from bridge.zenoh_link import open_polled
 from configs.brief import AgentBrief
 from configs.errors import InfrastructureError
 
@@ -33,7 +33,7 @@ CONTROLLER_PRIORITY = 40
 def run(brief: AgentBrief, stop: Stop) -> None:
     """Wire one agent to its bus and the network, wait for its peers, and run."""
     name_process(f"agent {brief.robot}")
-    with open_client(brief.network, brief.schedule.start_deadline_s) as link:
+    with open_polled(brief.network, brief.schedule.start_deadline_s) as link:
         try:
             # Verbatim from the deployment: python-can checks what its interface takes.
             settings: dict[str, Any] = dict(brief.bus)
