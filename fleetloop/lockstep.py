@@ -14,7 +14,8 @@ from bridge.messages import LeaderSpeed, PathState, PoseFix, Progress
 from bridge.process import Stop, settled_memory
 from bridge.telemetry import AGENT_ROW, PLANT_ROW, RowBuffer
 from configs.brief import AgentBrief, LeaderBrief, PlantBrief
-from fleetloop.record.writer import RecordWriter, Source
+from fleetloop.record.background import BackgroundWriter
+from fleetloop.record.writer import Source
 from plant.unit import Unit
 
 PROGRESS_EVERY_TICKS = 256
@@ -38,7 +39,7 @@ class InProcessRun:
         plant: PlantBrief,
         agents: list[AgentBrief],
         leader: LeaderBrief,
-        writer: RecordWriter,
+        writer: BackgroundWriter,
         on_progress: Callable[[Progress], None],
     ) -> None:
         self._brief = plant
@@ -152,7 +153,13 @@ class InProcessRun:
 
 
 def _write(
-    writer: RecordWriter, robot: str, source: Source, first: int, count: int, rows: bytes, _: bool
+    writer: BackgroundWriter,
+    robot: str,
+    source: Source,
+    first: int,
+    count: int,
+    rows: bytes,
+    _: bool,
 ) -> None:
     if count:
         writer.add(robot, source, first, rows)

@@ -19,6 +19,7 @@ from configs.scenario import Scenario
 from fleetloop import run_folder
 from fleetloop.launch import Outcome, ProcessRun
 from fleetloop.lockstep import InProcessRun
+from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.reader import Record
 from fleetloop.record.writer import RecordWriter
 from fleetloop.results import print_results
@@ -112,7 +113,10 @@ def _in_process(
     began = time.monotonic()
     record = folder / run_folder.RECORD
     period_ns = schedule(scenario).period_ns
-    with RecordWriter(record, scenario.names, to_toml(scenario), period_ns) as writer:
+    with (
+        RecordWriter(record, scenario.names, to_toml(scenario), period_ns) as file,
+        BackgroundWriter(file) as writer,
+    ):
         run = InProcessRun(
             plant_brief(scenario, network=network),
             [agent_brief(scenario, r, network=network, bus=()) for r in scenario.names],
