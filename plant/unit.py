@@ -69,13 +69,19 @@ class Unit:
         """What both drives send at this instant, in order of arbitration."""
         self._feed()
         frames = [*self._right.due(now_ns), *self._left.due(now_ns)]
-        frames.sort()
+        if len(frames) > 1:
+            frames.sort()
         return frames
 
     def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
-        """Give one frame from the bus to both drives and return their replies."""
-        right, left = self._right.hear(frame, now_ns), self._left.hear(frame, now_ns)
-        return [*right, *left] if right or left else ()
+        """Give one frame from the bus to the drives that it may concern; return their replies."""
+        can_id, right, left = frame[0], self._right, self._left
+        if can_id == right.setpoint_id != left.setpoint_id:
+            return right.hear(frame, now_ns)
+        if can_id == left.setpoint_id != right.setpoint_id:
+            return left.hear(frame, now_ns)
+        replies = right.hear(frame, now_ns), left.hear(frame, now_ns)
+        return [*replies[0], *replies[1]] if any(replies) else ()
 
     def advance(self, t_s: float, period_s: float, substeps: int) -> None:
         """Integrate one control period from scenario time `t_s`, torques held."""

@@ -41,10 +41,23 @@ class Counters:
 
 
 class _Client:
-    __slots__ = ("backlog", "bus", "gathered", "joined", "name", "owes", "own", "paced", "sock")
+    __slots__ = (
+        "backlog",
+        "bus",
+        "gathered",
+        "joined",
+        "name",
+        "owes",
+        "own",
+        "paced",
+        "receive",
+        "send",
+        "sock",
+    )
 
     def __init__(self, sock: socket.socket, bus: "_Bus") -> None:
         self.sock = sock
+        self.receive, self.send = sock.recv, sock.send
         self.bus = bus
         self.name = ""
         self.joined = self.paced = self.gathered = self.own = self.owes = False
@@ -70,6 +83,7 @@ class Hub:
     def __init__(self, listeners: Mapping[str, socket.socket], wake_fd: int | None = None) -> None:
         self._buses = {name: _Bus(name, sock) for name, sock in listeners.items()}
         self._epoll = select.epoll()
+        self._poll = self._epoll.poll
         self._readers: dict[int, _Client | _Bus | None] = {}
         self._answered: list[str] = []
         self._left: list[str] = []
@@ -90,8 +104,14 @@ class Hub:
         if not clients:
             return
         together = wire.encode_frames(0, stamp_ns, frames)
-        if len(clients) > 1:
-            clients = clients.copy()
+        if len(clients) == 1:
+            (client,) = clients
+            if client.owes is False and client.paced and not client.backlog:
+                client.owes = True
+                bus.owing += 1
+                self._send(client, together)
+                return
+        clients = clients.copy()
         for client in clients:
             if client.gathered:
                 if client.paced and not client.owes:
@@ -174,8 +194,9 @@ class Hub:
     def _handle(self, timeout_s: float) -> bool:
         """Handle what is ready; return whether the wake-up descriptor was."""
         woken = False
-        for fd, event in self._epoll.poll(timeout_s):
-            reader = self._readers.get(fd)
+        readers = self._readers
+        for fd, event in self._poll(timeout_s):
+            reader = readers.get(fd)
             if isinstance(reader, _Client):
                 if event == _READ:
                     self._read(reader)
@@ -192,7 +213,7 @@ class Hub:
 
     def _read(self, client: _Client) -> None:
         try:
-            data = client.sock.recv(wire.MAX_BYTES)
+            data = client.receive(wire.MAX_BYTES)
         except BlockingIOError:
             return
         except OSError:
@@ -274,7 +295,7 @@ class Hub:
             self._keep(client, data)
             return
         try:
-            client.sock.send(data)
+            client.send(data)
         except BlockingIOError:
             self._keep(client, data)
             self._epoll.modify(client.sock.fileno(), _READ | _WRITE)

@@ -30,6 +30,7 @@ from bridge.frame import Frame
 FINE_S = 0.05
 """Waits below this are kept to the microsecond; the kernel's own bound counts in its ticks."""
 _TIMEVAL = struct.Struct("ll")
+_new = tuple.__new__  # of a frame, past its constructor: this is the hot path
 _IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ignore_config"})
 
 
@@ -135,9 +136,12 @@ class FleetloopBus(can.BusABC):
         Raises:
             can.CanOperationError: FD frame, the bus is gone, or no room within `timeout`.
         """
-        if msg.is_fd:
-            raise can.CanOperationError("the bus is classic CAN: no FD frames")
-        frame = to_frame(msg)
+        if msg.is_extended_id or msg.is_remote_frame or msg.is_error_frame or msg.is_fd:
+            if msg.is_fd:
+                raise can.CanOperationError("the bus is classic CAN: no FD frames")
+            frame = to_frame(msg)
+        else:
+            frame = _new(Frame, (msg.arbitration_id, bytes(msg.data)))
         if self._gathered:
             self._outbox.append(frame)
             return
@@ -198,13 +202,14 @@ class FleetloopBus(can.BusABC):
 
     def _take(self, data: bytes) -> None:
         packet = wire.decode(data)
-        if packet is not None and packet.kind == wire.FRAMES:
-            self._stamp_ns = packet.stamp_ns
+        if packet is not None and packet[0] == wire.FRAMES:
+            _, flags, _, stamp_ns, frames, _ = packet
+            self._stamp_ns = stamp_ns
             self._owes = self._paced
-            timestamp = packet.stamp_ns / 1e9
-            is_rx = not packet.flags & wire.OWN
-            for can_id, frame in packet.frames:
-                self._inbox.append(to_message(can_id, frame, timestamp, self.channel, is_rx))
+            timestamp, channel, is_rx = stamp_ns / 1e9, self.channel, not flags & wire.OWN
+            put = self._inbox.append
+            for can_id, content in frames:
+                put(to_message(can_id, content, timestamp, channel, is_rx))
         elif packet is not None and packet.kind == wire.BYE:
             self._closed_because = packet.text
             raise can.CanOperationError(f"bus {self.channel!r} closed: {packet.text}")

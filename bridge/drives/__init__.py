@@ -52,6 +52,8 @@ class DriveNode(Protocol):
 
     fed_ns: int
     """When it last took a set-point, bus time."""
+    setpoint_id: int
+    """The identifier of the set-point that it takes at its address now."""
 
     def feed(self, revolutions: float, rev_s: float) -> None:
         """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""

@@ -64,7 +64,7 @@ class OdriveNode:
         self._next_heartbeat_ns = self._next_encoder_ns = self._next_torques_ns = 0
         self._next_other_ns = 0
         self._encoder_id = f.identifier(node_id, Command.GET_ENCODER_ESTIMATES)
-        self._torque_id = f.identifier(node_id, Command.SET_INPUT_TORQUE)
+        self.setpoint_id = f.identifier(node_id, Command.SET_INPUT_TORQUE)
 
     # --- the plant's end -------------------------------------------------------------------------
 
@@ -121,7 +121,7 @@ class OdriveNode:
     def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Take one frame from the bus; return the replies."""
         can_id, data = frame
-        if can_id == self._torque_id and len(data) == 4:
+        if can_id == self.setpoint_id and len(data) == 4:
             (torque,) = _UNPACK_FLOAT(data)
             if isfinite(torque):
                 self.fed_ns = now_ns
@@ -300,7 +300,7 @@ class OdriveNode:
         if node <= f.UNADDRESSED:
             self.node_id = node
             self._encoder_id = f.identifier(node, Command.GET_ENCODER_ESTIMATES)
-            self._torque_id = f.identifier(node, Command.SET_INPUT_TORQUE)
+            self.setpoint_id = f.identifier(node, Command.SET_INPUT_TORQUE)
 
     # --- what it says ----------------------------------------------------------------------------
 
