@@ -103,6 +103,7 @@ class _Wired(NamedTuple):
     ) -> None:
         """Run the loop's body; then hand on the last rows and say the last word."""
         sampler = Sampler()
+        began_ns = cpu_ns()
         try:
             with sampler if self.agent.brief.schedule.profile else nullcontext():
                 body()
@@ -113,7 +114,7 @@ class _Wired(NamedTuple):
                 **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
                 "stopped": self.agent.stopped_because,
                 "refused": ", ".join(refused),
-                "cpu_ns": cpu_ns(),
+                "cpu_ns": cpu_ns() - began_ns,
             }
             self.report.put(Report(values).encode())
             stop.await_release()

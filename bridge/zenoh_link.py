@@ -1,7 +1,7 @@
 """A link over Zenoh: client sessions to one router, which enforces the graph.
 
 Client mode, multicast and gossip off, so that nobody can talk past the router; shared memory off;
-reliable, blocking, express, real-time priority: nothing is dropped, nothing waits for a batch.
+reliable, blocking, real-time priority: nothing is dropped. Express, nothing waits for a batch.
 Subscribers run on Zenoh's network thread and only queue. Every session is closed in a `with`: one
 that isn't can keep its process from ending.
 
@@ -36,7 +36,7 @@ _PORT_TRIES = 5
 _POLLED_DEPTH = 4096
 """Messages that wait for who polls; many times more than any schedule lets be on their way."""
 _YIELDS = 20
-_PAUSE_S = 50e-6
+_PAUSE_S, _LONGEST_PAUSE_S = 50e-6, 2e-3
 _ONE_THREAD = "(app: (worker_threads: 1), net: {0}, acc: {0}, rx: {0}, tx: {1})"
 _APP, _OWN = "(handover: app)", "(worker_threads: 1)"
 
@@ -50,13 +50,13 @@ class ZenohLink:
         self._declared: list[object] = []
         self.receive = self._inbox.receive
 
-    def publisher(self, key: str) -> Publisher:
+    def publisher(self, key: str, *, express: bool = True) -> Publisher:
         """A publisher on `key`; a put blocks rather than drops."""
         return self._session.declare_publisher(
             key,
             congestion_control=zenoh.CongestionControl.BLOCK,
             priority=zenoh.Priority.REAL_TIME,
-            express=True,
+            express=express,
             reliability=zenoh.Reliability.RELIABLE,
             allowed_destination=zenoh.Locality.REMOTE,
         )
@@ -126,7 +126,7 @@ class PolledLink(ZenohLink):
     """A link for who looks at given times: what comes wakes nobody and runs no Python.
 
     `receive` looks at all subscribers in turn. Waiting is looking again: a few times giving way to
-    others, then with short pauses.
+    others, then with pauses that grow.
     """
 
     def __init__(self, session: zenoh.Session) -> None:
@@ -150,12 +150,13 @@ class PolledLink(ZenohLink):
         if timeout_s <= 0.0:
             return None
         deadline = time.monotonic() + timeout_s
-        looks = 0
-        while time.monotonic() < deadline:
+        looks, pause_s = 0, _PAUSE_S
+        while (left_s := deadline - time.monotonic()) > 0.0:
             if looks < _YIELDS:
                 os.sched_yield()
             else:
-                time.sleep(_PAUSE_S)
+                time.sleep(min(pause_s, left_s))
+                pause_s = min(1.5 * pause_s, _LONGEST_PAUSE_S)
             looks += 1
             for tag, key, look in polled:
                 if (sample := look()) is not None:

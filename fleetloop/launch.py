@@ -20,7 +20,7 @@ from bridge import access, keys
 from bridge.can_bus import places
 from bridge.link import Arrival, Link
 from bridge.messages import Go, LeaderSpeed, Progress, Report
-from bridge.process import Stop
+from bridge.process import Stop, cpu_ns
 from bridge.zenoh_link import RouterLink, open_router
 from configs.brief import NetworkLink, RecorderBrief
 from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
@@ -56,6 +56,7 @@ class Outcome:
     wall_s: float = 0.0
     startup_s: float = 0.0
     teardown_s: float = 0.0
+    cpu_ns: int = 0  # of the launcher, since everybody was ready
     reports: dict[str, Report] = field(default_factory=dict)
 
 
@@ -98,7 +99,9 @@ class ProcessRun:
                 failure = self._await_ready(link, stop)
                 if failure is None and not stop.requested:
                     self.outcome.startup_s = time.monotonic() - began
+                    began_ns = cpu_ns()
                     failure = self._watch(link, stop)
+                    self.outcome.cpu_ns = cpu_ns() - began_ns
                 ending = time.monotonic()
                 self._end(link, stop, failure)
                 self.outcome.teardown_s = time.monotonic() - ending

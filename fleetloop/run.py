@@ -88,7 +88,6 @@ def _over_processes(
     on_progress: Callable[[Progress], None],
     stop: Stop,
 ) -> RunStats:
-    began_ns = time.process_time_ns()
     run = ProcessRun(
         scenario,
         run=f"{folder.name}-{time.monotonic_ns() % 1_000_000:06d}",
@@ -97,9 +96,7 @@ def _over_processes(
         profile=options.profile,
         on_progress=on_progress,
     )
-    stats = _stats(run.run(stop), realtime=scenario.clock.mode == "realtime")
-    stats.cpu_s["launcher"] = round((time.process_time_ns() - began_ns) * 1e-9, 3)
-    return stats
+    return _stats(run.run(stop), realtime=scenario.clock.mode == "realtime")
 
 
 def _in_process(
@@ -146,6 +143,7 @@ def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
         startup_s=outcome.startup_s,
         teardown_s=outcome.teardown_s,
     )
+    stats.cpu_s["launcher"] = round(outcome.cpu_ns * 1e-9, 3)
     for process, report in outcome.reports.items():
         waits = {
             name.removesuffix("_ns"): round(report.number(name) * 1e-9, 4)
