@@ -79,21 +79,24 @@ class Motor:
         "_constant",
         "_decay",
         "_dt_s",
-        "_fet_C",
-        "_fet_gain",
-        "_fet_rise_K",
+        "_fet_K",
+        "_fet_K_A2",
+        "_fet_keep",
+        "_fet_zero_C",
         "_inertia",
         "_inertia_rate",
         "_mean",
         "_mean_square",
         "_model",
-        "_motor_gain",
-        "_motor_rise_K",
+        "_motor_zero_C",
         "_override_A",
         "_pending",
         "_random",
+        "_resistance",
         "_supply",
-        "_winding_C",
+        "_winding_K",
+        "_winding_K_A2",
+        "_winding_keep",
         "current_A",
         "fet_C",
         "motor_C",
@@ -109,12 +112,13 @@ class Motor:
         self._supply = supply
         self._random = random
         self._constant = model.torque_constant_N_m_A
+        self._resistance = model.winding_resistance_ohm + model.fet_resistance_ohm
         self._override_A: float | None = None
         self._asked_A = self._acting_A = 0.0
         self._pending: list[tuple[float, float]] = []  # seconds from now, current from then on
         self._dt_s = 0.0
-        self._fet_C = self._winding_C = model.ambient_C
-        self._fet_rise_K = self._motor_rise_K = 0.0
+        self._fet_K = self._winding_K = 0.0  # above ambient
+        self._fet_zero_C = self._motor_zero_C = model.ambient_C  # with what faults add
         self.current_A = 0.0
         """q-axis current at the end of the last step."""
         self.torque_N_m = 0.0
@@ -126,7 +130,6 @@ class Motor:
 
     def step(self, demand_N_m: float, speed_rad_s: float, dt_s: float) -> float:
         """Mean torque at the wheel [N·m] over `dt_s`, for a demand and a speed at its start."""
-        model = self._model
         if dt_s != self._dt_s:
             self._discretise(dt_s)
         if not -_FASTEST_RAD_S <= speed_rad_s <= _FASTEST_RAD_S:
@@ -141,24 +144,21 @@ class Motor:
             mean, square = self._switch(asked, dt_s)
         torque = self.torque_N_m = self._constant * mean
 
-        winding_W = model.winding_resistance_ohm * square
-        fet_W = model.fet_resistance_ohm * square
-        self.power_W = torque * speed_rad_s + winding_W + fet_W
-        ambient = model.ambient_C
-        rise = model.motor_thermal_resistance_K_W * winding_W
-        self._winding_C += (ambient + rise - self._winding_C) * self._motor_gain
-        rise = model.fet_thermal_resistance_K_W * fet_W
-        self._fet_C += (ambient + rise - self._fet_C) * self._fet_gain
-        self.motor_C = self._winding_C + self._motor_rise_K
-        self.fet_C = self._fet_C + self._fet_rise_K
+        self.power_W = torque * speed_rad_s + self._resistance * square
+        windings = self._winding_K = (
+            self._winding_K * self._winding_keep + self._winding_K_A2 * square
+        )
+        fets = self._fet_K = self._fet_K * self._fet_keep + self._fet_K_A2 * square
+        self.motor_C = windings + self._motor_zero_C
+        self.fet_C = fets + self._fet_zero_C
 
-        coulomb = model.coulomb_friction_N_m
+        coulomb = self._model.coulomb_friction_N_m
         push = self._inertia_rate * speed_rad_s + torque
         if -coulomb <= push <= coulomb:
             return torque - push
         if push < 0.0:
             coulomb = -coulomb
-        viscous = model.viscous_friction_N_m_s
+        viscous = self._model.viscous_friction_N_m_s
         return torque - coulomb - viscous * (push - coulomb) / (self._inertia_rate + viscous)
 
     def sense(self) -> tuple[float, float]:
@@ -181,8 +181,9 @@ class Motor:
         Raises:
             ValueError: the amount isn't finite.
         """
-        if amount is not None and not isfinite(amount):
-            raise ValueError(f"{fault.value} = {amount}: must be a finite rise in K")
+        rise = _RISE_K if amount is None else amount
+        if not isfinite(rise):
+            raise ValueError(f"{fault.value} = {rise}: must be a finite rise in K")
         constant = self._model.torque_constant_N_m_A
         match fault:
             case MotorFault.TORQUE_STUCK:
@@ -194,18 +195,18 @@ class Motor:
             case MotorFault.TORQUE_REVERSED:
                 self._constant = -constant
             case MotorFault.FET_OVER_TEMPERATURE:
-                self._fet_rise_K = _RISE_K if amount is None else amount
-                self.fet_C = self._fet_C + self._fet_rise_K
+                self._fet_zero_C = self._model.ambient_C + rise
+                self.fet_C = self._fet_K + self._fet_zero_C
             case MotorFault.MOTOR_OVER_TEMPERATURE:
-                self._motor_rise_K = _RISE_K if amount is None else amount
-                self.motor_C = self._winding_C + self._motor_rise_K
+                self._motor_zero_C = self._model.ambient_C + rise
+                self.motor_C = self._winding_K + self._motor_zero_C
 
     def clear_faults(self) -> None:
         """A sound motor again; heat and current are those of this moment."""
         self._constant = self._model.torque_constant_N_m_A
         self._override_A = None
-        self._fet_rise_K = self._motor_rise_K = 0.0
-        self.fet_C, self.motor_C = self._fet_C, self._winding_C
+        ambient = self._fet_zero_C = self._motor_zero_C = self._model.ambient_C
+        self.fet_C, self.motor_C = self._fet_K + ambient, self._winding_K + ambient
 
     def _discretise(self, dt_s: float) -> None:
         model = self._model
@@ -214,8 +215,14 @@ class Motor:
         self._decay = exp(-x)
         self._mean = -expm1(-x) / x
         self._mean_square = -expm1(-2.0 * x) / (2.0 * x)
-        self._motor_gain = -expm1(-dt_s / model.motor_thermal_time_s)
-        self._fet_gain = -expm1(-dt_s / model.fet_thermal_time_s)
+        gain = -expm1(-dt_s / model.motor_thermal_time_s)
+        self._winding_keep = 1.0 - gain
+        self._winding_K_A2 = (
+            gain * model.motor_thermal_resistance_K_W * model.winding_resistance_ohm
+        )
+        gain = -expm1(-dt_s / model.fet_thermal_time_s)
+        self._fet_keep = 1.0 - gain
+        self._fet_K_A2 = gain * model.fet_thermal_resistance_K_W * model.fet_resistance_ohm
         self._inertia_rate = self._inertia / dt_s
 
     def _current_for(self, demand_N_m: float, speed_rad_s: float) -> float:
