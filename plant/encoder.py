@@ -207,7 +207,8 @@ class Encoder:
                 self._offset -= copysign(lost, -moved if self._flipped else moved)
             turn = true // counts
             if self._model.index and turn != self._counted // counts:
-                mark = counts * max(turn, self._counted // counts)
-                at_mark = self._offset + 2.0 * (true - mark) if self._flipped else self._offset
+                at_mark = self._offset
+                if self._flipped:
+                    at_mark += 2.0 * (true - counts * turn)  # whichever turn's mark it was
                 self._offset -= at_mark - counts * float(round(at_mark / counts))
         self._counted = true

@@ -93,10 +93,11 @@ def test_a_ramp_of_speed_is_followed_with_the_lag_of_a_double_integrator_loop(
     assert fmean(behind) == pytest.approx(rate / bandwidth**2, rel=0.3, abs=2e-7)
 
 
-def test_a_resting_wheel_reads_exactly_zero_speed() -> None:
-    made = encoder()
-    turn_to(made, lambda t: TURN * min(t, 0.1), 0.2, 0.0005)
-    assert made.step(TURN * 0.1, 0.0005)[1] == 0.0
+@pytest.mark.parametrize("angle", [0.1 + 0.3 * COUNT * n for n in range(7)])
+def test_a_wheel_that_stopped_reads_exactly_zero_speed(angle: float) -> None:
+    made = encoder(pll_bandwidth_rad_s=700.0)  # gains that floats don't hold exactly
+    turn_to(made, lambda t: TURN * min(t, angle), 0.15, LOOP_S)
+    assert {made.step(TURN * angle, LOOP_S)[1] for _ in range(2000)} == {0.0}
 
 
 def test_a_start_in_motion_has_no_transient() -> None:
@@ -251,6 +252,14 @@ def test_lost_counts_make_position_and_speed_fall_short_by_their_fraction(rev_s:
     assert position == pytest.approx(rev_s * (0.1 + 0.9 * 1.0005), abs=0.01)
 
 
+def test_counts_lost_by_a_flipped_encoder_make_it_fall_short_the_other_way() -> None:
+    made = at_speed()
+    made.inject(EncoderFault.SIGN_FLIP)
+    made.inject(EncoderFault.COUNT_LOSS, 0.1)
+    position, _ = on(made, 2.0, 1.0)
+    assert position == pytest.approx(0.2 - 0.9 * 2.0 * 1.0005, abs=0.01)
+
+
 def test_all_counts_lost_is_a_frozen_encoder() -> None:
     made = at_speed()
     made.inject(EncoderFault.COUNT_LOSS, 1.0)
@@ -287,11 +296,12 @@ def test_an_index_does_not_see_whole_turns() -> None:
     assert position == pytest.approx(1.0 + 2.0 * 0.6005, abs=3.0 * COUNT)
 
 
-def test_a_flipped_encoder_with_an_index_is_set_to_zero_at_its_mark() -> None:
+def test_a_flipped_encoder_with_an_index_counts_back_from_its_mark() -> None:
     made = encoder(index=True)
     made.inject(EncoderFault.SIGN_FLIP)
-    turn_to(made, lambda t: 0.2 * TURN * sin(10.0 * t), 2.0, 0.0005)
-    assert made.count == pytest.approx(-0.2 * sin(20.0) * 8192, abs=2.0)
+    made.inject(EncoderFault.JUMP, 0.05)
+    turn_to(made, lambda t: 0.2 * TURN * sin(100.0 * t), 2.0, 0.0005)
+    assert made.count == pytest.approx(-0.2 * sin(200.0) * 8192, abs=2.0)
 
 
 @pytest.mark.parametrize(
