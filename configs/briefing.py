@@ -10,20 +10,24 @@ from configs.brief import (
     Disturbance,
     DriveLink,
     DriveModel,
+    EncoderModel,
     FigureEightPath,
     FormationOffset,
     Gains,
     LeaderBrief,
     LinePath,
+    MotorModel,
     NetworkLink,
     PlantBrief,
     Pose,
+    PowertrainModel,
     ReferencePath,
     RobotBrief,
     Schedule,
     Settings,
     SplinePath,
     StructureOffset,
+    SupplyModel,
     VaryingOffset,
     Wheels,
     WorldOffset,
@@ -176,6 +180,7 @@ def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief
         body=Body(**scenario.body_of(robot).model_dump()),
         disturbance=Disturbance(disturbance.amplitude_N_m, disturbance.rate_rad_s, float(number)),
         drive=_drive_model(scenario, number),
+        powertrain=_powertrain_model(scenario, number),
         right_node=scenario.drive.right_node,
         left_node=scenario.drive.left_node,
         pose=Pose(robot.pose.x_m, robot.pose.y_m, robot.pose.theta_rad),
@@ -186,7 +191,7 @@ def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief
 
 def _drive_model(scenario: Scenario, number: int) -> DriveModel:
     drive = scenario.drive
-    limited = drive.preset == "limited"
+    limited = drive.preset != "ideal"
     return DriveModel(
         protocol=drive.protocol,
         torque_constant_N_m_A=drive.torque_constant_N_m_A,
@@ -201,4 +206,23 @@ def _drive_model(scenario: Scenario, number: int) -> DriveModel:
         watchdog_ns=round(drive.watchdog_s * 1e9),
         zero_torque_on_disarm=drive.zero_torque_on_disarm,
         serial_number=SERIAL_NUMBER + 2 * number,
+    )
+
+
+def _powertrain_model(scenario: Scenario, number: int) -> PowertrainModel | None:
+    drive, motor = scenario.drive, scenario.motor
+    if drive.preset != "realistic":
+        return None
+    constant, limit = motor.torque_constant_N_m_A, motor.current_limit_A
+    inherited = {"torque_constant_N_m_A", "current_limit_A"}
+    return PowertrainModel(
+        motor=MotorModel(
+            torque_constant_N_m_A=drive.torque_constant_N_m_A if constant is None else constant,
+            assumed_torque_constant_N_m_A=drive.torque_constant_N_m_A,
+            current_limit_A=drive.current_limit_A if limit is None else limit,
+            **motor.model_dump(exclude=inherited),
+        ),
+        encoder=EncoderModel(**scenario.encoder.model_dump()),
+        supply=SupplyModel(**scenario.supply.model_dump()),
+        seed=(scenario.seed << 9) + number,  # at most 256 robots
     )

@@ -99,6 +99,14 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
             drive.watchdog_s,
             "0 (off) or at least two control periods, or every torque comes too late",
         )
+    encoder = scenario.encoder
+    if 2.0 * encoder.pll_bandwidth_rad_s >= encoder.pll_rate_hz:
+        yield Problem(
+            "encoder.pll_bandwidth_rad_s",
+            encoder.pll_bandwidth_rad_s,
+            f"must be below half of encoder.pll_rate_hz = {encoder.pll_rate_hz:g}, as drives want"
+            " it: twice the bandwidth times the loop period is a gain below 1",
+        )
 
 
 def _expects(scenario: Scenario) -> Iterator[Problem]:

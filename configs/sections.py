@@ -268,8 +268,10 @@ class Drive(Section):
     """The drives, two per robot."""
 
     protocol: Literal["odrive"] = "odrive"
-    preset: Literal["ideal", "limited"] = Field(
-        "ideal", description="ideal: torque as commanded; limited: with the limits below"
+    preset: Literal["ideal", "limited", "realistic"] = Field(
+        "ideal",
+        description="ideal: torque as commanded; limited: with the limits below; realistic: these,"
+        " and [motor], [encoder], [supply]",
     )
     right_node: Annotated[int, Field(ge=0, le=62)] = 0
     left_node: Annotated[int, Field(ge=0, le=62)] = 1

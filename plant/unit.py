@@ -12,7 +12,7 @@ from bridge.frame import Frame
 from configs.brief import RobotBrief
 from plant.encoder import PER_RADIAN
 from plant.integrate import rk4
-from plant.motor import Motor
+from plant.motor import IdealMotor
 from plant.robot import Robot, State
 
 
@@ -41,8 +41,8 @@ class Unit:
         self._right = node(brief.drive, brief.right_node, brief.drive.serial_number)
         self._left = node(brief.drive, brief.left_node, brief.drive.serial_number + 1)
         self._answered_ns = 0
-        self._motor_right = Motor()
-        self._motor_left = Motor()
+        self._motor_right = IdealMotor()
+        self._motor_left = IdealMotor()
         self._demand_right = self._demand_left = 0.0
         self._torque_right = self._torque_left = 0.0
         pose = brief.pose
@@ -89,8 +89,10 @@ class Unit:
         right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
         self._demand_right = self._right.torque_demand()
         self._demand_left = self._left.torque_demand()
-        right = self._torque_right = self._motor_right.torque(self._demand_right, right_speed)
-        left = self._torque_left = self._motor_left.torque(self._demand_left, left_speed)
+        right = self._torque_right = self._motor_right.step(
+            self._demand_right, right_speed, period_s
+        )
+        left = self._torque_left = self._motor_left.step(self._demand_left, left_speed, period_s)
         if substeps == 1:
             self.state = rk4(self._body, state, right, left, t_s, period_s)
             return
