@@ -1,13 +1,14 @@
 """One robot's controller process. The only file here that wires things.
 
-Started by `fleetloop run` with an `AgentBrief` on standard input.
+Started by `fleetloop run` with an `AgentBrief` on standard input; `fleetloop agent` calls `run` in
+a process of its own, on the robot.
 """
 
 from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from dataclasses import asdict
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import can
 
@@ -16,35 +17,44 @@ from agents.loop import Counters, LockstepLoop, give
 from agents.realtime import Counters as Clock
 from agents.realtime import RealtimeLoop
 from bridge import keys
+from bridge.access import LAUNCHER
 from bridge.barrier import Hellos, await_hellos
+from bridge.can_bus.opening import open_bus
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import Report, Rows
-from bridge.process import Stop, cpu_ns, go_realtime, name_process, serve, settle_memory
+from bridge.process import (
+    LAUNCHER_GONE,
+    Stop,
+    cpu_ns,
+    go_realtime,
+    name_process,
+    serve,
+    settle_memory,
+)
 from bridge.profile import Sampler
 from bridge.telemetry import AGENT_ROW, RowBuffer
 from bridge.zenoh_link import open_polled
 from configs.brief import AgentBrief
-from configs.errors import InfrastructureError
+from configs.errors import FleetloopError
 
 CONTROLLER_PRIORITY = 40
 """SCHED_FIFO, below the plant's: the drives answer whoever computes."""
 
 
-def run(brief: AgentBrief, stop: Stop) -> None:
-    """Wire one agent to its bus and the network, wait for its peers, and run."""
+def run(brief: AgentBrief, stop: Stop) -> str:
+    """Wire one agent to its bus and the network, wait for its peers, and run.
+
+    Returns why it stopped before the end of the run, "" if it did not.
+    """
     name_process(f"agent {brief.robot}")
     with open_polled(brief.network, brief.schedule.start_deadline_s) as link:
-        try:
-            # Verbatim from the deployment: python-can checks what its interface takes.
-            settings: dict[str, Any] = dict(brief.bus)
-            bus = can.Bus(**settings)
-        except can.CanError as error:
-            raise InfrastructureError(f"{brief.robot}: no bus: {error}") from error
-        with bus:
-            _run(brief, stop, link, bus)
+        if brief.detached:
+            link.on_gone(keys.live(brief.network.run, LAUNCHER), partial(stop.end, LAUNCHER_GONE))
+        with open_bus(brief.robot, brief.bus) as bus:
+            return _run(brief, stop, link, bus)
 
 
-def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> None:
+def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> str:
     name, robot = brief.network.run, brief.robot
     path = link.publisher(keys.path(name, robot))
     telemetry = link.publisher(keys.telemetry(name, robot))
@@ -66,7 +76,7 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> None:
     hellos.add(telemetry, Rows(0, 0, b"", False).encode())
     run_loop = _realtime if brief.schedule.realtime else _lockstep
     wired = _Wired(agent, bus, link, path, hellos, rows, report)
-    run_loop(wired, stop)
+    return run_loop(wired, stop)
 
 
 class _Wired(NamedTuple):
@@ -100,50 +110,64 @@ class _Wired(NamedTuple):
         stop: Stop,
         counters: Counters | Clock,
         refused: Iterable[str] = (),
-    ) -> None:
-        """Run the loop's body; then hand on the last rows and say the last word."""
+    ) -> str:
+        """Run the loop's body; then hand on the last rows and say the last word.
+
+        Returns why the body stopped early, "" if it did not.
+        """
         sampler = Sampler()
         began_ns = cpu_ns()
+        failure = ""
         try:
             with sampler if self.agent.brief.schedule.profile else nullcontext():
                 body()
+        except FleetloopError as error:
+            failure = str(error)
+            raise
         finally:
+            early = stop.reason
             self.rows.finish()
             values: dict[str, int | float | str] = {
                 **asdict(counters),
                 **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
                 "stopped": self.agent.stopped_because,
                 "refused": ", ".join(refused),
+                "failure": failure,
                 "cpu_ns": cpu_ns() - began_ns,
             }
             self.report.put(Report(values).encode())
             stop.await_release()
+        return early
 
 
-def _lockstep(wired: _Wired, stop: Stop) -> None:
+def _lockstep(wired: _Wired, stop: Stop) -> str:
     loop = LockstepLoop(wired.agent, wired.bus, wired.link, wired.path, wired.hellos)
     wired.await_peers(loop.take, stop)
     first = loop.await_first_frame(stop)
     if first is None:
-        return
+        return stop.reason
     settle_memory()
-    wired.run(partial(loop.run, first, stop), stop, loop.counters)
+    return wired.run(partial(loop.run, first, stop), stop, loop.counters)
 
 
-def _realtime(wired: _Wired, stop: Stop) -> None:
+def _realtime(wired: _Wired, stop: Stop) -> str:
     loop = RealtimeLoop(wired.agent, wired.bus, wired.link, wired.path, wired.hellos)
     wired.await_peers(lambda arrival: (give(wired.agent, arrival), None)[1], stop)
     settle_memory()
     refused = go_realtime(CONTROLLER_PRIORITY)
     epoch_ns = loop.await_go(stop)
     if epoch_ns is None:
-        return
-    wired.run(partial(loop.run, epoch_ns, stop), stop, loop.counters, refused)
+        return stop.reason
+    return wired.run(partial(loop.run, epoch_ns, stop), stop, loop.counters, refused)
+
+
+def _serve(brief: AgentBrief, stop: Stop) -> None:
+    run(brief, stop)
 
 
 def main() -> int:
     """Serve as a controller; return the exit status."""
-    return serve(AgentBrief, run, name="agent")
+    return serve(AgentBrief, _serve, name="agent")
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from agents.agent import Agent, Phase
 from agents.loop import give
 from bridge.barrier import Hellos
 from bridge.can_bus.convert import can_id_of, to_message
+from bridge.clock import monotonic_of
 from bridge.link import Link, Publisher
 from bridge.messages import Go
 from bridge.process import Stop
@@ -61,7 +62,7 @@ class RealtimeLoop:
                 if arrival.tag != "go":
                     self.counters.undecodable += not give(self._agent, arrival)
                 elif (go := Go.decode(arrival.payload)) is not None:
-                    return go.epoch_ns
+                    return monotonic_of(go.epoch_ns)
             if time.monotonic() > deadline:
                 raise InfrastructureError(
                     f"{self._robot}: the run did not start within"

@@ -10,6 +10,14 @@ each process is bound to its identity by a random password that it alone is give
                 hears  @clock/go
     recorder    puts   progress, report; its token
                 hears  truth and telemetry of all robots
+    localisation       only with robots that aren't emulated:
+                puts   their poses
+                hears  @clock/go
+
+Plant and controllers may watch the launcher's token: on other machines, its end is how they learn
+that the run is over. Who comes from another machine has a password that was agreed on before, or a
+certificate whose common name is the identity; then the password is no secret and proves nothing.
+The plant hears the poses of the robots that it doesn't emulate.
 
 The launcher's own session is inside the router and isn't subject to the rules. Flows are named from
 the router's side: a process that publishes is an ingress put, and it must be told (egress
@@ -19,13 +27,15 @@ an egress put.
 
 import json
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from bridge import keys
 
 PLANT = "plant"
 RECORDER = "recorder"
+LAUNCHER = "launcher"
+LOCALISATION = "localisation"
 
 
 def agent_user(robot: str) -> str:
@@ -33,13 +43,19 @@ def agent_user(robot: str) -> str:
     return f"agent-{robot}"
 
 
+def user_of(role: str) -> str:
+    """The identity of a role: plant, recorder, agent/<robot>."""
+    return role.replace("/", "-")
+
+
 @dataclass(frozen=True, slots=True)
 class Rights:
-    """What one identity may do: keys it may put, keys it may hear, its liveliness token."""
+    """What one identity may do: keys it may put and hear, its liveliness token, whose it sees."""
 
     puts: tuple[str, ...]
     hears: tuple[str, ...]
     token: str
+    watches: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +64,7 @@ class AccessPlan:
 
     rights: Mapping[str, Rights]
     passwords: Mapping[str, str] = field(repr=False)
+    certified: frozenset[str] = frozenset()  # identities that must show a certificate
 
     def dictionary(self) -> str:
         """Zenoh's user dictionary: `user:password` lines."""
@@ -61,7 +78,11 @@ class AccessPlan:
             own = _rules_of(user, rights)
             rules += own
             policies.append({"rules": [rule["id"] for rule in own], "subjects": [user]})
-        subjects = [{"id": user, "usernames": [user]} for user in self.rights]
+        subjects = [
+            {"id": user, "usernames": [user]}
+            | ({"cert_common_names": [user]} if user in self.certified else {})
+            for user in self.rights
+        ]
         return json.dumps(
             {
                 "enabled": True,
@@ -74,10 +95,23 @@ class AccessPlan:
 
 
 def plan(
-    run: str, robots: Sequence[str], hears: Mapping[str, Sequence[str]], leader: Sequence[str]
+    run: str,
+    robots: Sequence[str],
+    hears: Mapping[str, Sequence[str]],
+    leader: Sequence[str],
+    *,
+    witnessed: Collection[str] = (),
+    guests: Mapping[str, str] | None = None,
+    certified: bool = False,
 ) -> AccessPlan:
-    """The rights of a run from its graph: `hears[i]` are the robots that i hears, `leader` h_i."""
+    """The rights of a run from its graph: `hears[i]` are the robots that i hears, `leader` h_i.
+
+    Somebody else says the poses of the robots in `witnessed`: they aren't emulated. `guests` are
+    the passwords of identities on other machines (all others are given random ones), who must show
+    a certificate with their identity as its common name if `certified`.
+    """
     rights: dict[str, Rights] = {}
+    launcher = (keys.live(run, LAUNCHER),)
     for robot in robots:
         process = f"agent/{robot}"
         heard = [keys.path(run, other) for other in hears[robot]]
@@ -87,19 +121,29 @@ def plan(
             puts=(keys.path(run, robot), keys.telemetry(run, robot), *_control(run, process)),
             hears=(keys.pose(run, robot), keys.go(run), *heard),
             token=keys.live(run, process),
+            watches=launcher,
         )
     truths = [keys.truth(run, robot) for robot in robots]
+    poses = [keys.pose(run, robot) for robot in robots if robot not in witnessed]
+    witnesses = [keys.pose(run, robot) for robot in robots if robot in witnessed]
     rights[PLANT] = Rights(
-        puts=(*(keys.pose(run, robot) for robot in robots), *truths, *_control(run, PLANT)),
-        hears=(keys.go(run),),
+        puts=(*poses, *truths, *_control(run, PLANT)),
+        hears=(keys.go(run), *witnesses),
         token=keys.live(run, PLANT),
+        watches=launcher,
     )
+    if witnesses:
+        rights[LOCALISATION] = Rights(
+            puts=tuple(witnesses), hears=(keys.go(run),), token=keys.live(run, LOCALISATION)
+        )
     rights[RECORDER] = Rights(
         puts=_control(run, RECORDER),
         hears=(*truths, *(keys.telemetry(run, robot) for robot in robots)),
         token=keys.live(run, RECORDER),
     )
-    return AccessPlan(rights, {user: secrets.token_urlsafe(24) for user in rights})
+    known = dict(guests or {})
+    passwords = {user: known.get(user) or secrets.token_urlsafe(24) for user in rights}
+    return AccessPlan(rights, passwords, frozenset(known if certified else ()))
 
 
 def _control(run: str, process: str) -> tuple[str, str]:
@@ -118,10 +162,16 @@ def _rules_of(user: str, rights: Rights) -> list[dict[str, object]]:
             "key_exprs": list(key_exprs),
         }
 
-    return [
+    rules = [
         rule("puts", ["put"], "ingress", rights.puts),
         rule("learns", ["declare_subscriber"], "egress", rights.puts),
         rule("asks", ["declare_subscriber"], "ingress", rights.hears),
         rule("hears", ["put"], "egress", rights.hears),
         rule("lives", ["liveliness_token"], "ingress", [rights.token]),
     ]
+    if rights.watches:
+        rules += [
+            rule("watches", ["declare_liveliness_subscriber"], "ingress", rights.watches),
+            rule("sees", ["liveliness_token"], "egress", rights.watches),
+        ]
+    return rules

@@ -10,8 +10,8 @@
     fleetloop/<run>/@progress/<process>      how far a process is, to the launcher
     fleetloop/<run>/@report/<process>        a process's last word, to the launcher
 
-A process is `plant`, `recorder` or `agent/<robot>`. Chunks that begin with @ are verbatim: no
-wildcard of data subscriptions matches them.
+A process is `launcher`, `plant`, `recorder` or `agent/<robot>`. Chunks that begin with @ are
+verbatim: no wildcard of data subscriptions matches them.
 """
 
 import re

@@ -179,7 +179,7 @@ class Report(NamedTuple):
 
 
 class Go(NamedTuple):
-    """Everybody is ready; in real time, tick 0 is at this reading of the monotonic clock."""
+    """Everybody is ready; in real time, tick 0 is at this reading of the wall clock."""
 
     epoch_ns: int
 

@@ -64,6 +64,11 @@ class Stop:
         """The launcher has heard the last word, or will never hear it."""
         os.eventfd_write(self.release_fd, 1)
 
+    def end(self, reason: str) -> None:
+        """There is no launcher any more: stop, and don't wait for it to have the last word."""
+        self.request(reason)
+        self.release()
+
     def await_release(self) -> None:
         """Having said the last word, stay until the launcher has it, at most `LINGER_S`.
 
@@ -186,8 +191,7 @@ def _read_brief(stream: BinaryIO) -> object:
 def _watch_lifeline(stop: Stop) -> None:
     while os.read(0, 4096):
         stop.release()
-    stop.request(LAUNCHER_GONE)
-    stop.release()
+    stop.end(LAUNCHER_GONE)
     threading.Event().wait(GRACE_S)
     os._exit(3)
 

@@ -26,7 +26,7 @@ from zenoh.handlers import Callback, FifoChannel
 
 from bridge.access import AccessPlan
 from bridge.link import Arrival, Inbox, Publisher
-from configs.brief import NetworkLink
+from configs.brief import NetworkLink, Outside, TlsFiles
 from configs.errors import InfrastructureError
 
 LEASE_MS = 1000
@@ -48,6 +48,7 @@ class ZenohLink:
         self._session = session
         self._inbox = Inbox()
         self._declared: list[object] = []
+        self._tokens: dict[str, zenoh.LivelinessToken] = {}
         self.receive = self._inbox.receive
 
     def publisher(self, key: str, *, express: bool = True) -> Publisher:
@@ -76,7 +77,24 @@ class ZenohLink:
 
     def declare_live(self, key: str) -> None:
         """Hold a liveliness token on `key`."""
-        self._declared.append(self._session.liveliness().declare_token(key))
+        self._tokens[key] = self._session.liveliness().declare_token(key)
+
+    def withdraw_live(self, key: str) -> None:
+        """Let go of the token on `key`."""
+        self._tokens.pop(key).undeclare()
+
+    def on_gone(self, key: str, act: Callable[[], None]) -> None:
+        """Call `act`, on the network's thread, when the token on `key` goes, or the way to it."""
+
+        def take(sample: zenoh.Sample) -> None:
+            if sample.kind == zenoh.SampleKind.DELETE:
+                act()
+
+        self._declared.append(
+            self._session.liveliness().declare_subscriber(
+                key, Callback(take, indirect=False), history=True
+            )
+        )
 
     def watch_live(self, key_expr: str, tag: str) -> None:
         """Queue b"1" for every token that is there or comes, b"0" for every one that goes."""
@@ -102,6 +120,7 @@ class ZenohLink:
         in its close.
         """
         self._declared.clear()
+        self._tokens.clear()
         if self._session.is_closed():
             return
         closer = threading.Thread(target=self._session.close, daemon=True)
@@ -197,6 +216,8 @@ def _client(network: NetworkLink, timeout_s: float) -> zenoh.Session:
     _set(config, "connect/timeout_ms", int(timeout_s * 1000))
     _set(config, "transport/auth/usrpwd/user", network.user)
     _set(config, "transport/auth/usrpwd/password", network.password)
+    if network.tls is not None:
+        _set(config, "transport/link/tls", _mutual_tls(network.tls, "connect"))
     failure = (
         f"{network.user}: no session with the router at {network.endpoint} within {timeout_s:g} s:"
         " nobody listens there, or it refused the login"
@@ -206,19 +227,22 @@ def _client(network: NetworkLink, timeout_s: float) -> zenoh.Session:
 
 
 @contextlib.contextmanager
-def open_router(endpoint: str | None, access: AccessPlan, folder: Path) -> Iterator[RouterLink]:
+def open_router(
+    endpoint: str | None, access: AccessPlan, folder: Path, outside: Outside | None = None
+) -> Iterator[RouterLink]:
     """Be the router at `endpoint`, or at a free loopback port if None, and enforce `access`.
 
-    `folder` must be private: the user dictionary is written there while the router opens.
+    Those on other machines come in at `outside`. `folder` must be private: the user dictionary is
+    written there while the router opens.
 
     Raises:
-        InfrastructureError: the endpoint is taken or can't be listened on.
+        InfrastructureError: an endpoint is taken or can't be listened on.
     """
     dictionary = folder / "users"
     dictionary.touch(mode=0o600)
     dictionary.write_text(access.dictionary(), "utf-8")
     try:
-        link = _listen(endpoint, access, dictionary)
+        link = _listen(endpoint, access, dictionary, outside)
     finally:
         dictionary.unlink()
     with link:
@@ -238,13 +262,17 @@ def _few_threads(tx: str) -> Iterator[None]:
         del os.environ["ZENOH_RUNTIME"]
 
 
-def _listen(endpoint: str | None, access: AccessPlan, dictionary: Path) -> RouterLink:
+def _listen(
+    endpoint: str | None, access: AccessPlan, dictionary: Path, outside: Outside | None
+) -> RouterLink:
     tries = 1 if endpoint else _PORT_TRIES
     reason = ""
     for _ in range(tries):
         at = endpoint or f"tcp/127.0.0.1:{_free_port()}"
         config = _config("router")
-        _set(config, "listen/endpoints", [at])
+        _set(config, "listen/endpoints", [at, *([outside.endpoint] if outside else [])])
+        if outside is not None and outside.tls is not None:
+            _set(config, "transport/link/tls", _mutual_tls(outside.tls, "listen"))
         _set(config, "transport/auth/usrpwd/dictionary_file", str(dictionary))
         config.insert_json5("access_control", access.access_control())
         try:
@@ -253,10 +281,22 @@ def _listen(endpoint: str | None, access: AccessPlan, dictionary: Path) -> Route
             return RouterLink(session, at)
         except InfrastructureError as error:
             reason = str(error)
-    raise InfrastructureError(
-        f"can't listen at {endpoint or 'any loopback port'}: already in use, or no such address"
-        f" ({reason})"
+    where = " and ".join(
+        [endpoint or "any loopback port", *([outside.endpoint] if outside is not None else [])]
     )
+    raise InfrastructureError(
+        f"can't listen at {where}: already in use, or no such address ({reason})"
+    )
+
+
+def _mutual_tls(files: TlsFiles, side: str) -> dict[str, object]:
+    """Zenoh's TLS section; `side` is "listen" or "connect"."""
+    return {
+        "root_ca_certificate": files.ca,
+        "enable_mtls": True,
+        f"{side}_certificate": files.certificate,
+        f"{side}_private_key": files.private_key,
+    }
 
 
 def _config(mode: str) -> zenoh.Config:

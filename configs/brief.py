@@ -235,6 +235,15 @@ class Pose:
 
 
 @dataclass(frozen=True, slots=True)
+class TlsFiles:
+    """Files of mutual TLS, in PEM; the certificate's common name is the identity."""
+
+    ca: str
+    certificate: str
+    private_key: str
+
+
+@dataclass(frozen=True, slots=True)
 class NetworkLink:
     """How one process reaches the router, and as whom."""
 
@@ -242,6 +251,15 @@ class NetworkLink:
     endpoint: str  # e.g. tcp/127.0.0.1:40001
     user: str
     password: str = field(repr=False)
+    tls: TlsFiles | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Outside:
+    """Where the router listens for roles on other machines."""
+
+    endpoint: str
+    tls: TlsFiles | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,6 +281,8 @@ class AgentBrief:
     phase_ns: int  # in real time, this much after a tick's time the controller acts
     bus: Settings  # keyword arguments of can.Bus, verbatim
     network: NetworkLink
+    detached: bool = False  # no launcher is its parent: the run's end is when the launcher's
+    # token on the network goes
 
 
 # --- the plant ------------------------------------------------------------------------------------
@@ -397,6 +417,9 @@ class PlantBrief:
     runtime_folder: str  # holds the buses' sockets; removed when the run ends
     network: NetworkLink
     listeners: tuple[tuple[str, int], ...] = ()  # bus, inherited file descriptor of its socket
+    attached: tuple[tuple[str, Settings], ...] = ()  # bus, keyword arguments of can.Bus: not ours
+    witnessed: tuple[tuple[str, Pose], ...] = ()  # robots that aren't emulated; where they start
+    detached: bool = False  # as an agent's
 
 
 @dataclass(frozen=True, slots=True)

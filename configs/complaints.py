@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from configs.cross_checks import Problem
 from configs.scenario import Scenario
@@ -20,9 +20,11 @@ def line(name: str, problem: Problem) -> str:
     return f"{name}: {problem.key} = {_shown(problem.value)}: {problem.right}"
 
 
-def complaints(error: ValidationError, data: dict[str, Any]) -> list[Problem]:
-    """All that pydantic has against the parsed file `data`."""
-    return [_problem(dict(item), data) for item in error.errors(include_url=False)]
+def complaints(
+    error: ValidationError, data: dict[str, Any], model: type[BaseModel] = Scenario
+) -> list[Problem]:
+    """All that pydantic has against the parsed file `data`, which should be a `model`."""
+    return [_problem(dict(item), data, model) for item in error.errors(include_url=False)]
 
 
 def salvage(error: ValidationError, data: dict[str, Any]) -> Scenario | None:
@@ -54,7 +56,7 @@ def _get(holder: object, part: int | str) -> Any:
     return _NOTHING
 
 
-def _problem(item: dict[str, Any], data: dict[str, Any]) -> Problem:
+def _problem(item: dict[str, Any], data: dict[str, Any], model: type[BaseModel]) -> Problem:
     loc: list[int | str] = list(item["loc"])
     names: list[str] = []
     holder: Any = data
@@ -69,7 +71,7 @@ def _problem(item: dict[str, Any], data: dict[str, Any]) -> Problem:
             names.append(str(part))
         holder = inner
     if item["type"] == "extra_forbidden":
-        return Problem(".".join(names), item["input"], _unknown(loc))
+        return Problem(".".join(names), item["input"], _unknown(loc, model))
     if item["type"].startswith("union_tag"):
         tag = item["ctx"].get("tag", MISSING)
         tags = item["ctx"].get("expected_tags", "")
@@ -79,16 +81,16 @@ def _problem(item: dict[str, Any], data: dict[str, Any]) -> Problem:
     return Problem(".".join(names), value, _right(item))
 
 
-def _unknown(loc: Sequence[int | str]) -> str:
-    known = _known_keys(loc[:-1])
+def _unknown(loc: Sequence[int | str], model: type[BaseModel]) -> str:
+    known = _known_keys(loc[:-1], model)
     close = difflib.get_close_matches(str(loc[-1]), known, 1, cutoff=0.5)
     hint = f"; did you mean {close[0]}?" if close else ""
     return f"unknown key{hint} (known here: {', '.join(known)})" if known else "unknown key"
 
 
-def _known_keys(loc: Sequence[int | str]) -> list[str]:
+def _known_keys(loc: Sequence[int | str], model: type[BaseModel]) -> list[str]:
     """The keys that the schema knows at a location."""
-    schema = Scenario.model_json_schema(by_alias=True)
+    schema = model.model_json_schema(by_alias=True)
     definitions = schema.get("$defs", {})
 
     def resolve(node: dict[str, Any], tag: str | None = None) -> dict[str, Any]:

@@ -42,6 +42,14 @@ SetOption = Annotated[
         " --set robot.r2.pose.x_m=-6.5 . May be repeated.",
     ),
 ]
+DeploymentOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--deployment",
+        metavar="FILE",
+        help="Where everything is: CAN interfaces, router, roles on other machines. Else all here.",
+    ),
+]
 
 
 @app.command()
@@ -79,6 +87,7 @@ def run(
         int | None, typer.Option(metavar="N", help="Seed, instead of the file's.")
     ] = None,
     overrides: SetOption = None,
+    deployment: DeploymentOption = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -117,8 +126,62 @@ def run(
         as_json=as_json,
         figures=figures,
         profile=profile,
+        deployment=deployment,
     )
     raise typer.Exit(run_scenario(scenario, options))
+
+
+@app.command()
+def agent(
+    scenario: ScenarioArg,
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Its name in the scenario.")],
+    deployment: Annotated[
+        Path,
+        typer.Option("--deployment", metavar="FILE", help="Its CAN bus, the router, credentials."),
+    ],
+    overrides: SetOption = None,
+) -> None:
+    """Run one robot's controller on its own, as on the robot: its CAN bus, a router elsewhere."""
+    from fleetloop.agent_alone import run_agent
+
+    raise typer.Exit(run_agent(scenario, robot, deployment, tuple(overrides or [])))
+
+
+@app.command()
+def plant(
+    scenario: ScenarioArg,
+    robots: Annotated[
+        str,
+        typer.Option(metavar="R1,R2", help="Only these robots; all that are emulated if not given"),
+    ] = "",
+    duration: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="End after this time; else with Ctrl-C.")
+    ] = None,
+    overrides: SetOption = None,
+    deployment: DeploymentOption = None,
+    as_json: Annotated[
+        bool,
+        typer.Option("--json", help="Say on one line, when ready, what to give to can.Bus(**...)."),
+    ] = False,
+    stdin: Annotated[
+        bool,
+        typer.Option(
+            "--stdin", help="Answer requests on standard input (poses), and end when it ends."
+        ),
+    ] = False,
+) -> None:
+    """Emulate drives and physics alone, in real time, for your own CAN host code."""
+    from fleetloop.plant_alone import Options, run_plant
+
+    options = Options(
+        robots=tuple(filter(None, robots.split(","))),
+        duration_s=duration,
+        deployment=deployment,
+        overrides=tuple(overrides or []),
+        as_json=as_json,
+        serve_stdin=stdin,
+    )
+    raise typer.Exit(run_plant(scenario, options))
 
 
 @app.command()

@@ -5,6 +5,8 @@
     agents     one controller per robot
     recorder   writes the record
 
+Roles that a deployment has elsewhere are waited for, watched and ended over the network.
+
 Start: sockets first, then processes, then the barrier: everybody proves its links and declares a
 liveliness token; with the last one the launcher says go. End: the plant stops within a tick, the
 controllers follow it, the recorder takes what still comes; who doesn't is killed after a bound.
@@ -18,15 +20,18 @@ from pathlib import Path
 
 from bridge import access, keys
 from bridge.can_bus import places
+from bridge.clock import wall_of
 from bridge.link import Arrival, Link
 from bridge.messages import Go, LeaderSpeed, Progress, Report
 from bridge.process import Stop, cpu_ns
 from bridge.zenoh_link import RouterLink, open_router
 from configs.brief import NetworkLink, RecorderBrief
 from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
+from configs.deployment import Deployment, roles_of
 from configs.errors import InfrastructureError
 from configs.loading import to_toml
 from configs.scenario import Scenario
+from fleetloop import placing
 from fleetloop.children import (
     GAVE_UP,
     PEER_SILENT,
@@ -36,6 +41,7 @@ from fleetloop.children import (
     end,
     refuse_shadowed_roles,
 )
+from fleetloop.elsewhere import Elsewhere
 from fleetloop.nursery import FIRST_FD, Nursery
 from fleetloop.record.writer import finish_truncated
 
@@ -72,15 +78,18 @@ class ProcessRun:
         speed: float,
         profile: bool,
         on_progress: Callable[[Progress], None],
+        deployment: Deployment | None = None,
     ) -> None:
         self._profile = profile
         self._scenario = scenario
-        self._run = run
+        self._deployment = deployment or Deployment()
+        self._run = placing.run_name(scenario, self._deployment) or run
+        self._elsewhere = Elsewhere(self._deployment.elsewhere(scenario))
         self._record = record
         self._speed = speed
         self._on_progress = on_progress
         self._robots = scenario.names
-        self._processes = ("plant", "recorder", *(f"agent/{robot}" for robot in self._robots))
+        self._processes = roles_of(scenario)
         self._children: list[Child] = []
         self._alive: set[str] = set()
         self._seen: dict[str, tuple[int, float]] = {}
@@ -116,9 +125,9 @@ class ProcessRun:
         scenario, run = self._scenario, self._run
         folder = places.create_run_folder(run)
         try:
-            graph = scenario.topology
-            plan = access.plan(run, self._robots, graph.hears, graph.leader)
-            with open_router(scenario.network.endpoint, plan, folder) as link:
+            plan, outside = self._access(), placing.outside(self._deployment)
+            with open_router(scenario.network.endpoint, plan, folder, outside) as link:
+                link.declare_live(keys.live(run, access.LAUNCHER))
                 link.watch_live(keys.live_all(run), "live")
                 # One by one: a wildcard is wider than any identity's rights and would be refused.
                 for process in self._processes:
@@ -129,8 +138,21 @@ class ProcessRun:
         finally:
             places.remove_run_folder(folder)
 
+    def _access(self) -> access.AccessPlan:
+        deployment, graph = self._deployment, self._scenario.topology
+        network = deployment.network
+        return access.plan(
+            self._run,
+            self._robots,
+            graph.hears,
+            graph.leader,
+            witnessed=[robot for robot in self._robots if not deployment.emulates(robot)],
+            guests=placing.guests(self._scenario, deployment),
+            certified=network is not None and network.tls is not None,
+        )
+
     def _spawn(self, link: RouterLink, plan: access.AccessPlan, folder: Path) -> None:
-        scenario, run = self._scenario, self._run
+        scenario, run, deployment = self._scenario, self._run, self._deployment
 
         def network(user: str) -> NetworkLink:
             return NetworkLink(run, link.endpoint, user, plan.passwords[user])
@@ -151,17 +173,22 @@ class ProcessRun:
             speed=self._speed,
             profile=self._profile,
         )
-        buses = tuple((bus, FIRST_FD + n) for n, bus in enumerate(self._robots))
-        plant = replace(plant, listeners=buses)
-        listeners = places.listen(folder, self._robots)
-        fds = [listeners[bus].fileno() for bus in self._robots]
+        plant = placing.robots_of_plant(plant, deployment)
+        here = deployment.runs_here
+        ours = [r for r in self._robots if deployment.is_ours(r) and here("plant")]
+        plant = replace(plant, listeners=tuple((r, FIRST_FD + n) for n, r in enumerate(ours)))
+        listeners = places.listen(folder, ours)
+        fds = [listeners[robot].fileno() for robot in ours]
+        pace = "gathered" if ticks.realtime else "paced"
         try:
             with Nursery(batch=not ticks.realtime) as nursery:
-                self._children.append(Child(nursery, "plant", "plant", plant, fds))
+                if here("plant"):
+                    self._children.append(Child(nursery, "plant", "plant", plant, fds))
                 for robot in self._robots:
-                    channel = str(places.socket_path(folder, robot))
-                    pace = "gathered" if ticks.realtime else "paced"
-                    bus = (("channel", channel), ("interface", "fleetloop"), (pace, True))
+                    if not here(f"agent/{robot}"):
+                        continue
+                    socket = str(places.socket_path(folder, robot)) if robot in ours else ""
+                    bus = placing.agent_bus(deployment, robot, pace=pace, socket=socket)
                     user = network(access.agent_user(robot))
                     brief = agent_brief(
                         scenario,
@@ -192,7 +219,7 @@ class ProcessRun:
             ready = self._alive.issuperset(self._processes)
             if ready and "plant" in self._seen:
                 return None
-            if (failure := cause(self._children)) is not None:
+            if (failure := self._cause()) is not None:
                 return failure
             if time.monotonic() > deadline:
                 absent = sorted(set(self._processes) - self._alive) or ["the plant's first tick"]
@@ -202,7 +229,7 @@ class ProcessRun:
                 )
             leader.put(speed)
             if ready:
-                epoch_ns = epoch_ns or time.monotonic_ns() + countdown_ns
+                epoch_ns = epoch_ns or wall_of(time.monotonic_ns() + countdown_ns)
                 go.put(Go(epoch_ns).encode())
             self._take(link.receive(0.02))
         return None
@@ -214,19 +241,32 @@ class ProcessRun:
         actors = [child for child in self._children if child.name != "recorder"]
         while not stop.requested:
             self._take(link.receive(WATCH_EVERY_S))
-            if (failure := cause(self._children)) is not None:
+            if (failure := self._cause()) is not None:
                 return self._root_of(failure, link, actors)
-            if all(child.ended() for child in actors):
+            if all(child.ended() for child in actors) and self._elsewhere.ended():
                 return None
-            if actors[0].ended() and (left := self._settle(link, actors, DRAIN_S)):
+            plant = self._child("plant")
+            if plant is not None and plant.ended() and (left := self._settle(link, actors)):
                 name = left[0].name
                 return Failure(
                     GAVE_UP, name, f"{name}: has not ended {DRAIN_S:g} s after the plant"
                 )
             if (silent := self._silent()) is not None:
                 self._settle(link, actors, 0.3)
-                return cause(self._children) or silent
+                return self._cause() or silent
         return None
+
+    def _child(self, name: str) -> Child | None:
+        """The process of that name, None if it is not one of this machine."""
+        return next((child for child in self._children if child.name == name), None)
+
+    def _cause(self) -> Failure | None:
+        """The failure that explains the others, None if nobody failed."""
+        far = self._elsewhere.failure(time.monotonic())
+        near = cause(self._children)
+        if near is None or far is None:
+            return near or far
+        return min(near, far, key=lambda failure: failure.rank)
 
     def _root_of(self, failure: Failure, link: Link, actors: Sequence[Child]) -> Failure:
         """Who lost a peer is not the cause: let the peer be found, within its deadline."""
@@ -236,7 +276,7 @@ class ProcessRun:
         deadline = time.monotonic() + within_s
         while time.monotonic() < deadline:
             left = self._settle(link, actors, WATCH_EVERY_S)
-            better = cause(self._children)
+            better = self._cause()
             if better is not None and better.rank < failure.rank:
                 return better
             if (silent := self._silent()) is not None:
@@ -248,7 +288,9 @@ class ProcessRun:
     def _limit_s(self) -> float:
         return schedule(self._scenario, self._speed).tick_deadline_s
 
-    def _settle(self, link: Link, children: Sequence[Child], within_s: float) -> list[Child]:
+    def _settle(
+        self, link: Link, children: Sequence[Child], within_s: float = DRAIN_S
+    ) -> list[Child]:
         """Hear last words until these have ended, at most `within_s`; return who has not."""
         deadline = time.monotonic() + within_s
         while left := [child for child in children if not child.ended()]:
@@ -263,9 +305,9 @@ class ProcessRun:
         limit_s = self._limit_s()
         now = time.monotonic()
         for name in ("plant", "recorder"):
-            child = next(child for child in self._children if child.name == name)
+            child = self._child(name)
             tick, when = self._seen.get(name, (0, now))
-            if now - when > limit_s and not child.ended():
+            if child is not None and now - when > limit_s and not child.ended():
                 text = f"{name}: no progress for {now - when:.1f} s after tick {tick}"
                 return Failure(GAVE_UP, name, text)
         return None
@@ -275,7 +317,9 @@ class ProcessRun:
             return
         process = keys.process_of(arrival.key)
         if arrival.tag == "live":
-            (self._alive.add if arrival.payload == b"1" else self._alive.discard)(process)
+            there = arrival.payload == b"1"
+            (self._alive.add if there else self._alive.discard)(process)
+            self._elsewhere.note_token(process, time.monotonic(), there=there)
         elif arrival.tag == "progress":
             progress = Progress.decode(arrival.payload)
             if progress is not None:
@@ -286,13 +330,14 @@ class ProcessRun:
                     self._on_progress(progress)
         elif (report := Report.decode(arrival.payload)) is not None:
             self.outcome.reports[process] = report
+            self._elsewhere.note_report(process, report)
             for child in self._children:
                 if child.name == process:
                     child.release()
 
     # --- end ---------------------------------------------------------------------------------
 
-    def _end(self, link: Link, stop: Stop, failure: Failure | None) -> None:
+    def _end(self, link: RouterLink, stop: Stop, failure: Failure | None) -> None:
         outcome = self.outcome
         if stop.requested:
             outcome.ended, outcome.reason = "interrupted", stop.reason
@@ -305,10 +350,14 @@ class ProcessRun:
         if failure is not None and failure.name == recorder.name:
             # What it doesn't take any more would keep all others waiting.
             recorder.kill()
+        # Without launcher those elsewhere stop, if they haven't.
+        link.withdraw_live(keys.live(self._run, access.LAUNCHER))
         if outcome.ended != "completed":
-            actors[0].ask_to_stop()
+            if actors:
+                actors[0].ask_to_stop()
             self._settle(link, actors, 1.0)
         end(actors)
+        self._hear_from_elsewhere(link)
         if outcome.ended != "completed":
             recorder.ask_to_stop()
         deadline = time.monotonic() + DRAIN_S
@@ -324,3 +373,9 @@ class ProcessRun:
             outcome.reason = lost.text if lost else f"recorder: not done within {DRAIN_S:g} s"
         if unfinished and self._record.exists():
             finish_truncated(self._record)
+
+    def _hear_from_elsewhere(self, link: Link) -> None:
+        """Let those on other machines say their last word; what they don't say in time is lost."""
+        deadline = time.monotonic() + DRAIN_S
+        while not self._elsewhere.ended() and (left_s := deadline - time.monotonic()) > 0.0:
+            self._take(link.receive(min(left_s, WATCH_EVERY_S)))

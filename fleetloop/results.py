@@ -41,8 +41,8 @@ def print_results(summary: Summary, folder: Path) -> None:
         line(spread_line(summary))
     for expect in summary["expectations"]:
         line(f"{mark(expect):<11}  {claim(expect)}")
-    for robot, reason in summary["stopped_robots"].items():
-        line(f"STOPPED {robot}: {reason}")
+    for text in trouble_lines(summary):
+        line(text)
     if summary["real_time_factor"] is not None:
         line(
             f"{summary['ticks']} ticks in {summary['wall_s']:.2f} s:"
@@ -104,6 +104,14 @@ def spread_line(summary: Summary) -> str:
         f"spread of s: peak {spread['peak']:.4f} m, settled {_time(spread['settle_s'])},"
         f" final {spread['final']:.2e} m"
     )
+
+
+def trouble_lines(summary: Summary) -> Iterator[str]:
+    """Robots that stopped themselves, and buses that failed at times."""
+    for robot, reason in summary["stopped_robots"].items():
+        yield f"STOPPED {robot}: {reason}"
+    for bus, trouble in summary["bus_troubles"].items():
+        yield f"BUS {bus}: {trouble}"
 
 
 def realtime_lines(summary: Summary) -> Iterator[str]:

@@ -1,28 +1,27 @@
 """`fleetloop run`: one scenario from file to results."""
 
-import signal
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from types import FrameType
 
 from bridge.messages import Progress
 from bridge.process import Stop
 from configs.brief import NetworkLink
 from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
+from configs.deployment import Deployment, load_deployment
 from configs.errors import InfrastructureError, ScenarioError
 from configs.loading import load, to_toml
 from configs.scenario import Scenario
-from fleetloop import run_folder
+from fleetloop import placing, run_folder
 from fleetloop.launch import Outcome, ProcessRun
 from fleetloop.lockstep import InProcessRun
 from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.reader import Record
 from fleetloop.record.writer import RecordWriter
 from fleetloop.results import print_results
+from fleetloop.signals import stop_on_signals
 from fleetloop.summary import RunStats, check_expectations, summarise, to_json
 from fleetloop.terminal import RunProgress, say
 
@@ -40,6 +39,7 @@ class Options:
     as_json: bool = False
     figures: bool = True
     profile: bool = False
+    deployment: Path | None = None
 
 
 def run_scenario(source: str, options: Options) -> int:
@@ -59,21 +59,29 @@ def run_scenario(source: str, options: Options) -> int:
         raise ScenarioError(
             f"--speed {options.speed:g}: real time has one speed; for lockstep only"
         )
+    if options.in_process and options.deployment is not None:
+        raise ScenarioError(
+            f"--deployment {options.deployment}: --in-process has no buses and no network to place"
+        )
     check_expectations(scenario.expect)
+    deployment = _deployment(scenario, options)
+    placing.guests(scenario, deployment)  # what is wrong with credentials comes before the run
     started = datetime.now(UTC).astimezone()
     folder = run_folder.create(scenario.name, options.out, now=started)
     run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
     with (
-        _stop_on_signals() as stop,
+        stop_on_signals() as stop,
         RunProgress(scenario.name, scenario.duration_s, quiet=options.as_json) as progress,
     ):
 
         def on_progress(state: Progress) -> None:
             progress.show(state.t_ns * 1e-9, state.wall_ns * 1e-9)
 
-        run = _in_process if options.in_process else _over_processes
         try:
-            stats = run(scenario, folder, options, on_progress, stop)
+            if options.in_process:
+                stats = _in_process(scenario, folder, on_progress, stop)
+            else:
+                stats = _over_processes(scenario, deployment, folder, options, on_progress, stop)
         except InfrastructureError:
             run_folder.remove_if_unused(folder)
             raise
@@ -81,8 +89,15 @@ def run_scenario(source: str, options: Options) -> int:
     return _finish(scenario, folder, stats, options)
 
 
+def _deployment(scenario: Scenario, options: Options) -> Deployment:
+    if options.deployment is None:
+        return Deployment()
+    return load_deployment(options.deployment, scenario)
+
+
 def _over_processes(
     scenario: Scenario,
+    deployment: Deployment,
     folder: Path,
     options: Options,
     on_progress: Callable[[Progress], None],
@@ -95,6 +110,7 @@ def _over_processes(
         speed=options.speed,
         profile=options.profile,
         on_progress=on_progress,
+        deployment=deployment,
     )
     return _stats(run.run(stop), realtime=scenario.clock.mode == "realtime")
 
@@ -102,7 +118,6 @@ def _over_processes(
 def _in_process(
     scenario: Scenario,
     folder: Path,
-    options: Options,  # noqa: ARG001 - the reference runs as fast as it can
     on_progress: Callable[[Progress], None],
     stop: Stop,
 ) -> RunStats:
@@ -171,6 +186,11 @@ def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
                 for name in report.values
                 if name.startswith("frames.")
             }
+            stats.bus_troubles = {
+                name.removeprefix("trouble."): str(text)
+                for name, text in report.values.items()
+                if name.startswith("trouble.")
+            }
         if stopped := report.values.get("stopped"):
             stats.stopped_robots[process.removeprefix("agent/")] = str(stopped)
     return stats
@@ -198,20 +218,3 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options)
     if unsaved is not None:
         raise unsaved
     return EXIT_CODES[summary["verdict"]]
-
-
-@contextmanager
-def _stop_on_signals() -> Iterator[Stop]:
-    """Ctrl-C, SIGTERM and a closed terminal ask for an orderly stop while the run lasts."""
-    stop = Stop()
-
-    def request(number: int, _: FrameType | None) -> None:
-        stop.request(f"interrupted by {signal.Signals(number).name}")
-
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = {number: signal.signal(number, request) for number in numbers}
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -39,6 +39,7 @@ class RunStats:
     frames_per_bus: dict[str, int] = field(default_factory=dict)
     waits_s: dict[str, dict[str, float]] = field(default_factory=dict)
     stopped_robots: dict[str, str] = field(default_factory=dict)
+    bus_troubles: dict[str, str] = field(default_factory=dict)
     cpu_s: dict[str, float] = field(default_factory=dict)
     realtime: dict[str, dict[str, int]] = field(default_factory=dict)
     refused: set[str] = field(default_factory=set)
@@ -90,6 +91,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         "stopped_robots": stats.stopped_robots,
         "overruns": stats.overruns,
         "frames_per_bus": stats.frames_per_bus,
+        "bus_troubles": stats.bus_troubles,
         "waits_s": stats.waits_s,
         "cpu_s": stats.cpu_s,
         "profile_us_per_tick": _profile(stats, ticks),

@@ -6,26 +6,30 @@ inherited file descriptors.
 
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
 from bridge import keys
+from bridge.access import LAUNCHER
 from bridge.barrier import Hellos, await_hellos
 from bridge.can_bus import places
+from bridge.can_bus.ends import DriveEnd
 from bridge.can_bus.hub import Hub
+from bridge.clock import monotonic_of
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import Go, PoseFix, Progress, Report, Rows
-from bridge.process import Stop, cpu_ns, go_realtime, serve, settle_memory
+from bridge.process import LAUNCHER_GONE, Stop, cpu_ns, go_realtime, serve, settle_memory
 from bridge.profile import Sampler
 from bridge.telemetry import PLANT_ROW, RowBuffer
 from bridge.zenoh_link import open_client
-from configs.brief import PlantBrief
+from configs.brief import PlantBrief, Settings
 from configs.errors import FleetloopError, InfrastructureError
 from plant.loop import Counters, LockstepLoop, bus_frames
 from plant.realtime import RealtimeLoop
 from plant.unit import Unit
+from plant.witness import Witness
 
 PLANT_PRIORITY = 45
 """SCHED_FIFO, above the controllers'."""
@@ -38,33 +42,58 @@ def run(brief: PlantBrief, stop: Stop) -> str:
     listeners = {bus: socket.socket(fileno=fd) for bus, fd in brief.listeners}
     try:
         with open_client(brief.network, brief.schedule.start_deadline_s) as link:
+            if brief.detached:
+                gone = partial(stop.end, LAUNCHER_GONE)
+                link.on_gone(keys.live(brief.network.run, LAUNCHER), gone)
             hub = Hub(listeners, stop.wake_fd)
+            end: DriveEnd = hub
             try:
-                counters = _run(brief, stop, link, hub)
+                end = join(hub, brief.attached)
+                counters = _run(brief, stop, link, hub, end)
             finally:
-                hub.close(stop.reason or "the plant has ended")
+                end.close(stop.reason or "the plant has ended")
     finally:
         # The launcher does it too, unless it was killed.
         places.remove_run_folder(Path(brief.runtime_folder))
     return f"ended after tick {counters.ticks}"
 
 
-def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> Counters:
+def join(hub: Hub, attached: Sequence[tuple[str, Settings]]) -> DriveEnd:
+    """The drives' end of all buses: ours on the hub, and those that are attached.
+
+    Raises:
+        InfrastructureError: one of them can't be opened.
+    """
+    if not attached:
+        return hub
+    from bridge.can_bus.attached import AttachedBuses
+    from bridge.can_bus.joined import JoinedEnds
+
+    names = [name for name, _ in attached]
+    return JoinedEnds(hub, AttachedBuses(dict(attached)), names)
+
+
+def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> Counters:
     name = brief.network.run
     units = [Unit(robot) for robot in brief.robots]
+    others = [Witness(robot, start) for robot, start in brief.witnessed]
     # In real time all poses are of one instant: they travel together.
     express = not brief.schedule.realtime
     poses = [link.publisher(keys.pose(name, u.brief.robot), express=express) for u in units]
-    truths = [link.publisher(keys.truth(name, unit.brief.robot)) for unit in units]
+    robots = [*(unit.brief.robot for unit in units), *(other.robot for other in others)]
+    truths = [link.publisher(keys.truth(name, robot)) for robot in robots]
     rows = [RowBuffer(PLANT_ROW, partial(_put_rows, truth)) for truth in truths]
     progress = link.publisher(keys.progress(name, "plant"))
     report = link.publisher(keys.report(name, "plant"))
     link.subscribe(keys.go(name), "go")
+    for other in others:
+        link.subscribe(keys.pose(name, other.robot), other.robot)
 
     hellos = Hellos()
-    for unit, pose, truth in zip(units, poses, truths, strict=True):
+    for unit, pose in zip(units, poses, strict=True):
         start = unit.brief.pose
         hellos.add(pose, PoseFix(EARLY, 0, start.x_m, start.y_m, start.theta_rad).encode())
+    for truth in truths:
         hellos.add(truth, Rows(0, 0, b"", False).encode())
 
     def say(state: Progress) -> None:
@@ -74,10 +103,11 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> Counters:
     body: Callable[[Stop], None]
     if brief.schedule.realtime:
         link.declare_live(keys.live(name, "plant"))
-        epoch_ns = _serve_until_go(brief, hub, link, hellos, stop)
+        epoch_ns = _serve_until_go(brief, end, link, hellos, stop)
         settle_memory()
         refused = go_realtime(PLANT_PRIORITY)
-        wall = RealtimeLoop(brief, units, hub, poses, rows, say)
+        record = partial(_record, link, others, rows[len(units) :], brief.schedule.period_s)
+        wall = RealtimeLoop(brief, units, end, poses, rows[: len(units)], say, record)
         counters, progress_of = wall.counters, wall.progress
         body = partial(wall.run, epoch_ns)
     else:
@@ -92,9 +122,9 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> Counters:
     try:
         with sampler if brief.schedule.profile else nullcontext():
             body(stop)
-        hub.close(stop.reason or "end of the run")
+        end.close(stop.reason or "end of the run")
     except FleetloopError as error:
-        hub.close(str(error))
+        end.close(str(error))
         raise
     finally:
         for buffer in rows:
@@ -108,6 +138,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub) -> Counters:
             "cpu_ns": cpu_ns() - began_ns,
             "refused": ", ".join(refused),
             **bus_frames(counters),
+            **{f"trouble.{bus}": text for bus, text in end.troubles().items()},
             **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
         }
         report.put(Report(values).encode())
@@ -132,21 +163,38 @@ def _await_go(brief: PlantBrief, link: Link, hellos: Hellos, stop: Stop) -> None
     )
 
 
-def _serve_until_go(brief: PlantBrief, hub: Hub, link: Link, hellos: Hellos, stop: Stop) -> int:
+def _serve_until_go(
+    brief: PlantBrief, end: DriveEnd, link: Link, hellos: Hellos, stop: Stop
+) -> int:
     """Say hello and serve the buses until the launcher says when tick 0 is."""
     deadline = time.monotonic() + brief.schedule.start_deadline_s
     while time.monotonic() < deadline and not stop.requested:
         hellos.say()
-        hub.serve(0.02)
+        end.serve(0.02)
         while (arrival := link.receive(0.0)) is not None:
-            go = Go.decode(arrival.payload)
+            go = Go.decode(arrival.payload) if arrival.tag == "go" else None
             if go is not None:
-                return go.epoch_ns
+                return monotonic_of(go.epoch_ns)
     if stop.requested:
         return time.monotonic_ns()
     raise InfrastructureError(
         f"plant: not ready after {brief.schedule.start_deadline_s:g} s: no go from the launcher"
     )
+
+
+def _record(
+    link: Link, others: Sequence[Witness], rows: Sequence[RowBuffer], period_s: float, tick: int
+) -> None:
+    """A row of each robot that isn't emulated."""
+    if not others:
+        return
+    while (arrival := link.receive(0.0)) is not None:
+        fix = PoseFix.decode(arrival.payload) if arrival.tag != "go" else None
+        for other in others:
+            if fix is not None and other.robot == arrival.tag:
+                other.take(fix)
+    for other, buffer in zip(others, rows, strict=True):
+        buffer.add(tick, other.row(tick * period_s))
 
 
 def _put_rows(publisher: Publisher, first: int, count: int, rows: bytes, final: bool) -> None:

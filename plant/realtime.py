@@ -12,7 +12,7 @@ cyclically, as always.
 import time
 from collections.abc import Callable, Sequence
 
-from bridge.can_bus.hub import Hub
+from bridge.can_bus.ends import DriveEnd
 from bridge.frame import Frame
 from bridge.link import Publisher
 from bridge.messages import PoseFix, Progress
@@ -45,12 +45,14 @@ class RealtimeLoop:
         self,
         brief: PlantBrief,
         units: Sequence[Unit],
-        hub: Hub,
+        hub: DriveEnd,
         poses: Sequence[Publisher],
         rows: Sequence[RowBuffer],
         report: Callable[[Progress], None],
+        record_others: Callable[[int], None] = lambda _: None,
     ) -> None:
         self._schedule = brief.schedule
+        self._record_others = record_others
         self._zero_ns = brief.schedule.bus_time_ns(0)
         self._hub = hub
         self._report = report
@@ -115,6 +117,8 @@ class RealtimeLoop:
         """What a tick brings, robot by robot; who sends torques meanwhile doesn't wait for all."""
         schedule, tick = self._schedule, self._tick
         bus_ns, t_ns = schedule.bus_time_ns(tick), tick * schedule.period_ns
+        if 0 <= tick < schedule.ticks:
+            self._record_others(tick)
         for bus, lane in self._lanes.items():
             unit = lane.unit
             self._move(lane, bus_ns)

@@ -24,7 +24,8 @@ def imported() -> set[str]:
 
 def test_every_import_is_a_declared_dependency_and_every_dependency_is_imported() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    declared = {text.partition(">")[0] for text in project["dependencies"]}
+    extras = (text for texts in project["optional-dependencies"].values() for text in texts)
+    declared = {text.partition(">")[0] for text in (*project["dependencies"], *extras)}
     distributions = packages_distributions()
     used = {distributions[name][0].lower().replace("_", "-") for name in imported()}
     assert used == declared

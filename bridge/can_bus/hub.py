@@ -175,6 +175,14 @@ class Hub:
         """What went over a bus so far."""
         return self._buses[name].counters
 
+    def troubles(self) -> dict[str, str]:
+        """Buses that failed at times: none of ours does."""
+        return {}
+
+    def fileno(self) -> int:
+        """A descriptor that is readable when there is something to handle."""
+        return self._epoll.fileno()
+
     def close(self, reason: str) -> None:
         """Say goodbye to all clients and close everything. Idempotent."""
         goodbye = wire.encode_text(wire.BYE, reason)

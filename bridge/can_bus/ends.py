@@ -1,0 +1,48 @@
+"""The drives' end of buses, whatever carries them: what the plant in real time needs of it.
+
+`hub.Hub` is the end of our own buses, `attached.AttachedBuses` of any other, `joined.JoinedEnds` of
+both at once.
+"""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from bridge.frame import Frame
+
+
+class Crossed(Protocol):
+    """What went over one bus."""
+
+    from_drives: int
+    from_clients: int
+
+
+class DriveEnd(Protocol):
+    """Where emulated drives hear and speak."""
+
+    def deliver(self, name: str, stamp_ns: int, frames: Sequence[Frame]) -> None:
+        """Send frames of the drives, in order, over a bus at bus time `stamp_ns`."""
+
+    def serve(self, timeout_s: float) -> None:
+        """Handle what happens on the buses; waits at most `timeout_s`."""
+
+    def heard(self) -> list[str]:
+        """Buses with something to take."""
+
+    def take(self, name: str) -> list[Frame]:
+        """What others sent on a bus since the last take, in order."""
+
+    def clients(self) -> int:
+        """How many may be listening."""
+
+    def counters(self, name: str) -> Crossed:
+        """What went over a bus so far."""
+
+    def troubles(self) -> dict[str, str]:
+        """Buses that failed at times, and how."""
+
+    def fileno(self) -> int:
+        """A descriptor that is readable when there is something to handle."""
+
+    def close(self, reason: str) -> None:
+        """Leave all buses. Idempotent."""

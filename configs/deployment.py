@@ -1,0 +1,267 @@
+"""The deployment file as a type: *where* a scenario runs; the default is all of it on this machine.
+
+    roles      what `fleetloop run` starts here; the other roles are started where they belong, by
+               `fleetloop agent` on the robots, and wait for the run
+    network    where the router listens, and as whom those from elsewhere come
+    robot.NAME the robot's CAN bus, verbatim for `can.Bus`, and whether the plant emulates the robot
+
+One file serves all machines of a fleet: secrets are in files that it names. A bus that isn't ours
+has somebody else's clock, so it needs real time.
+"""
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from configs.brief import Settings, TlsFiles
+from configs.complaints import MISSING, complaints, line
+from configs.cross_checks import Problem
+from configs.errors import ScenarioError
+from configs.scenario import Scenario
+from configs.sections import Name, Section
+
+OURS = "fleetloop"
+"""The interface whose buses the plant's process holds itself."""
+PLANT, RECORDER = "plant", "recorder"
+Endpoint = Annotated[str, Field(pattern=r"^(tcp|tls)/.+:\d+$")]
+
+
+def agent_role(robot: str) -> str:
+    """The role of a robot's controller."""
+    return f"agent/{robot}"
+
+
+class BusSection(BaseModel):
+    """Keyword arguments of `can.Bus`, verbatim: whatever the interface takes."""
+
+    model_config = ConfigDict(frozen=True, extra="allow", strict=True)
+
+    interface: Annotated[str, Field(min_length=1)] = OURS
+    channel: Annotated[str | int, Field(union_mode="left_to_right")] | None = Field(
+        None, description="the robot's name if not given"
+    )
+
+
+class RobotSection(Section):
+    """Where one robot is."""
+
+    bus: BusSection = BusSection()
+    emulated: bool | None = Field(
+        None,
+        description="the plant emulates its drives and its body; if not given: on our buses only,"
+        " because on another bus real drives may listen",
+    )
+
+
+class TlsSection(Section):
+    """Mutual TLS: files in PEM; the certificate's common name is the identity."""
+
+    ca: Path = Field(strict=False, description="who signed all certificates")
+    certificate: Path = Field(strict=False, description="this machine's")
+    private_key: Path = Field(strict=False, description="this machine's")
+
+
+class NetworkSection(Section):
+    """How the machines reach each other."""
+
+    endpoint: Endpoint = Field(description="where roles elsewhere reach the router")
+    listen: Endpoint | None = Field(
+        None, description="where the router listens, for example on all addresses; else endpoint"
+    )
+    run: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$")] | None = Field(
+        None, description="the run's name in every key; the scenario's if not given"
+    )
+    users: Path | None = Field(
+        None,
+        strict=False,
+        description="lines identity:password, all of them at the router, its own on a robot",
+    )
+    tls: TlsSection | None = Field(None, description="certificates instead of passwords")
+
+
+class Deployment(Section):
+    """Where the roles, buses and emulated robots of a scenario are."""
+
+    schema_: Literal[1] = Field(1, alias="schema", description="version of this format")
+    description: str = ""
+    roles: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(
+        None, description='"plant", "recorder", "agent/<robot>"; all if not given'
+    )
+    network: NetworkSection | None = None
+    robot: dict[Name, RobotSection] = Field(default_factory=dict)
+
+    def bus_of(self, robot: str) -> Settings:
+        """Keyword arguments of `can.Bus` for a robot's bus, sorted."""
+        bus = self.robot.get(robot, RobotSection()).bus
+        return tuple(sorted({"channel": robot, **bus.model_dump(exclude_none=True)}.items()))
+
+    def is_ours(self, robot: str) -> bool:
+        """Whether the plant holds the robot's bus itself."""
+        return self.robot.get(robot, RobotSection()).bus.interface == OURS
+
+    def emulates(self, robot: str) -> bool:
+        """Whether the plant emulates the robot."""
+        said = self.robot.get(robot, RobotSection()).emulated
+        return self.is_ours(robot) if said is None else said
+
+    def runs_here(self, role: str) -> bool:
+        """Whether `fleetloop run` starts this role."""
+        return self.roles is None or role in self.roles
+
+    def elsewhere(self, scenario: Scenario) -> tuple[str, ...]:
+        """The roles that are started by somebody else."""
+        return tuple(role for role in roles_of(scenario) if not self.runs_here(role))
+
+
+def roles_of(scenario: Scenario) -> tuple[str, ...]:
+    """All roles of a run."""
+    return (PLANT, RECORDER, *(agent_role(robot) for robot in scenario.names))
+
+
+def load_deployment(path: Path, scenario: Scenario) -> Deployment:
+    """Load a deployment file and check it against its scenario; its files are beside it.
+
+    Raises:
+        ScenarioError: it can't be read, or all that is wrong with it, a line each.
+    """
+    try:
+        data = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ScenarioError(f"{path}: can't be read: {reason}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{path}: not a TOML file: {error}") from error
+    return check_deployment(str(path), data, scenario, path.parent)
+
+
+def check_deployment(
+    name: str, data: dict[str, Any], scenario: Scenario, folder: Path
+) -> Deployment:
+    """A deployment from parsed TOML; `name` stands for the file in messages.
+
+    Raises:
+        ScenarioError: all that is wrong with it, a line each.
+    """
+    try:
+        deployment = Deployment.model_validate(data)
+    except ValidationError as error:
+        problems = complaints(error, data, Deployment)
+        raise ScenarioError("\n".join(dict.fromkeys(line(name, p) for p in problems))) from error
+    if found := _problems(deployment, scenario):
+        raise ScenarioError("\n".join(line(name, problem) for problem in found))
+    return _beside(deployment, folder)
+
+
+def tls_files(network: NetworkSection) -> TlsFiles | None:
+    """The files of mutual TLS, None if identities are proven by passwords."""
+    tls = network.tls
+    if tls is None:
+        return None
+    return TlsFiles(str(tls.ca), str(tls.certificate), str(tls.private_key))
+
+
+def passwords(network: NetworkSection | None, identities: tuple[str, ...]) -> dict[str, str]:
+    """The passwords of these identities from the deployment's file.
+
+    With TLS the certificate proves who somebody is, and the password is just the name again.
+
+    Raises:
+        ScenarioError: the file can't be read, is readable by others, or lacks somebody.
+    """
+    if network is None or not identities:
+        return {}
+    if network.tls is not None:
+        return {identity: identity for identity in identities}
+    path = network.users
+    if path is None:
+        raise ScenarioError(
+            "network.users = (missing): name a file with a line identity:password for each of"
+            f" {', '.join(identities)}, or give network.tls"
+        )
+    try:
+        text = path.read_text("utf-8")
+        mode = path.stat().st_mode
+    except OSError as error:
+        raise ScenarioError(f"network.users = {path}: {error.strerror}") from error
+    if mode & 0o077:
+        raise ScenarioError(f"network.users = {path}: others may read it; chmod 600 {path}")
+    known = dict(row.strip().split(":", 1) for row in text.splitlines() if ":" in row)
+    if absent := [identity for identity in identities if not known.get(identity)]:
+        raise ScenarioError(f"network.users = {path}: no line {absent[0]}:<password>")
+    return {identity: known[identity] for identity in identities}
+
+
+# --- check ----------------------------------------------------------------------------------------
+
+
+def _problems(deployment: Deployment, scenario: Scenario) -> list[Problem]:
+    roles = roles_of(scenario)
+    problems = [
+        Problem("roles", role, f"no such role; known: {', '.join(roles)}")
+        for role in deployment.roles or ()
+        if role not in roles
+    ]
+    if not deployment.runs_here(RECORDER):
+        right = "must name recorder: the record is written where `fleetloop run` is"
+        problems.append(Problem("roles", list(deployment.roles or ()), right))
+    if deployment.elsewhere(scenario) and deployment.network is None:
+        right = f"must be given: {', '.join(deployment.elsewhere(scenario))} come from elsewhere"
+        problems.append(Problem("network", MISSING, right))
+    realtime = scenario.clock.mode == "realtime"
+    if deployment.roles is not None and deployment.elsewhere(scenario) and not realtime:
+        right = 'roles elsewhere need clock.mode = "realtime"; add --clock realtime'
+        problems.append(Problem("roles", list(deployment.roles), right))
+    places: dict[tuple[object, object], str] = {}
+    for robot, section in deployment.robot.items():
+        key = f"robot.{robot}"
+        if robot not in scenario.names:
+            right = f"no such robot; known: {', '.join(scenario.names)}"
+            problems.append(Problem(key, robot, right))
+            continue
+        problems += _bus_problems(key, section, realtime=realtime)
+        bus = section.bus
+        other = places.setdefault((bus.interface, bus.channel or robot), robot)
+        if other != robot:
+            right = f"{other} is there with the same node ids; give each robot a bus of its own"
+            problems.append(Problem(f"{key}.bus.channel", bus.channel, right))
+    return problems
+
+
+def _bus_problems(key: str, section: RobotSection, *, realtime: bool) -> list[Problem]:
+    bus = section.bus
+    problems = [
+        Problem(f"{key}.bus.{name}", value, "must be a text, a number, true or false")
+        for name, value in (bus.model_extra or {}).items()
+        if not isinstance(value, str | int | float | bool)
+    ]
+    if bus.interface != OURS:
+        if bus.channel is None:
+            right = f"must be given: what the interface {bus.interface} opens"
+            problems.append(Problem(f"{key}.bus.channel", MISSING, right))
+        if not realtime:
+            right = (
+                'in lockstep the plant holds the bus: "fleetloop"; or run with --clock realtime'
+                " at a rate and with gains for it"
+            )
+            problems.append(Problem(f"{key}.bus.interface", bus.interface, right))
+    elif section.emulated is False:
+        right = "a bus of the interface fleetloop has emulated drives; name another interface"
+        problems.append(Problem(f"{key}.emulated", False, right))
+    return problems
+
+
+def _beside(deployment: Deployment, folder: Path) -> Deployment:
+    """The same with the files that it names found from its own folder."""
+    network = deployment.network
+    if network is None:
+        return deployment
+    changes: dict[str, Any] = {}
+    if network.users is not None:
+        changes["users"] = folder / network.users.expanduser()
+    if network.tls is not None:
+        tls = network.tls
+        files = {key: folder / getattr(tls, key).expanduser() for key in TlsSection.model_fields}
+        changes["tls"] = tls.model_copy(update=files)
+    return deployment.model_copy(update={"network": network.model_copy(update=changes)})

@@ -1,0 +1,74 @@
+"""Scenario and deployment → what each role is told of its place: buses, network, credentials."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from bridge import access
+from configs.brief import NetworkLink, Outside, PlantBrief, Settings
+from configs.deployment import Deployment, passwords, tls_files
+from configs.errors import ScenarioError
+from configs.scenario import Scenario
+
+
+def robots_of_plant(brief: PlantBrief, deployment: Deployment) -> PlantBrief:
+    """The plant's brief with the robots that it emulates, and the others as it sees them."""
+    emulated = tuple(r for r in brief.robots if deployment.emulates(r.robot))
+    attached = tuple(
+        (r.bus, deployment.bus_of(r.robot)) for r in emulated if not deployment.is_ours(r.robot)
+    )
+    witnessed = tuple((r.robot, r.pose) for r in brief.robots if r not in emulated)
+    return replace(brief, robots=emulated, attached=attached, witnessed=witnessed)
+
+
+def agent_bus(deployment: Deployment, robot: str, *, pace: str, socket: str = "") -> Settings:
+    """Keyword arguments of `can.Bus` for a controller; `socket`: where its bus of ours is."""
+    settings = deployment.bus_of(robot)
+    if not deployment.is_ours(robot):
+        return settings
+    ours = dict(settings) | {pace: True}
+    if socket:
+        ours["channel"] = socket
+    return tuple(sorted(ours.items()))
+
+
+def run_name(scenario: Scenario, deployment: Deployment) -> str | None:
+    """The run's name in every key if machines had to agree on one."""
+    network = deployment.network
+    return None if network is None else network.run or scenario.name
+
+
+def outside(deployment: Deployment) -> Outside | None:
+    """Where the router listens for those on other machines."""
+    network = deployment.network
+    if network is None:
+        return None
+    return Outside(network.listen or network.endpoint, tls_files(network))
+
+
+def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
+    """Passwords of those who come from elsewhere, by identity.
+
+    Raises:
+        ScenarioError: the deployment's credentials lack one of them.
+    """
+    identities = [access.user_of(role) for role in deployment.elsewhere(scenario)]
+    if any(not deployment.emulates(robot) for robot in scenario.names):
+        identities.append(access.LOCALISATION)
+    return passwords(deployment.network, tuple(identities))
+
+
+def network_link(scenario: Scenario, deployment: Deployment, role: str) -> NetworkLink:
+    """How a role that is started by itself reaches the router.
+
+    Raises:
+        ScenarioError: the deployment has no network, or no credentials for the role.
+    """
+    network = deployment.network
+    if network is None:
+        raise ScenarioError(
+            f"{role} on its own needs a deployment with [network] endpoint: where its router is"
+        )
+    user = access.user_of(role)
+    (password,) = passwords(network, (user,)).values()
+    run = network.run or scenario.name
+    return NetworkLink(run, network.endpoint, user, password, tls_files(network))

@@ -1,0 +1,30 @@
+"""A robot that the plant doesn't emulate: what the localisation system says of it is its truth.
+
+Its rows in the record have the pose that was said last, and no number for what nobody measures.
+"""
+
+from math import nan
+
+from bridge.messages import PoseFix
+from bridge.telemetry import PLANT_SIGNALS
+from configs.brief import Pose
+
+_UNKNOWN = (nan,) * (len(PLANT_SIGNALS) - 4)
+
+
+class Witness:
+    """What is known of one real robot."""
+
+    __slots__ = ("_pose", "robot")
+
+    def __init__(self, robot: str, start: Pose) -> None:
+        self.robot = robot
+        self._pose = start.x_m, start.y_m, start.theta_rad
+
+    def take(self, fix: PoseFix) -> None:
+        """Take what the localisation system says."""
+        self._pose = fix.x_m, fix.y_m, fix.theta_rad
+
+    def row(self, t_s: float) -> tuple[float, ...]:
+        """The signals of `bridge.telemetry.PLANT_SIGNALS` at this instant."""
+        return (t_s, *self._pose, *_UNKNOWN)
