@@ -73,7 +73,7 @@ def frame_bits(frame: Frame) -> int:
 def stuffed_bits(frame: Frame) -> str:
     """A frame as it is on the wire, "0" dominant, from its start through the last bit of its CRC.
 
-    Stuff bits are in. For the rare case that one bit decides; `frame_bits` is the fast way to count.
+    Stuff bits are in. For the rare case that one bit decides; to count, `frame_bits` is faster.
     """
     head, size, data = _fields(frame)
     content = head << 8 * len(data) | int.from_bytes(data, "big")
@@ -96,7 +96,7 @@ def stuffed_bits(frame: Frame) -> str:
 def arbitration_key(can_id: int) -> int:
     """The arbitration field as a number: whose is lower wins the bus.
 
-    bits 31..21 identifier or its base, 20 RTR or SRR, 19 IDE, 18..1 extension, 0 RTR of 29-bit
+    From bit 31: identifier or base (11), RTR or SRR, IDE, and of 29-bit ones extension (18), RTR.
     """
     if can_id <= ID_MASK_11:
         return can_id << 21
@@ -132,7 +132,7 @@ def _crc_of(byte: int) -> int:
 
 
 def _stuffed(last: int, run: int, byte: int) -> tuple[int, int]:
-    """The state after a byte and how many stuff bits it brought; a state is 256 (4 last + run − 1)."""
+    """State 256 (4 last + run − 1) after a byte, and how many stuff bits the byte brought."""
     stuffed = 0
     for n in range(7, -1, -1):
         bit = byte >> n & 1

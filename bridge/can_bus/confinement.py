@@ -1,12 +1,12 @@
 """Fault confinement of one CAN node, by ISO 11898-1: two counters and what follows from them.
 
-    event                                                                     counter
-    a frame sent                                                              TEC − 1, not below 0
-    a sent frame destroyed, or not acknowledged                               TEC + 8
-    the same for want of an acknowledgement only, while error passive         TEC as it is
-    a frame received                                                          REC − 1; 120 from above 127
-    a frame seen destroyed                                                    REC + 1
-    as above, and the first to say so                                         REC + 8 more
+    event                                                                 counter
+    a frame sent                                                          TEC − 1, not below 0
+    a sent frame destroyed, or not acknowledged                           TEC + 8
+    the same for want of an acknowledgement only, while error passive     TEC as it is
+    a frame received                                                      REC − 1; 120 if above 127
+    a frame seen destroyed                                                REC + 1
+    as above, and the first to say so                                     REC + 8 more
 
     state           when                           what the node may do
     ERROR_ACTIVE    both below 96                  everything; its error flag destroys a bad frame

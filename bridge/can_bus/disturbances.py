@@ -60,18 +60,23 @@ class Disturbances:
     def __bool__(self) -> bool:
         return bool(self._left)
 
-    def strike(self, sender: str, frame: Frame, *, on_wire: bool) -> Disturbance | None:
-        """What happens to this frame, if anything; it is then one less to come."""
-        for n, (disturbance, left) in enumerate(self._left):
+    def match(self, sender: str, frame: Frame, *, on_wire: bool) -> Disturbance | None:
+        """What would happen to this frame, if anything."""
+        for disturbance, _ in self._left:
             if (
                 (disturbance.kind is Kind.CORRUPT) is on_wire
                 and disturbance.can_id in (None, frame.can_id)
                 and disturbance.node in (None, sender)
             ):
-                if left is not None:
-                    if left == 1:
-                        del self._left[n]
-                    else:
-                        self._left[n] = (disturbance, left - 1)
                 return disturbance
         return None
+
+    def struck(self, disturbance: Disturbance) -> None:
+        """It happened: once less to come."""
+        for n, (other, left) in enumerate(self._left):
+            if other is disturbance:
+                if left == 1:
+                    del self._left[n]
+                elif left is not None:
+                    self._left[n] = (disturbance, left - 1)
+                return

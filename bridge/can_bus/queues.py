@@ -7,16 +7,16 @@
                 three                identifier             millisecond later with newer data
     Endless     a babbling idiot     always the same frame  never
 
-Nothing pending is ever replaced by something newer: ODrive's firmware 0.5.6 looks for a free mailbox
-and else reports that it didn't send (`ODriveCAN::send_message`), and its mailboxes compete by
-identifier (`TransmitFifoPriority = DISABLE`). Of equal identifiers the older one goes first. The
+Nothing pending is ever replaced by something newer: ODrive's firmware 0.5.6 looks for a free
+mailbox and else reports that it didn't send (`ODriveCAN::send_message`), and its mailboxes compete
+by identifier (`TransmitFifoPriority = DISABLE`). Of equal identifiers the older one goes first. The
 frame that is on the wire keeps its place until it was sent, for it may have to be sent again.
 """
 
 from bisect import insort
-from collections import deque
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
+from bridge.can_bus.bits import arbitration_key, frame_bits
 from bridge.frame import Frame
 
 HOST_QUEUE = 10
@@ -30,133 +30,89 @@ class Entry(NamedTuple):
     key: int  # of arbitration, see `bits.arbitration_key`
     number: int  # in order of submission, unique on the wire
     frame: Frame
+    bits: int  # on the wire, see `bits.frame_bits`
 
 
-class Queue(Protocol):
-    """A transmit queue."""
+class Queue:
+    """A transmit queue; `entries` are in the order in which they go to arbitration."""
 
-    def __len__(self) -> int: ...
+    __slots__ = ("capacity", "entries")
 
-    def room(self) -> bool:
-        """Whether one more frame can wait."""
+    def __init__(self, capacity: int) -> None:
+        if capacity < 1:
+            raise ValueError(f"a transmit queue for {capacity} frames: it takes 1 or more")
+        self.capacity = capacity
+        self.entries: list[Entry] = []
 
-    def push(self, entry: Entry) -> None:
-        """Take a frame; there is room."""
+    def push(self, entry: Entry) -> bool:
+        """Take a frame, or return False: no room."""
+        raise NotImplementedError
 
-    def head(self) -> Entry:
-        """What goes to arbitration; the queue isn't empty."""
-
-    def remove(self, entry: Entry) -> None:
+    def sent(self, entry: Entry) -> None:
         """Forget a frame that was sent."""
+        self.entries.remove(entry)
 
     def clear(self) -> int:
-        """Forget all; return how many."""
+        """Forget all; return how many frames that were submitted are lost."""
+        count = len(self.entries)
+        self.entries.clear()
+        return count
 
 
-class Fifo:
-    """First in, first out: a high-priority frame waits behind the others of its own node."""
+class Fifo(Queue):
+    """First in, first out: an urgent frame waits behind the others of its own node."""
 
-    __slots__ = ("_capacity", "_entries")
+    __slots__ = ()
 
     def __init__(self, capacity: int = HOST_QUEUE) -> None:
-        if capacity < 1:
-            raise ValueError(f"a transmit queue of {capacity} frames: it needs 1 or more")
-        self._capacity = capacity
-        self._entries: deque[Entry] = deque()
+        super().__init__(capacity)
 
-    def __len__(self) -> int:
-        return len(self._entries)
-
-    def room(self) -> bool:
-        """Whether one more frame can wait."""
-        return len(self._entries) < self._capacity
-
-    def push(self, entry: Entry) -> None:
-        """Take a frame."""
-        self._entries.append(entry)
-
-    def head(self) -> Entry:
-        """The oldest."""
-        return self._entries[0]
-
-    def remove(self, entry: Entry) -> None:
-        """Forget the oldest, which was sent."""
-        self._entries.popleft()
-
-    def clear(self) -> int:
-        """Forget all; return how many."""
-        count = len(self._entries)
-        self._entries.clear()
-        return count
+    def push(self, entry: Entry) -> bool:
+        """Take a frame, or return False: no room."""
+        entries = self.entries
+        if len(entries) >= self.capacity:
+            return False
+        entries.append(entry)
+        return True
 
 
-class Mailboxes:
+class Mailboxes(Queue):
     """A controller's transmit mailboxes: the lowest identifier goes first."""
 
-    __slots__ = ("_capacity", "_entries")
+    __slots__ = ()
 
     def __init__(self, capacity: int = DRIVE_MAILBOXES) -> None:
-        if capacity < 1:
-            raise ValueError(f"{capacity} transmit mailboxes: a controller needs 1 or more")
-        self._capacity = capacity
-        self._entries: list[Entry] = []
+        super().__init__(capacity)
 
-    def __len__(self) -> int:
-        return len(self._entries)
-
-    def room(self) -> bool:
-        """Whether a mailbox is free."""
-        return len(self._entries) < self._capacity
-
-    def push(self, entry: Entry) -> None:
-        """Take a frame into a free mailbox."""
-        insort(self._entries, entry)
-
-    def head(self) -> Entry:
-        """The lowest identifier."""
-        return self._entries[0]
-
-    def remove(self, entry: Entry) -> None:
-        """Free the mailbox of a frame that was sent."""
-        self._entries.remove(entry)
-
-    def clear(self) -> int:
-        """Free all; return how many were taken."""
-        count = len(self._entries)
-        self._entries.clear()
-        return count
+    def push(self, entry: Entry) -> bool:
+        """Take a frame into a free mailbox, or return False: there is none."""
+        entries = self.entries
+        if len(entries) >= self.capacity:
+            return False
+        insort(entries, entry)
+        return True
 
 
-class Endless:
+class Endless(Queue):
     """A babbling idiot: sends one frame again and again, as fast as the bus lets it."""
 
-    __slots__ = ("_entry", "_on")
+    __slots__ = ()
 
-    def __init__(self, key: int, frame: Frame) -> None:
-        self._entry = Entry(key, -1, frame)
-        self._on = True
+    def __init__(self, frame: Frame) -> None:
+        super().__init__(1)
+        self.entries.append(Entry(arbitration_key(frame.can_id), -1, frame, frame_bits(frame)))
 
-    def __len__(self) -> int:
-        return int(self._on)
-
-    def room(self) -> bool:
-        """Never: it says one thing only."""
+    def push(self, entry: Entry) -> bool:
+        """No: it says one thing only."""
+        del entry
         return False
 
-    def push(self, entry: Entry) -> None:
-        """Not called: there is no room."""
-        raise ValueError("a babbling node takes no frames")
-
-    def head(self) -> Entry:
-        """Always the same."""
-        return self._entry
-
-    def remove(self, entry: Entry) -> None:
+    def sent(self, entry: Entry) -> None:
         """It goes on."""
 
     def clear(self) -> int:
         """Stop for good; nothing that was submitted is lost."""
-        self._on = False
+        self.entries.clear()
         return 0
 
 
