@@ -5,30 +5,89 @@ the same bytes, so a run over processes must leave the same record, bit for bit.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 from agents.agent import Agent
+from agents.bus_clock import BusClock
+from bridge.can_bus.hub import Said
+from bridge.frame import Frame
 from bridge.messages import LeaderSpeed, PathState, PoseFix, Progress
 from bridge.process import Stop, settled_memory
 from bridge.telemetry import AGENT_ROW, PLANT_ROW, RowBuffer
 from configs.brief import AgentBrief, LeaderBrief, PlantBrief
 from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.writer import Source
-from plant.unit import Unit
+from plant.buses import Ask
+from plant.emulation import Emulation, emulations
+from plant.unit import Unit, unit_of
+from plant.wire_bus import WireBus
 
 PROGRESS_EVERY_TICKS = 256
 
 
 @dataclass(slots=True)
-class _Lane:
-    """One robot: its body and drives, its controller, its rows."""
+class _Mind:
+    """A controller and its clock."""
 
-    unit: Unit
     agent: Agent
-    truth: RowBuffer
-    frames: int = 0
+    clock: BusClock
+
+    @classmethod
+    def of(cls, agent: Agent) -> "_Mind":
+        """A controller before its first tick."""
+        return cls(agent, BusClock(agent.brief.schedule, agent.heard_since))
+
+
+class _Lane:
+    """One bus with the controllers of its robots."""
+
+    __slots__ = ("bus", "frames", "minds", "name", "steps", "wired")
+
+    def __init__(self, name: str, bus: Emulation, minds: Mapping[str, _Mind]) -> None:
+        self.name = name
+        self.bus = bus
+        self.wired = bus if isinstance(bus, WireBus) else None
+        self.minds = {unit.brief.robot: minds[unit.brief.robot] for unit in bus.units}
+        self.steps = bus.steps()
+        self.frames = 0
+
+    def tick(self) -> None:
+        """One tick of the bus."""
+        steps = self.steps
+        ask = next(steps)
+        while ask is not None:
+            ask = steps.send(self._answer(ask))
+
+    def _answer(self, ask: Ask) -> Sequence[Frame] | Sequence[Said]:
+        if self.wired is not None:
+            self.frames += len(ask.passed)
+            heard = [(end_ns, frame) for end_ns, frame, key in ask.passed if key != ask.asked]
+            said = _think(self.minds[ask.asked], heard)
+            room = self.wired.room(ask.asked)
+            return [Said(ask.asked, frame) for frame in said[:room]]
+        stamp_ns, frames = ask.stamp_ns, ask.frames
+        answers: list[Frame] = []
+        for mind in self.minds.values():
+            answers += _think(mind, [(stamp_ns, frame) for frame in frames])
+        self.frames += len(frames) + len(answers)
+        return answers
+
+
+def _think(mind: _Mind, heard: Sequence[tuple[int, Frame]]) -> list[Frame]:
+    """What a controller says to frames that it hears; to none at all: a tick has passed."""
+    agent, clock = mind.agent, mind.clock
+    said: list[Frame] = []
+    hear, due = agent.hear, clock.due
+    for at_ns, (can_id, data) in heard:
+        hear(can_id, data, at_ns)
+        tick = due(at_ns)
+        if tick is not None:
+            said += agent.step(tick)
+    if not heard:
+        said += agent.step(clock.passed())
+    return said
 
 
 class InProcessRun:
@@ -42,9 +101,8 @@ class InProcessRun:
         writer: BackgroundWriter,
         on_progress: Callable[[Progress], None],
     ) -> None:
-        self._brief = plant
         self._schedule = plant.schedule
-        self._units = [Unit(robot) for robot in plant.robots]
+        self._units = [unit_of(robot) for robot in plant.robots]
         self._truths = [
             RowBuffer(PLANT_ROW, partial(_write, writer, unit.brief.robot, "plant"))
             for unit in self._units
@@ -61,11 +119,14 @@ class InProcessRun:
             for brief in agents
         }
         self._on_progress = on_progress
-        self._period_s = plant.schedule.period_s
-        self._lanes = [
-            _Lane(unit, agent, truth)
-            for unit, agent, truth in zip(self._units, self._agents, self._truths, strict=True)
-        ]
+        ends = dict(zip(self._units, zip(self._agents, self._truths, strict=True), strict=True))
+
+        def begin(group: Sequence[Unit]) -> Callable[[int], None]:
+            return partial(self._begin, [(unit, *ends[unit]) for unit in group])
+
+        minds = {agent.brief.robot: _Mind.of(agent) for agent in self._agents}
+        buses = emulations(plant, self._units, begin)
+        self._lanes = [_Lane(name, bus, minds) for name, bus in buses.items()]
         for agent in self._agents:
             if agent.brief.hears_leader:
                 agent.take_leader(LeaderSpeed(leader.speed_steps))
@@ -75,7 +136,7 @@ class InProcessRun:
     @property
     def frames(self) -> dict[str, int]:
         """Frames that would have crossed each bus."""
-        return {lane.unit.brief.bus: lane.frames for lane in self._lanes}
+        return {lane.name: lane.frames for lane in self._lanes}
 
     @property
     def stopped_robots(self) -> dict[str, str]:
@@ -89,7 +150,8 @@ class InProcessRun:
     def run(self, stop: Stop) -> None:
         """Run from the first tick of the countdown to the closing tick, or until told to stop."""
         self._exchange_paths(-1)
-        self._localise(-1)
+        for unit, agent in zip(self._units, self._agents, strict=True):
+            _localise(unit, agent, -1, 0)
         with settled_memory():
             self._run(stop)
         for rows in (*self._truths, *self._telemetry):
@@ -111,37 +173,21 @@ class InProcessRun:
         self.wall_s = (time.monotonic_ns() - start_ns) * 1e-9
 
     def _tick(self, tick: int) -> None:
-        """One tick of all robots, one after the other: within a tick they don't meet."""
-        schedule, period_s, substeps = self._schedule, self._period_s, self._brief.substeps
-        bus_ns = schedule.bus_time_ns(tick)
-        t_s = tick * schedule.period_ns * 1e-9
-        if schedule.localises(tick):
-            self._localise(tick)
-        if schedule.shares(tick):
+        """One tick of all buses, one after the other: within a tick they don't meet."""
+        if self._schedule.shares(tick):
             self._exchange_paths(tick)
-        recorded = 0 <= tick < schedule.ticks
         for lane in self._lanes:
-            unit, agent, truth = lane.unit, lane.agent, lane.truth
-            frames = unit.frames_due(bus_ns)
-            hear = agent.hear
-            for can_id, data in frames:
-                hear(can_id, data, bus_ns)
-            answers = agent.step(tick)
-            lane.frames += len(frames) + len(answers)
-            for frame in answers:
-                for reply in unit.hear(frame, bus_ns):
-                    hear(*reply, bus_ns)
-            if recorded:
-                truth.add(tick, unit.row(t_s))
-                unit.advance(t_s, period_s, substeps)
+            lane.tick()
 
-    def _localise(self, tick: int) -> None:
-        t_ns = max(tick, 0) * self._schedule.period_ns
-        for unit, agent in zip(self._units, self._agents, strict=True):
-            x, y, theta, *_ = unit.state
-            fix = PoseFix.decode(PoseFix(tick, t_ns, x, y, theta).encode())
-            if fix is not None:
-                agent.take_pose(fix)
+    def _begin(self, group: Sequence[tuple[Unit, Agent, RowBuffer]], tick: int) -> None:
+        """As a plant's process does when a tick begins on a bus."""
+        schedule = self._schedule
+        t_ns = tick * schedule.period_ns
+        for unit, agent, truth in group:
+            if 0 <= tick < schedule.ticks:
+                truth.add(tick, unit.row(t_ns * 1e-9))
+            if schedule.localises(tick):
+                _localise(unit, agent, tick, t_ns)
 
     def _exchange_paths(self, tick: int) -> None:
         for agent in self._agents:
@@ -150,6 +196,13 @@ class InProcessRun:
             if state is not None:
                 for hearer in self._hearers[robot]:
                     hearer.take_path(robot, state)
+
+
+def _localise(unit: Unit, agent: Agent, tick: int, t_ns: int) -> None:
+    x, y, theta, *_ = unit.state
+    fix = PoseFix.decode(PoseFix(tick, t_ns, x, y, theta).encode())
+    if fix is not None:
+        agent.take_pose(fix)
 
 
 def _write(

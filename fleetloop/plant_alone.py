@@ -32,7 +32,7 @@ from fleetloop.signals import stop_on_signals
 from fleetloop.terminal import note, say
 from plant.__main__ import PLANT_PRIORITY, join
 from plant.realtime import RealtimeLoop
-from plant.unit import Unit
+from plant.unit import Unit, unit_of
 
 FOREVER_TICKS = 1 << 53
 GO_AHEAD_NS = 1_000_000
@@ -120,7 +120,7 @@ def _buses(brief: PlantBrief, folder: Path) -> dict[str, Settings]:
 def _run(
     brief: PlantBrief, end: DriveEnd, buses: dict[str, Settings], options: Options, stop: Stop
 ) -> None:
-    units = [Unit(robot) for robot in brief.robots]
+    units = [unit_of(robot) for robot in brief.robots]
     nowhere = _Nowhere()
     rows = [RowBuffer(PLANT_ROW, lambda *_: None) for _ in units]
     loop = RealtimeLoop(brief, units, end, [nowhere] * len(units), rows, nowhere.put)

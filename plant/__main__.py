@@ -28,7 +28,7 @@ from configs.brief import PlantBrief, Settings
 from configs.errors import FleetloopError, InfrastructureError
 from plant.loop import Counters, LockstepLoop, bus_frames
 from plant.realtime import RealtimeLoop
-from plant.unit import Unit
+from plant.unit import Unit, unit_of
 from plant.witness import Witness
 
 PLANT_PRIORITY = 45
@@ -75,7 +75,7 @@ def join(hub: Hub, attached: Sequence[tuple[str, Settings]]) -> DriveEnd:
 
 def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> Counters:
     name = brief.network.run
-    units = [Unit(robot) for robot in brief.robots]
+    units = [unit_of(robot) for robot in brief.robots]
     others = [Witness(robot, start) for robot, start in brief.witnessed]
     # In real time all poses are of one instant: they travel together.
     express = not brief.schedule.realtime

@@ -22,9 +22,6 @@ class DriveClient(Protocol):
     def hear(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         """Take any frame from the bus."""
 
-    def complete(self, now_ns: int) -> bool:
-        """Whether both wheels' encoder frames of this instant are here."""
-
     def heard_since(self, bus_ns: int) -> bool:
         """Whether both wheels' encoder frames came after this bus time."""
 

@@ -73,7 +73,7 @@ class OdriveNode:
         self._position = revolutions + self._offset
         self._velocity = rev_s
 
-    def torque_demand(self) -> float:
+    def torque_demand(self, dt_s: float = 0.0) -> float:  # noqa: ARG002
         """Torque that the drive asks of its motor now [N·m]; always finite."""
         if self.state is not AxisState.CLOSED_LOOP_CONTROL:
             return 0.0
