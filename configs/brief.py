@@ -314,6 +314,17 @@ class DriveModel:
 
 
 @dataclass(frozen=True, slots=True)
+class WireModel:
+    """How a bus is emulated that has a bit rate: see `bridge.can_bus.wire`."""
+
+    bitrate_bit_s: int
+    txqueuelen: int  # frames in a host's transmit queue
+    tx_mailboxes: int  # frames in a drive's controller
+    restart_ns: int | None  # a host starts to recover from bus-off this much later; None: never
+    drive_restart_ns: int | None
+
+
+@dataclass(frozen=True, slots=True)
 class RobotBrief:
     """One robot as the plant sees it."""
 
@@ -338,7 +349,7 @@ class PlantBrief:
     substeps: int  # RK4 steps per control period
     speed: float  # real-time factor that the run is held to; 0: as fast as possible
     seed: int
-    bitrate_bit_s: int
+    wire: WireModel | None  # of every bus; None: ideal, frames take no time
     runtime_folder: str  # holds the buses' sockets; removed when the run ends
     network: NetworkLink
     listeners: tuple[tuple[str, int], ...] = ()  # bus, inherited file descriptor of its socket

@@ -26,6 +26,7 @@ from configs.brief import (
     StructureOffset,
     VaryingOffset,
     Wheels,
+    WireModel,
     WorldOffset,
 )
 from configs.scenario import Scenario
@@ -117,14 +118,33 @@ def plant_brief(
     """What the plant is told."""
     ticks = schedule(scenario, speed, profile=profile)
     return PlantBrief(
-        robots=tuple(_robot(scenario, n, robot) for n, robot in enumerate(scenario.robot, 1)),
+        robots=robot_briefs(scenario),
         schedule=ticks,
         substeps=max(1, -(-ticks.period_ns // round(scenario.clock.plant_step_s * 1e9))),
         speed=speed,
         seed=scenario.seed,
-        bitrate_bit_s=scenario.bus.bitrate_bit_s,
+        wire=wire_model(scenario),
         runtime_folder=runtime_folder,
         network=network,
+    )
+
+
+def robot_briefs(scenario: Scenario) -> tuple[RobotBrief, ...]:
+    """All robots as the plant sees them."""
+    return tuple(_robot(scenario, n, robot) for n, robot in enumerate(scenario.robot, 1))
+
+
+def wire_model(scenario: Scenario) -> WireModel | None:
+    """How the buses are emulated; None: frames take no time."""
+    bus = scenario.bus
+    if bus.timing == "ideal":
+        return None
+    return WireModel(
+        bitrate_bit_s=bus.bitrate_bit_s,
+        txqueuelen=bus.txqueuelen,
+        tx_mailboxes=bus.tx_mailboxes,
+        restart_ns=None if bus.restart_s is None else round(bus.restart_s * 1e9),
+        drive_restart_ns=None if bus.drive_restart_s is None else round(bus.drive_restart_s * 1e9),
     )
 
 

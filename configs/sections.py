@@ -261,7 +261,24 @@ class Bus(Section):
 
     interface: Literal["fleetloop"] = "fleetloop"
     bitrate_bit_s: Annotated[int, Field(ge=10_000, le=1_000_000)] = 1_000_000
-    timing: Literal["ideal"] = Field("ideal", description="frames take no time")
+    timing: Literal["ideal", "wire"] = Field(
+        "ideal", description="ideal: frames take no time; wire: bit rate, arbitration and errors"
+    )
+    txqueuelen: Annotated[int, Field(ge=1, le=1000)] = Field(
+        10, description="frames that wait at a host before a send fails, as SocketCAN's"
+    )
+    tx_mailboxes: Annotated[int, Field(ge=1, le=32)] = Field(
+        3, description="frames that wait in a drive's controller"
+    )
+    restart_s: NotNegative | None = Field(
+        None, description="a host recovers from bus-off this much later; never if not given"
+    )
+    drive_restart_s: NotNegative | None = Field(
+        None, description="the same of a drive; as in the field, never if not given"
+    )
+    load_ceiling: Annotated[float, Field(gt=0, le=1)] = Field(
+        0.7, description="worst-case load above which a bus on a wire is refused"
+    )
 
 
 class Drive(Section):

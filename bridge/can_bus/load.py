@@ -18,6 +18,7 @@ schedulable if its R is no more than its period. Above a load of 1 there is no b
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 
 from bridge.can_bus.bits import arbitration_key, most_bits
 from bridge.frame import EFF, RTR
@@ -48,11 +49,17 @@ class Response:
     can_id: int
     period_ns: int
     response_ns: int | None  # None: no bound, the bus is overloaded
+    usual_ns: int | None  # the same with all frames of mean length
 
     @property
     def schedulable(self) -> bool:
         """Whether it is always sent before it is due again."""
         return self.response_ns is not None and self.response_ns <= self.period_ns
+
+    @property
+    def usually_schedulable(self) -> bool:
+        """The same for frames of mean length, still all due at once."""
+        return self.usual_ns is not None and self.usual_ns <= self.period_ns
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,14 +95,18 @@ def analyse(messages: Sequence[Message], bitrate_bit_s: int) -> Analysis:
         raise ValueError("no messages: nothing to analyse")
     costs = [_span(message.worst_bits, bitrate_bit_s) for message in ranked]
     periods = [message.period_ns for message in ranked]
-    means = [message.mean_bits or message.worst_bits for message in ranked]
+    usual = [_span(message.mean_bits or message.worst_bits, bitrate_bit_s) for message in ranked]
     tau = _span(1, bitrate_bit_s)
-    rate = _SECOND_NS / bitrate_bit_s
     return Analysis(
-        sum(bits * rate / period for bits, period in zip(means, periods, strict=True)),
+        sum(cost / period for cost, period in zip(usual, periods, strict=True)),
         sum(cost / period for cost, period in zip(costs, periods, strict=True)),
         tuple(
-            Response(message.can_id, message.period_ns, _response(n, costs, periods, tau))
+            Response(
+                message.can_id,
+                message.period_ns,
+                _response(n, costs, periods, tau),
+                _response(n, usual, periods, tau),
+            )
             for n, message in enumerate(ranked)
         ),
     )
@@ -129,5 +140,5 @@ def _tightness(message: Response) -> float:
     return message.response_ns / message.period_ns
 
 
-def _span(bits: int, bitrate_bit_s: int) -> int:
-    return -(-bits * _SECOND_NS // bitrate_bit_s)
+def _span(bits: float, bitrate_bit_s: int) -> int:
+    return ceil(bits * _SECOND_NS / bitrate_bit_s)

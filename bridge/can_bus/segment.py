@@ -84,13 +84,11 @@ class Segment:
     def move(self, node: Node, to: "Segment", at_ns: int) -> None:
         """Take a node to another segment; if it is sending, at the end of its frame."""
         self._moves = [move for move in self._moves if move[0] is not node]
-        if to is self:
-            return
-        if self.is_sending(node, at_ns):
+        if self.is_sending(node, at_ns) and to is not self:
             self._moves.append((node, to))
-            return
-        self.leave(node, at_ns)
-        to.join(node, at_ns)
+        elif to is not self:
+            self.leave(node, at_ns)
+            to.join(node, at_ns)
 
     def awaits(self, segment: "Segment") -> bool:
         """Whether a node is about to move to that segment."""
@@ -112,8 +110,7 @@ class Segment:
         start = max(at_ns, self.free_ns)
         if self._first_ns is None or start < self._first_ns:
             self._first_ns = start
-        plan = self._plan
-        if plan is not None and plan.start_ns >= at_ns:
+        if self._plan is not None and self._plan.start_ns >= at_ns:
             self._plan = None
 
     def revise(self, at_ns: int) -> None:
