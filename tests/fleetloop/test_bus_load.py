@@ -67,9 +67,7 @@ def test_telemetry_counts_as_well() -> None:
 
 
 @pytest.mark.parametrize(("robots", "level"), [(5, "ok"), (7, "warning"), (20, "error")])
-def test_seven_robots_at_200_hz_may_share_a_bus_twenty_may_not(
-    robots: int, level: str
-) -> None:
+def test_seven_robots_at_200_hz_may_share_a_bus_twenty_may_not(robots: int, level: str) -> None:
     scenario = load("realtime_200hz", ("bus.timing='wire'",))
     one = robot_briefs(scenario)[0]
     shared = tuple(
