@@ -91,7 +91,11 @@ class LockstepLoop:
         counters = self.counters
         message: can.Message | None = first
         asked_ns = time.monotonic_ns()
-        hear, clock, schedule = agent.hear, BusClock(self._schedule, agent.heard_since), self._schedule
+        hear, clock, schedule = (
+            agent.hear,
+            BusClock(self._schedule, agent.heard_since),
+            self._schedule,
+        )
         timeout_s = BUS_SHARE * schedule.tick_deadline_s
         while True:
             if message is None:

@@ -330,6 +330,7 @@ class DriveModel:
     torques_period_ns: int  # 0: only on request
     watchdog_ns: int  # 0: off
     zero_torque_on_disarm: bool
+    command_latency_ns: tuple[int, int]  # from the end of a frame until firmware acts on it
     serial_number: int  # of the right drive; the left one has the next number
 
 
@@ -388,6 +389,17 @@ class PowertrainModel:
 
 
 @dataclass(frozen=True, slots=True)
+class WireModel:
+    """How a bus is emulated that has a bit rate: see `bridge.can_bus.wire`."""
+
+    bitrate_bit_s: int
+    txqueuelen: int  # frames in a host's transmit queue
+    tx_mailboxes: int  # frames in a drive's controller
+    restart_ns: int | None  # a host starts to recover from bus-off this much later; None: never
+    drive_restart_ns: int | None
+
+
+@dataclass(frozen=True, slots=True)
 class RobotBrief:
     """One robot as the plant sees it."""
 
@@ -413,7 +425,7 @@ class PlantBrief:
     substeps: int  # RK4 steps per control period
     speed: float  # real-time factor that the run is held to; 0: as fast as possible
     seed: int
-    bitrate_bit_s: int
+    wire: WireModel | None  # of every bus; None: ideal, frames take no time
     runtime_folder: str  # holds the buses' sockets; removed when the run ends
     network: NetworkLink
     listeners: tuple[tuple[str, int], ...] = ()  # bus, inherited file descriptor of its socket

@@ -30,6 +30,7 @@ from configs.brief import (
     SupplyModel,
     VaryingOffset,
     Wheels,
+    WireModel,
     WorldOffset,
 )
 from configs.scenario import Scenario
@@ -121,14 +122,33 @@ def plant_brief(
     """What the plant is told."""
     ticks = schedule(scenario, speed, profile=profile)
     return PlantBrief(
-        robots=tuple(_robot(scenario, n, robot) for n, robot in enumerate(scenario.robot, 1)),
+        robots=robot_briefs(scenario),
         schedule=ticks,
         substeps=max(1, -(-ticks.period_ns // round(scenario.clock.plant_step_s * 1e9))),
         speed=speed,
         seed=scenario.seed,
-        bitrate_bit_s=scenario.bus.bitrate_bit_s,
+        wire=wire_model(scenario),
         runtime_folder=runtime_folder,
         network=network,
+    )
+
+
+def robot_briefs(scenario: Scenario) -> tuple[RobotBrief, ...]:
+    """All robots as the plant sees them."""
+    return tuple(_robot(scenario, n, robot) for n, robot in enumerate(scenario.robot, 1))
+
+
+def wire_model(scenario: Scenario) -> WireModel | None:
+    """How the buses are emulated; None: frames take no time."""
+    bus = scenario.bus
+    if bus.timing == "ideal":
+        return None
+    return WireModel(
+        bitrate_bit_s=bus.bitrate_bit_s,
+        txqueuelen=bus.txqueuelen,
+        tx_mailboxes=bus.tx_mailboxes,
+        restart_ns=None if bus.restart_s is None else round(bus.restart_s * 1e9),
+        drive_restart_ns=None if bus.drive_restart_s is None else round(bus.drive_restart_s * 1e9),
     )
 
 
@@ -205,8 +225,16 @@ def _drive_model(scenario: Scenario, number: int) -> DriveModel:
         torques_period_ns=round(drive.torques_period_s * 1e9),
         watchdog_ns=round(drive.watchdog_s * 1e9),
         zero_torque_on_disarm=drive.zero_torque_on_disarm,
+        command_latency_ns=_latency_ns(drive),
         serial_number=SERIAL_NUMBER + 2 * number,
     )
+
+
+def _latency_ns(drive: sections.Drive) -> tuple[int, int]:
+    if drive.preset != "realistic":
+        return 0, 0
+    least_s, most_s = drive.command_latency_s
+    return round(least_s * 1e9), round(most_s * 1e9)
 
 
 def _powertrain_model(scenario: Scenario, number: int) -> PowertrainModel | None:

@@ -93,6 +93,9 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
     drive = scenario.drive
     if drive.right_node == drive.left_node:
         yield Problem("drive.left_node", drive.left_node, "must differ from drive.right_node")
+    least_s, most_s = drive.command_latency_s
+    if least_s > most_s:
+        yield Problem("drive.command_latency_s", [least_s, most_s], "least before most")
     if drive.watchdog_s and drive.watchdog_s < 2 * scenario.clock.control_period_s:
         yield Problem(
             "drive.watchdog_s",

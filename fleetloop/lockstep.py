@@ -11,7 +11,7 @@ from functools import partial
 
 from agents.agent import Agent
 from agents.bus_clock import BusClock
-from bridge.can_bus.hub import Said
+from bridge.can_bus.traffic import Said
 from bridge.frame import Frame
 from bridge.messages import LeaderSpeed, PathState, PoseFix, Progress
 from bridge.process import Stop, settled_memory
@@ -19,7 +19,7 @@ from bridge.telemetry import AGENT_ROW, PLANT_ROW, RowBuffer
 from configs.brief import AgentBrief, LeaderBrief, PlantBrief
 from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.writer import Source
-from plant.buses import Ask
+from plant.buses import IdealBus
 from plant.emulation import Emulation, emulations
 from plant.unit import Unit, unit_of
 from plant.wire_bus import WireBus
@@ -43,36 +43,67 @@ class _Mind:
 class _Lane:
     """One bus with the controllers of its robots."""
 
-    __slots__ = ("bus", "frames", "minds", "name", "steps", "wired")
+    __slots__ = ("frames", "minds", "name")
 
-    def __init__(self, name: str, bus: Emulation, minds: Mapping[str, _Mind]) -> None:
+    def __init__(self, name: str, units: Sequence[Unit], minds: Mapping[str, _Mind]) -> None:
         self.name = name
-        self.bus = bus
-        self.wired = bus if isinstance(bus, WireBus) else None
-        self.minds = {unit.brief.robot: minds[unit.brief.robot] for unit in bus.units}
-        self.steps = bus.steps()
+        self.minds = {unit.brief.robot: minds[unit.brief.robot] for unit in units}
         self.frames = 0
 
     def tick(self) -> None:
         """One tick of the bus."""
-        steps = self.steps
+        raise NotImplementedError
+
+
+class _IdealLane(_Lane):
+    """A bus on which frames take no time."""
+
+    __slots__ = ("_steps",)
+
+    def __init__(self, name: str, bus: IdealBus, minds: Mapping[str, _Mind]) -> None:
+        super().__init__(name, bus.units, minds)
+        self._steps = bus.steps()
+
+    def tick(self) -> None:
+        steps = self._steps
         ask = next(steps)
         while ask is not None:
-            ask = steps.send(self._answer(ask))
+            frames = [(ask.stamp_ns, frame) for frame in ask.frames]
+            answers: list[Frame] = []
+            for mind in self.minds.values():
+                answers += _think(mind, frames)
+            self.frames += len(frames) + len(answers)
+            ask = steps.send(answers)
 
-    def _answer(self, ask: Ask) -> Sequence[Frame] | Sequence[Said]:
-        if self.wired is not None:
+
+class _WireLane(_Lane):
+    """A bus with bit timing."""
+
+    __slots__ = ("_pending", "_steps", "_wire")
+
+    def __init__(self, name: str, bus: WireBus, minds: Mapping[str, _Mind]) -> None:
+        super().__init__(name, bus.units, minds)
+        self._wire = bus
+        self._steps = bus.steps()
+        self._pending: dict[str, list[tuple[int, Frame]]] = {robot: [] for robot in self.minds}
+
+    def tick(self) -> None:
+        steps, pending = self._steps, self._pending
+        ask = next(steps)
+        while ask is not None:
             self.frames += len(ask.passed)
-            heard = [(end_ns, frame) for end_ns, frame, key in ask.passed if key != ask.asked]
-            said = _think(self.minds[ask.asked], heard)
-            room = self.wired.room(ask.asked)
-            return [Said(ask.asked, frame) for frame in said[:room]]
-        stamp_ns, frames = ask.stamp_ns, ask.frames
-        answers: list[Frame] = []
-        for mind in self.minds.values():
-            answers += _think(mind, [(stamp_ns, frame) for frame in frames])
-        self.frames += len(frames) + len(answers)
-        return answers
+            for robot, heard in pending.items():
+                heard += [(end_ns, frame) for end_ns, frame, key in ask.passed if key != robot]
+            robot = ask.asked
+            heard, pending[robot] = pending[robot], []
+            said = _think(self.minds[robot], heard)
+            ask = steps.send([Said(robot, frame) for frame in said[: self._wire.room(robot)]])
+
+
+def _lane(name: str, bus: Emulation, minds: Mapping[str, _Mind]) -> _Lane:
+    if isinstance(bus, WireBus):
+        return _WireLane(name, bus, minds)
+    return _IdealLane(name, bus, minds)
 
 
 def _think(mind: _Mind, heard: Sequence[tuple[int, Frame]]) -> list[Frame]:
@@ -126,7 +157,7 @@ class InProcessRun:
 
         minds = {agent.brief.robot: _Mind.of(agent) for agent in self._agents}
         buses = emulations(plant, self._units, begin)
-        self._lanes = [_Lane(name, bus, minds) for name, bus in buses.items()]
+        self._lanes = [_lane(name, bus, minds) for name, bus in buses.items()]
         for agent in self._agents:
             if agent.brief.hears_leader:
                 agent.take_leader(LeaderSpeed(leader.speed_steps))

@@ -28,7 +28,7 @@ from configs.brief import PlantBrief, Settings
 from configs.errors import FleetloopError, InfrastructureError
 from plant.loop import Counters, LockstepLoop, bus_frames
 from plant.realtime import RealtimeLoop
-from plant.unit import Unit, unit_of
+from plant.unit import unit_of
 from plant.witness import Witness
 
 PLANT_PRIORITY = 45
@@ -45,7 +45,7 @@ def run(brief: PlantBrief, stop: Stop) -> str:
             if brief.detached:
                 gone = partial(stop.end, LAUNCHER_GONE)
                 link.on_gone(keys.live(brief.network.run, LAUNCHER), gone)
-            hub = Hub(listeners, stop.wake_fd)
+            hub = Hub(listeners, stop.wake_fd, queue=brief.wire.txqueuelen if brief.wire else 0)
             end: DriveEnd = hub
             try:
                 end = join(hub, brief.attached)

@@ -9,9 +9,9 @@ over. Who drives it, over sockets or by calls, changes nothing of what happens.
 """
 
 from collections.abc import Callable, Generator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
-from bridge.can_bus.hub import Passed
+from bridge.can_bus.traffic import Key, Passed
 from bridge.frame import Frame
 from configs.brief import Schedule
 from plant.unit import Unit
@@ -24,10 +24,11 @@ class Ask(NamedTuple):
     frames: Sequence[Frame]  # on an ideal bus: all of this instant
     passed: Sequence[Passed] = ()  # on a bus with bit timing
     asked: str = ""  # a robot; "": all of the bus
-    freed: Sequence[tuple[str | int, int]] = ()  # frames that left the transmit queues of clients
+    freed: Sequence[tuple[Key, int]] = ()  # frames that left the transmit queues of clients
 
 
-Steps = Generator[Ask | None, Sequence[Frame], None]
+_Answer = TypeVar("_Answer")
+Steps = Generator[Ask | None, Sequence[_Answer], None]
 Begin = Callable[[int], None]
 """Told each tick as it begins, bodies being where they are at that instant."""
 
@@ -43,7 +44,7 @@ class IdealBus:
         self._substeps = substeps
         self._begin = begin
 
-    def steps(self) -> Steps:
+    def steps(self) -> Steps[Frame]:
         """The ticks from the first of the countdown to the closing one."""
         schedule, begin, substeps = self._schedule, self._begin, self._substeps
         period_s, period_ns, last = schedule.period_s, schedule.period_ns, schedule.ticks

@@ -4,9 +4,9 @@
                    or `plant.wire_bus` do between questions and answers; and on to its tick k + 1
 
 Robots of different buses meet only in their controllers' messages, for which each controller waits
-by tick. So a bus need not wait for all others at every tick: it may be up to `WINDOW_TICKS` ahead of
-the slowest, which keeps all cores at work and changes no value. Held to a speed, all go tick by tick
-together.
+by tick. So a bus need not wait for all others at every tick: it may be up to `WINDOW_TICKS` ahead
+of the slowest, which keeps all cores at work and changes no value. Held to a speed, all go tick by
+tick together.
 
 Bus time runs from power-up; scenario time is 0 when control starts, after the countdown in which
 the controllers arm their drives and the bodies are held as the scenario puts them. The run ends
@@ -26,7 +26,7 @@ from bridge.process import Stop
 from bridge.telemetry import RowBuffer
 from configs.brief import PlantBrief
 from configs.errors import InfrastructureError, PeerLostError
-from plant.buses import Ask
+from plant.buses import Ask, IdealBus
 from plant.emulation import Emulation, emulations
 from plant.unit import Unit
 from plant.wire_bus import WireBus
@@ -54,17 +54,76 @@ class Counters:
 class _Lane:
     """One bus on its way through the ticks."""
 
-    __slots__ = ("asked", "asked_ns", "bus", "done", "robots", "steps", "tick", "wired")
+    __slots__ = ("asked", "asked_ns", "bus", "done", "robots", "tick")
 
-    def __init__(self, bus: str, emulation: Emulation, tick: int) -> None:
+    def __init__(self, bus: str, units: Sequence[Unit], tick: int) -> None:
         self.bus = bus
-        self.robots = [unit.brief.robot for unit in emulation.units]
-        self.wired = emulation if isinstance(emulation, WireBus) else None
-        self.steps = emulation.steps()
+        self.robots = [unit.brief.robot for unit in units]
         self.tick = tick
         self.asked = ""  # the robot that was asked; "": all
         self.asked_ns = 0  # when it was asked to answer; 0: nobody was
         self.done = False
+
+    def begin(self) -> Ask | None:
+        """Begin the next tick."""
+        raise NotImplementedError
+
+    def go_on(self, hub: Hub) -> Ask | None:
+        """Hand on what the clients had to say, up to the next question; None: the tick is over."""
+        raise NotImplementedError
+
+    def put(self, hub: Hub, ask: Ask) -> None:
+        """Put a question to the clients."""
+        raise NotImplementedError
+
+
+class _IdealLane(_Lane):
+    """A bus on which frames take no time."""
+
+    __slots__ = ("_steps",)
+
+    def __init__(self, bus: str, emulation: IdealBus, tick: int) -> None:
+        super().__init__(bus, emulation.units, tick)
+        self._steps = emulation.steps()
+
+    def begin(self) -> Ask | None:
+        return next(self._steps)
+
+    def go_on(self, hub: Hub) -> Ask | None:
+        return self._steps.send(hub.take(self.bus))
+
+    def put(self, hub: Hub, ask: Ask) -> None:
+        hub.deliver(self.bus, ask.stamp_ns, ask.frames)
+
+
+class _WireLane(_Lane):
+    """A bus with bit timing."""
+
+    __slots__ = ("_steps", "_wire")
+
+    def __init__(self, bus: str, emulation: WireBus, tick: int) -> None:
+        super().__init__(bus, emulation.units, tick)
+        self._wire = emulation
+        self._steps = emulation.steps()
+
+    def begin(self) -> Ask | None:
+        return next(self._steps)
+
+    def go_on(self, hub: Hub) -> Ask | None:
+        for key in hub.departed(self.bus):
+            self._wire.depart(key)
+        return self._steps.send(hub.say(self.bus))
+
+    def put(self, hub: Hub, ask: Ask) -> None:
+        for key, count in ask.freed:
+            hub.left_queue(self.bus, key, count)
+        hub.pass_on(self.bus, ask.stamp_ns, ask.passed, ask.asked)
+
+
+def _lane(bus: str, emulation: Emulation, tick: int) -> _Lane:
+    if isinstance(emulation, WireBus):
+        return _WireLane(bus, emulation, tick)
+    return _IdealLane(bus, emulation, tick)
 
 
 class _Ends(NamedTuple):
@@ -94,13 +153,15 @@ class LockstepLoop:
         self._hub = hub
         self._report = report
         first = -schedule.countdown_ticks
-        ends = {unit: _Ends(*rest) for unit, *rest in zip(units, poses, rows, strict=True)}
+        ends = {
+            unit: _Ends(pose, truth) for unit, pose, truth in zip(units, poses, rows, strict=True)
+        }
 
         def begin(group: Sequence[Unit]) -> Callable[[int], None]:
             return partial(self._begin, [(unit, ends[unit]) for unit in group])
 
         buses = emulations(brief, units, begin)
-        self._lanes = {name: _Lane(name, bus, first) for name, bus in buses.items()}
+        self._lanes = {name: _lane(name, bus, first) for name, bus in buses.items()}
         self._slowest = first
         self._at_slowest = len(self._lanes)
         self._held: list[_Lane] = []
@@ -155,19 +216,12 @@ class LockstepLoop:
 
     def _ask(self, lane: _Lane, now_ns: int) -> None:
         """Begin the next tick of a bus."""
-        ask = next(lane.steps)
+        ask = lane.begin()
         if ask is not None:
             self._put(lane, ask, now_ns)
 
     def _go_on(self, lane: _Lane, now_ns: int) -> None:
-        """Hand on what the clients of a bus had to say, up to the next question or tick."""
-        hub, bus = self._hub, lane.bus
-        if lane.wired is None:
-            ask = lane.steps.send(hub.take(bus))
-        else:
-            for key in hub.departed(bus):
-                lane.wired.depart(key)
-            ask = lane.steps.send(hub.say(bus))
+        ask = lane.go_on(self._hub)
         if ask is not None:
             self._put(lane, ask, now_ns)
         else:
@@ -175,12 +229,7 @@ class LockstepLoop:
 
     def _put(self, lane: _Lane, ask: Ask, now_ns: int) -> None:
         lane.asked_ns, lane.asked = now_ns, ask.asked
-        if lane.wired is None:
-            self._hub.deliver(lane.bus, ask.stamp_ns, ask.frames)
-            return
-        for key, count in ask.freed:
-            self._hub.left_queue(lane.bus, key, count)
-        self._hub.pass_on(lane.bus, ask.stamp_ns, ask.passed, ask.asked)
+        lane.put(self._hub, ask)
 
     def _take_on(self, lane: _Lane, now_ns: int) -> None:
         """A bus from its tick to the next, and on as far as the slowest allows."""

@@ -4,7 +4,7 @@
 
 A unit is told the time and never asks for it. A step of the integration holds the torques.
 
-    Unit        ideal motors and encoders: what a drive asks for acts at once, what it is told is true
+    Unit        ideal motors and encoders: what a drive asks for acts at once, what it hears is true
     RealUnit    motors, supply and encoders of `plant.powertrain`
 """
 

@@ -18,9 +18,9 @@ from collections.abc import Sequence
 from heapq import heappop, heappush
 from random import Random
 
-from bridge.can_bus.hub import Passed, Said
 from bridge.can_bus.node import Delivered, Node
 from bridge.can_bus.queues import Fifo, Mailboxes
+from bridge.can_bus.traffic import Key, Passed, Said
 from bridge.can_bus.wire import Wire
 from bridge.drives import DriveNode
 from bridge.frame import ERR, Frame
@@ -75,21 +75,21 @@ class WireBus:
             for unit in units
         }
         self._of_node = {drive.node: drive for drive in self._drives}
-        self._hosts: dict[str | int, Node] = {}
-        self._key_of: dict[Node, str | int] = {}
+        self._hosts: dict[Key, Node] = {}
+        self._key_of: dict[Node, Key] = {}
         for unit in units:
             self._host(unit.brief.robot)
         self._mail: list[tuple[int, int, _Drive, Frame]] = []
         self._number = 0
         self._now_ns = 0
         self._passed: list[Passed] = []
-        self._freed: list[tuple[str | int, int]] = []
+        self._freed: list[tuple[Key, int]] = []
         self.refused = 0
         """Frames of clients that found no room."""
 
     # --- lockstep --------------------------------------------------------------------------------
 
-    def steps(self) -> Steps:
+    def steps(self) -> Steps[Said]:
         """The ticks from the first of the countdown to the closing one."""
         schedule = self._schedule
         for tick in range(-schedule.countdown_ticks, schedule.ticks + 1):
@@ -121,7 +121,7 @@ class WireBus:
                 self.refused += 1
                 self._freed.append((key, 1))
 
-    def depart(self, key: str | int) -> None:
+    def depart(self, key: Key) -> None:
         """A client has left."""
         node = self._hosts.pop(key, None)
         if node is not None:
@@ -223,11 +223,9 @@ class WireBus:
         mailboxes = Mailboxes(self._model.tx_mailboxes)
         return self.wire.attach(name, queue=mailboxes, restart_ns=self._model.drive_restart_ns)
 
-    def _host(self, key: str | int) -> Node:
+    def _host(self, key: Key) -> Node:
         model = self._model
-        node = self.wire.attach(
-            str(key), queue=Fifo(model.txqueuelen), restart_ns=model.restart_ns
-        )
+        node = self.wire.attach(str(key), queue=Fifo(model.txqueuelen), restart_ns=model.restart_ns)
         self._hosts[key] = node
         self._key_of[node] = key
         return node

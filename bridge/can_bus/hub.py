@@ -22,30 +22,14 @@ import socket
 import time
 from collections import deque
 from collections.abc import Collection, Mapping, Sequence
-from typing import NamedTuple
 
 from bridge.can_bus import packet as wire
-from bridge.can_bus.packet import Stamped
+from bridge.can_bus.traffic import Key, Passed, Said, Stamped
 from bridge.frame import Frame
 
 BACKLOG = 100_000
 MAX_CLIENTS = 64
 _READ, _WRITE = select.EPOLLIN, select.EPOLLOUT
-
-
-class Said(NamedTuple):
-    """A frame from a client of a bus with bit timing; its key is its name if it is paced."""
-
-    key: str | int
-    frame: Frame
-
-
-class Passed(NamedTuple):
-    """A frame that ended on a bus with bit timing, and the key of the client that had sent it."""
-
-    end_ns: int
-    frame: Frame
-    key: str | int | None = None
 
 
 class Counters:
@@ -84,7 +68,7 @@ class _Client:
         self.receive, self.send = sock.recv, sock.send
         self.bus = bus
         self.name = ""
-        self.key: str | int = 0
+        self.key: Key = 0
         self.gone = 0  # frames that left its transmit queue
         self.pending: list[Stamped] = []  # for a paced client, until it is asked
         self.joined = self.paced = self.gathered = self.own = self.owes = False
@@ -108,7 +92,7 @@ class _Bus:
     def __init__(self, name: str, listener: socket.socket, queue: int) -> None:
         self.queue = queue
         self.said: list[Said] = []
-        self.departed: list[str | int] = []
+        self.departed: list[Key] = []
         self.name = name
         self.listener = listener
         self.stamp_ns = -1  # not powered up yet
@@ -121,7 +105,7 @@ class _Bus:
 class Hub:
     """All buses of one process; `listeners` are bound, listening sockets by bus name.
 
-    `queue` is how many frames may wait at a client of a bus with bit timing; 0: frames take no time.
+    `queue` is how many frames may wait at a client, on buses with bit timing; 0: they have none.
     """
 
     def __init__(
@@ -208,13 +192,13 @@ class Hub:
         said, bus.said = bus.said, []
         return said
 
-    def departed(self, name: str) -> list[str | int]:
+    def departed(self, name: str) -> list[Key]:
         """Keys of clients that left a bus with bit timing since the last call."""
         bus = self._buses[name]
         departed, bus.departed = bus.departed, []
         return departed
 
-    def left_queue(self, name: str, key: str | int, count: int) -> None:
+    def left_queue(self, name: str, key: Key, count: int) -> None:
         """Frames of a client have left its transmit queue; it hears it with the next frames."""
         for client in self._buses[name].clients:
             if client.key == key:

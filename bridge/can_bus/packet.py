@@ -22,6 +22,7 @@ import struct
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from bridge.can_bus.traffic import Stamped
 from bridge.frame import MAX_DATA, Frame
 
 VERSION = 2
@@ -51,15 +52,8 @@ class Packet(NamedTuple):
     before_ns: tuple[int, ...] = ()  # of each frame; empty: all of them ended at `stamp_ns`
 
 
-class Stamped(NamedTuple):
-    """A frame and the bus time at which it ended."""
-
-    end_ns: int
-    frame: Frame
-
-
 def encode_frames(flags: int, stamp_ns: int, frames: Sequence[Frame]) -> bytes:
-    """A FRAMES packet with at most `MAX_FRAMES` frames of at most 8 bytes each, all of one instant."""
+    """A FRAMES packet of one instant: `MAX_FRAMES` frames of 8 bytes at most."""
     count = len(frames)
     if count == 2:
         (id_1, data_1), (id_2, data_2) = frames

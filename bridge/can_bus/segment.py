@@ -33,12 +33,12 @@ class Segment:
         "_plain",
         "_plan",
         "_ready",
-        "_recovery",
         "_troubled",
         "busy_ns",
         "errors",
         "free_ns",
         "nodes",
+        "recovery",
     )
 
     def __init__(self, bit_rate: int, disturbances: Disturbances) -> None:
@@ -51,7 +51,7 @@ class Segment:
         self._ready: list[Node] = []  # have something to send
         self._first_ns: int | None = None  # earliest start of what is ready
         self._plan: Plan | None = None
-        self._recovery = Recovery(bit_rate)
+        self.recovery = Recovery(bit_rate)
         self._moves: list[tuple[Node, Segment]] = []
         self._troubled = False  # somebody has a receive error to work off
         self._plain = False  # nothing but arbitration decides who sends, and that it passes
@@ -66,7 +66,7 @@ class Segment:
         if node.queue.entries:
             self.wake(node, at_ns)
         if node.sequences_left:
-            self._recovery.nodes.append(node)
+            self.recovery.nodes.append(node)
             node.recessive_from_ns = max(node.recessive_from_ns, at_ns)
         self.revise(at_ns)
 
@@ -74,7 +74,7 @@ class Segment:
         """Let a node go; a frame of its own that is on the wire goes on."""
         self.nodes.remove(node)
         self._moves = [move for move in self._moves if move[0] is not node]
-        for some in (self._ready, self._recovery.nodes):
+        for some in (self._ready, self.recovery.nodes):
             if node in some:
                 some.remove(node)
         if not self._ready:
@@ -84,17 +84,19 @@ class Segment:
     def move(self, node: Node, to: "Segment", at_ns: int) -> None:
         """Take a node to another segment; if it is sending, at the end of its frame."""
         self._moves = [move for move in self._moves if move[0] is not node]
-        if to is self:
-            return
-        if self.is_sending(node, at_ns):
+        if self.is_sending(node, at_ns) and to is not self:
             self._moves.append((node, to))
-            return
-        self.leave(node, at_ns)
-        to.join(node, at_ns)
+        elif to is not self:
+            self.leave(node, at_ns)
+            to.join(node, at_ns)
 
     def awaits(self, segment: "Segment") -> bool:
         """Whether a node is about to move to that segment."""
         return any(to is segment for _, to in self._moves)
+
+    def deserted(self) -> bool:
+        """Whether nobody is there, and no frame of one who left is on the wire."""
+        return not self.nodes and self._plan is None
 
     def is_sending(self, node: Node, at_ns: int) -> bool:
         """Whether a frame of this node is on the wire."""
@@ -108,8 +110,7 @@ class Segment:
         start = max(at_ns, self.free_ns)
         if self._first_ns is None or start < self._first_ns:
             self._first_ns = start
-        plan = self._plan
-        if plan is not None and plan.start_ns >= at_ns:
+        if self._plan is not None and self._plan.start_ns >= at_ns:
             self._plan = None
 
     def revise(self, at_ns: int) -> None:
@@ -123,10 +124,6 @@ class Segment:
         if self._plan is not None and self._plan.start_ns >= at_ns:
             self._plan = None
 
-    def recover(self, node: Node, from_ns: int) -> None:
-        """Let a node that is off the bus count its way back from this instant on."""
-        self._recovery.start(node, from_ns)
-
     # --- what happens ----------------------------------------------------------------------------
 
     def next_ns(self) -> int | None:
@@ -134,9 +131,9 @@ class Segment:
         plan = self._plan
         if plan is None and self._first_ns is not None:
             plan = self._plan = self._arbitrate(self._first_ns)
-        node = self._recovery.next(plan.start_ns if plan else None)
+        node = self.recovery.next(plan.start_ns if plan else None)
         if node is not None:
-            return self._recovery.back_ns(node)
+            return self.recovery.back_ns(node)
         return None if plan is None else plan.done_ns
 
     def run(self, to_ns: int, events: list[Event]) -> None:
@@ -145,10 +142,10 @@ class Segment:
             plan = self._plan
             if plan is None and self._first_ns is not None and self._first_ns < to_ns:
                 plan = self._plan = self._arbitrate(self._first_ns)
-            if self._recovery.nodes:
-                node = self._recovery.next(plan.start_ns if plan else None)
-                if node is not None and self._recovery.back_ns(node) <= to_ns:
-                    self._note(node, self._recovery.finish(node), events)
+            if self.recovery.nodes:
+                node = self.recovery.next(plan.start_ns if plan else None)
+                if node is not None and self.recovery.back_ns(node) <= to_ns:
+                    self._note(node, self.recovery.finish(node), events)
                     continue
             if plan is None or plan.done_ns > to_ns:
                 return
@@ -214,8 +211,8 @@ class Segment:
         else:
             self._failed(plan, what, what.error, events)
         self._first_ns = free_ns if self._ready else None
-        if self._recovery.nodes:
-            self._recovery.count(plan.start_ns, free_ns)
+        if self.recovery.nodes:
+            self.recovery.count(plan.start_ns, free_ns)
         if self._moves:
             for node, to in self._moves.copy():
                 self.move(node, to, plan.done_ns)
@@ -296,5 +293,5 @@ class Segment:
         if state is _OFF:
             node.counters.dropped += node.queue.clear()
             if node.restart_ns is not None:
-                self._recovery.start(node, at_ns + node.restart_ns)
+                self.recovery.start(node, at_ns + node.restart_ns)
         self.revise(at_ns)

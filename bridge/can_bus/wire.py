@@ -90,7 +90,7 @@ class Wire:
     def restart(self, node: Node) -> None:
         """Tell a node that is bus-off to come back: after 128 times 11 recessive bits it is."""
         if node.state is NodeState.BUS_OFF and node.attached:
-            self._segment(node).recover(node, self.now_ns)
+            self._segment(node).recovery.start(node, self.now_ns)
 
     def disconnect(self, node: Node) -> None:
         """Open the line to a node: it hears and reaches nobody. Its frame on the wire goes on."""
@@ -186,7 +186,9 @@ class Wire:
 
     def _forget_empty(self) -> None:
         main = self._main
-        self._apart = [segment for segment in self._apart if segment.nodes or main.awaits(segment)]
+        self._apart = [
+            segment for segment in self._apart if not segment.deserted() or main.awaits(segment)
+        ]
 
     def _queue(self, node: Node, entry: Entry) -> bool:
         if node.state is NodeState.BUS_OFF or not node.queue.push(entry):

@@ -13,6 +13,17 @@ from bridge.frame import Frame
 from configs.brief import DriveLink, DriveModel
 
 
+class Feeling(NamedTuple):
+    """What a drive measures of its motor and of the supply."""
+
+    torque_N_m: float  # the motor's, estimated
+    current_A: float  # q axis
+    fet_C: float
+    motor_C: float  # NaN: no thermistor
+    bus_V: float
+    bus_A: float
+
+
 class DriveClient(Protocol):
     """The controller's end of the two drives of a robot."""
 
@@ -64,8 +75,16 @@ class DriveNode(Protocol):
     def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Take one frame from the bus; return the replies."""
 
-    def torque_demand(self) -> float:
-        """Torque that the drive asks of its motor now [N·m]; always finite."""
+    input_torque: float
+    """The torque that the set-point said [N·m], before limits."""
+    next_due_ns: int
+    """The earliest bus time at which `due` has something to do."""
+
+    def feel(self, feeling: Feeling) -> None:
+        """Take what the drive measures."""
+
+    def torque_demand(self, dt_s: float) -> float:
+        """Torque that the drive asks of its motor for the next `dt_s` [N·m]; always finite."""
 
 
 class DriveProtocol(NamedTuple):

@@ -87,6 +87,14 @@ class OdriveNode:
         limit = self._current_limit * model.torque_constant_N_m_A
         return min(max(torque, -limit), limit)
 
+    @property
+    def next_due_ns(self) -> int:
+        """The earliest bus time at which `due` has something to do."""
+        return min(self._next_encoder_ns, self._next_other_ns)
+
+    def feel(self, feeling: object) -> None:
+        """Take what the drive measures."""
+
     def due(self, now_ns: int) -> Sequence[Frame]:
         """Cyclic frames due at this instant; the watchdog is looked at first."""
         self._supervise(now_ns)
