@@ -57,7 +57,7 @@ class Unit:
             pose.x_m, pose.y_m, pose.theta_rad, brief.v_m_s, brief.omega_rad_s, 0.0, 0.0
         )
 
-    def _feed(self) -> None:
+    def feed(self) -> None:
         """Tell both drives what their encoders see."""
         state = self.state
         right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
@@ -69,12 +69,12 @@ class Unit:
         if min(self._right.fed_ns, self._left.fed_ns) <= self._answered_ns:
             return ()
         self._answered_ns = now_ns
-        self._feed()
+        self.feed()
         return self._right.feedback(now_ns), self._left.feedback(now_ns)
 
     def frames_due(self, now_ns: int) -> list[Frame]:
         """What both drives send at this instant, in order of arbitration."""
-        self._feed()
+        self.feed()
         frames = [*self._right.due(now_ns), *self._left.due(now_ns)]
         if len(frames) > 1:
             frames.sort()
@@ -132,7 +132,7 @@ class RealUnit(Unit):
         self._train = powertrain(model, min(self._body.mbar_1, self._body.mbar_2))
         self._felt_s = 0.0
 
-    def _feed(self) -> None:
+    def feed(self) -> None:
         """The encoders have told their drives already, at every step."""
 
     def advance(self, t_s: float, period_s: float, substeps: int) -> None:

@@ -239,3 +239,4 @@ class WireBus:
             unit.advance((from_ns - self._zero_ns) * 1e-9, span_ns * 1e-9, substeps)
         if to_ns > unit.moved_ns:
             unit.moved_ns = to_ns
+            unit.feed()
