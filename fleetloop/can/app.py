@@ -49,7 +49,9 @@ def dump(
     log_format: Annotated[
         bool, typer.Option("-L", help="Log format, for canplayer, python-can and others.")
     ] = False,
-    count: Annotated[int, typer.Option("-n", min=1, help="End after so many frames.")] = 0,
+    count: Annotated[
+        int | None, typer.Option("-n", min=1, help="End after so many frames.")
+    ] = None,
     silence_ms: Annotated[
         float | None, typer.Option("-T", min=0.0, metavar="MS", help="End after a silence.")
     ] = None,

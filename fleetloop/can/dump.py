@@ -41,7 +41,7 @@ class Options:
     ascii_too: bool = False
     explain_errors: bool = False
     decode: bool = False
-    count: int = 0  # 0: no end
+    count: int | None = None
     silence_s: float | None = None
 
     def check(self) -> None:
@@ -178,7 +178,7 @@ def _short(channel: str) -> str:
 def _print_all(listener: Listener, wanted: dict[str, Filter], options: Options) -> None:
     printer = Printer(options, list(wanted))
     write, flush = sys.stdout.write, sys.stdout.flush
-    left = options.count
+    left = options.count if options.count is not None else sys.maxsize
     silent_at = _deadline(options.silence_s)
     while not listener.over:
         wait_s = None if silent_at is None else silent_at - time.monotonic()
@@ -187,12 +187,11 @@ def _print_all(listener: Listener, wanted: dict[str, Filter], options: Options) 
         heard = [item for item in listener.listen(wait_s) if wanted[item.bus].passes(item[1][0])]
         if not heard:
             continue
-        if options.count:
-            heard = heard[:left]
-            left -= len(heard)
+        heard = heard[:left]
+        left -= len(heard)
         write("".join(map(printer.lines, heard)))
         flush()
-        if options.count and not left:
+        if not left:
             return
         silent_at = _deadline(options.silence_s)
 

@@ -70,6 +70,7 @@ def survey(seconds: float, bit_rate: int) -> list[BusReport]:
                 problems[str(path)] = str(error)
         census = {name: Census(bit_rate) for name in buses}
         with Listener(buses) as listener:
+            listener.listen(0.0)  # what gathered while the others were opened
             start = time.monotonic()
             while not listener.over and (left := start + seconds - time.monotonic()) > 0:
                 for name, frame, stamp_ns in listener.listen(left):
