@@ -134,7 +134,8 @@ def gateway(
     ] = False,
 ) -> None:
     """Join a bus to another python-can bus, both ways, until the run ends or Ctrl-C."""
-    from fleetloop.can.gateway import FarBus, join
+    from fleetloop.can.far_bus import FarBus
+    from fleetloop.can.gateway import join
 
     far = FarBus.parse(interface, channel, bitrate, options or [], echo)
     raise typer.Exit(join(bus, far, retry_s=retry, with_rates=rate))

@@ -28,6 +28,7 @@ class Signal(NamedTuple):
     unit: str = ""
     scale: float = 1.0
     meaning: type[IntEnum] | None = None
+    bits: int = 0xFFFF_FFFF_FFFF
 
 
 class Value(NamedTuple):
@@ -84,7 +85,7 @@ LAYOUTS: Mapping[Command, Layout] = {
         "Axis_Error",
         Signal("Axis_State", meaning=odrive.AxisState),
         Signal("Procedure_Result", meaning=odrive.ProcedureResult),
-        "Trajectory_Done_Flag",
+        Signal("Trajectory_Done_Flag", bits=1),
     ),
     Command.ESTOP: _numbers("<"),
     Command.GET_ERROR: _numbers("<II", "Active_Errors", "Disarm_Reason"),
@@ -173,7 +174,9 @@ def _value(signal: Signal, raw: float) -> Value:
         return Value(signal.name, odrive.error_names(odrive.AxisError(int(raw))), "")
     if signal.meaning is not None:
         return Value(signal.name, _meaning(signal.meaning, int(raw)), "")
-    return Value(signal.name, raw if signal.scale == 1.0 else raw * signal.scale, signal.unit)
+    if signal.scale != 1.0:
+        return Value(signal.name, raw * signal.scale, signal.unit)
+    return Value(signal.name, raw & signal.bits if isinstance(raw, int) else raw, signal.unit)
 
 
 def _meaning(kind: type[IntEnum], raw: int) -> str:

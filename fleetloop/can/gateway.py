@@ -11,80 +11,27 @@ Our bus ends with its run: the gateway says so and ends with 0. When the far bus
 with 3, or tries for `retry_s` to open it again; what our bus says meanwhile is lost and counted.
 """
 
+import contextlib
 import threading
 import time
 from dataclasses import dataclass, field
-from typing import Any
 
 import can
 
 from bridge.can_bus.convert import to_frame, to_message
 from bridge.can_bus.interface import BusClosedError
 from bridge.frame import MAX_DATA
-from configs.errors import InfrastructureError, ScenarioError
+from configs.errors import InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.echo import EchoGuard
+from fleetloop.can.far_bus import FarBus
 from fleetloop.terminal import note, say
 
-ECHOING = frozenset({"udp_multicast"})
 SEND_S = 0.01
 WAIT_S = 0.1
 RETRY_EVERY_S = 0.5
 FAILURES = 10
 """So many failures in a row mean that the far bus is lost; one may be a stranger's datagram."""
-
-
-@dataclass(frozen=True, slots=True)
-class FarBus:
-    """The other bus, as python-can opens it."""
-
-    interface: str
-    channel: str | None
-    options: dict[str, Any]  # whatever the interface takes
-    echoes: bool
-
-    @classmethod
-    def parse(
-        cls,
-        interface: str,
-        channel: str | None,
-        bitrate: int | None,
-        pairs: list[str],
-        echo: str,
-    ) -> "FarBus":
-        """From the command line.
-
-        Raises:
-            ScenarioError: an option is no KEY=VALUE, or `echo` is none of auto, yes, no.
-        """
-        if echo not in ("auto", "yes", "no"):
-            raise ScenarioError(f"--echo {echo}: right are auto, yes and no")
-        options: dict[str, Any] = {}
-        for pair in pairs:
-            key, equals, value = pair.partition("=")
-            if not equals or not key.isidentifier():
-                raise ScenarioError(f"--option {pair}: right is KEY=VALUE, e.g. rtscts=true")
-            options[key] = _value(value)
-        if bitrate is not None:
-            options["bitrate"] = bitrate
-        echoes = interface in ECHOING if echo == "auto" else echo == "yes"
-        return cls(interface, channel, options, echoes)
-
-    @property
-    def name(self) -> str:
-        """For people."""
-        return f"{self.interface} {self.channel or ''}".rstrip()
-
-    def open(self) -> can.BusABC:
-        """Open it.
-
-        Raises:
-            InfrastructureError: python-can can't; the text is python-can's.
-        """
-        try:
-            return can.Bus(channel=self.channel, interface=self.interface, **self.options)
-        except (can.CanError, OSError, ValueError, TypeError, ImportError, NameError) as error:
-            raise InfrastructureError(f"can't open {self.name}: {error}") from error
 
 
 @dataclass(slots=True)
@@ -243,38 +190,50 @@ def join(channel: str, far_bus: FarBus, *, retry_s: float = 0.0, with_rates: boo
     Raises:
         InfrastructureError: one of the buses can't be opened.
     """
-    outward, inward = Counters(), Counters()
+    ways = Counters(), Counters()
     start = time.monotonic()
-    status, interrupted = 0, False
-    with open_bus(channel) as near:
-        far: can.BusABC | None = far_bus.open()
+    with contextlib.ExitStack() as until_joined:
+        far = until_joined.enter_context(far_bus.open())
+        near = open_bus(channel)
+        until_joined.pop_all()  # from here on, who passes on closes what it passes on to
+    with near:
         note(f"joined {channel} and {far_bus.name}; Ctrl-C ends it")
         try:
-            while far is not None:
-                with far:
-                    gateway = Gateway(near, far, EchoGuard(echoes=far_bus.echoes), outward, inward)
-                    gateway.run()
-                if gateway.near_gone is not None:
-                    note(f"fleetloop: {gateway.near_gone}")
-                    status = 0 if isinstance(gateway.near_gone, BusClosedError) else 3
-                    break
-                note(f"fleetloop: {far_bus.name}: {gateway.far_gone}")
-                storm = gateway.guard.storm
-                far = None if storm else _reopen(far_bus, near, outward, retry_s)
-                status = 3 if far is None else 0
+            status = _pass_on(near, far, far_bus, ways, retry_s)
         except KeyboardInterrupt:
-            interrupted = True
-        except can.CanError as error:
-            note(f"fleetloop: {error}")
-            status = 0 if isinstance(error, BusClosedError) else 3
+            status = 130
     wall_s = time.monotonic() - start
-    for way, counters in (
-        (f"{channel} → {far_bus.name}", outward),
-        (f"{far_bus.name} → {channel}", inward),
-    ):
+    names = (f"{channel} → {far_bus.name}", f"{far_bus.name} → {channel}")
+    for name, counters in zip(names, ways, strict=True):
         rates = f"; {counters.passed / wall_s:.0f}/s, at most {counters.most_per_s} in a second"
-        say(f"{way}: {counters.words()}{rates if with_rates else ''}")
-    return 130 if interrupted else status
+        say(f"{name}: {counters.words()}{rates if with_rates else ''}")
+    return status
+
+
+def _pass_on(
+    near: can.BusABC,
+    far: can.BusABC,
+    far_bus: FarBus,
+    ways: tuple[Counters, Counters],
+    retry_s: float,
+) -> int:
+    """Pass frames on, over as many openings of the far bus as it takes; the exit status."""
+    reopened: can.BusABC | None = far
+    try:
+        while reopened is not None:
+            with reopened as current:
+                gateway = Gateway(near, current, EchoGuard(echoes=far_bus.echoes), *ways)
+                gateway.run()
+            if gateway.near_gone is not None:
+                raise gateway.near_gone
+            note(f"fleetloop: {far_bus.name}: {gateway.far_gone}")
+            if gateway.guard.storm:
+                return 3
+            reopened = _reopen(far_bus, near, ways[0], retry_s)
+    except can.CanError as gone:
+        note(f"fleetloop: {gone}")
+        return 0 if isinstance(gone, BusClosedError) else 3
+    return 3
 
 
 def drain(bus: can.BusABC) -> int:
@@ -299,17 +258,3 @@ def _reopen(
         note(f"opened {far_bus.name} again")
         return far
     return None
-
-
-def _value(text: str) -> bool | int | float | str:
-    match text.lower():
-        case "true" | "yes":
-            return True
-        case "false" | "no":
-            return False
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
