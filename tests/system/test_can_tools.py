@@ -1,7 +1,6 @@
 """`fleetloop can ...` as an operator uses it, on the buses of a run."""
 
 import json
-import os
 import re
 import signal
 import subprocess
@@ -21,13 +20,12 @@ TOOL = (sys.executable, "-m", "fleetloop", "can")
 
 
 def tool(*args: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*TOOL, *args],
-        capture_output=True,
-        text=True,
-        timeout=30,
-        env=os.environ | {"COLUMNS": "100"},
-    )
+    return subprocess.run([*TOOL, *args], capture_output=True, text=True, timeout=30)
+
+
+def clients_of_r1() -> int:
+    reports = json.loads(tool("list", "--seconds", "0.01", "--json").stdout)
+    return int(reports[0]["clients"])
 
 
 @contextmanager
@@ -53,9 +51,9 @@ def test_buses_are_listed_watched_and_fed(run: Run) -> None:
     assert [report["bus"] for report in reports] == ["r1", "r2"]
     for report in reports:
         assert report["clients"] == 1
-        # Two wheels, torque and encoder at 1 kHz, heartbeats: can.md says 40 % of 1 Mbit/s.
-        assert report["frames_per_s"] == pytest.approx(4020, rel=0.02)
-        assert report["load"] == pytest.approx(0.40, abs=0.04)
+        # Two wheels, each torque and encoder at 500 Hz and a heartbeat at 10 Hz; 80 to 125 bits.
+        assert report["frames_per_s"] == pytest.approx(2020, rel=0.02)
+        assert report["load"] == pytest.approx(0.20, abs=0.02)
         assert [node["state"] for node in report["nodes"]] == ["CLOSED_LOOP_CONTROL"] * 2
 
     dumped = tool("dump", "r1", "-n", "50").stdout.splitlines()
@@ -64,11 +62,7 @@ def test_buses_are_listed_watched_and_fed(run: Run) -> None:
     assert all(map(line.fullmatch, dumped))
 
     with started("dump", "-L", "r1,037:7FF", "-n", "2", "-T", "20000") as dump:
-        run_clients = 2
-        while (
-            json.loads(tool("list", "--seconds", "0.01", "--json").stdout)[0]["clients"]
-            < run_clients
-        ):
+        while clients_of_r1() < 2:
             assert dump.poll() is None
         assert tool("send", "r1", "037#R8").returncode == 0
         out, _ = dump.communicate(timeout=20)
@@ -91,7 +85,7 @@ def test_a_dump_ends_with_its_reader_its_user_and_its_run(run: Run) -> None:
         dump.send_signal(signal.SIGINT)
         out, err = dump.communicate(timeout=10)
         assert (dump.returncode, err) == (130, "")
-        assert out.endswith("\n")
+        assert out[-1:] in ("", "\n")
     with started("dump", "r1") as dump:
         assert dump.stdout is not None
         dump.stdout.readline()
