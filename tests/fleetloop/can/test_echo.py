@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.frame import Frame
-from fleetloop.can.echo import LEAST, MEMORY_S, EchoGuard
+from fleetloop.can.echo import ECHO_S, LEAST, EchoGuard
 
 A, B = Frame(1, b"a"), Frame(2, b"b")
 
@@ -27,7 +27,9 @@ def test_an_interface_that_does_not_echo_loses_nothing() -> None:
 def test_an_echo_that_never_came_swallows_nothing_later() -> None:
     guard = EchoGuard(echoes=True)
     guard.sent(A, 0.0)
-    assert not guard.is_echo(A, MEMORY_S + 0.01)
+    assert not guard.is_echo(A, ECHO_S + 0.01)
+    guard.sent(A, ECHO_S + 0.02)
+    assert [guard.is_echo(A, ECHO_S + 0.02) for _ in range(2)] == [True, False]
 
 
 @given(st.lists(st.tuples(st.booleans(), st.sampled_from([A, B])), max_size=60))
@@ -57,6 +59,15 @@ def test_frames_that_go_round_are_noticed_whether_or_not_the_interface_echoes(
         assert guard.is_echo(frame, now_s) == echoes
         if echoes:
             assert not guard.is_echo(frame, now_s)  # another gateway's copy
+    assert guard.storm
+
+
+def test_a_round_that_takes_seconds_is_noticed_too() -> None:
+    guard = EchoGuard(echoes=False)
+    for k in range(4000):
+        guard.sent(Frame(1, k.to_bytes(2, "big")), k / 1000)
+    for k in range(4000):
+        guard.is_echo(Frame(1, k.to_bytes(2, "big")), 4.0 + k / 1000)
     assert guard.storm
 
 
