@@ -35,6 +35,10 @@ _new = tuple.__new__  # of a frame, past its constructor: this is the hot path
 _IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ignore_config"})
 
 
+class BusClosedError(can.CanOperationError):
+    """The bus said goodbye, at the end of its run; the text has its reason."""
+
+
 class FleetloopBus(can.BusABC):
     """One client of an emulated bus.
 
@@ -195,7 +199,7 @@ class FleetloopBus(can.BusABC):
         elif self._outbox:
             self._flush(0)
         if self._closed_because is not None:
-            raise can.CanOperationError(f"bus {self.channel!r} closed: {self._closed_because}")
+            raise BusClosedError(f"bus {self.channel!r} closed: {self._closed_because}")
         try:
             if wait_s is not None and wait_s < FINE_S:
                 if not polling:
@@ -229,7 +233,7 @@ class FleetloopBus(can.BusABC):
                 put(to_message(can_id, content, timestamp, channel, is_rx))
         elif packet is not None and packet.kind == wire.BYE:
             self._closed_because = packet.text
-            raise can.CanOperationError(f"bus {self.channel!r} closed: {packet.text}")
+            raise BusClosedError(f"bus {self.channel!r} closed: {packet.text}")
         elif not data:
             raise can.CanOperationError(f"bus {self.channel!r} closed without a word")
 
