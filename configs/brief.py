@@ -330,8 +330,8 @@ class DriveModel:
     torques_period_ns: int  # 0: only on request
     watchdog_ns: int  # 0: off
     zero_torque_on_disarm: bool
-    command_latency_ns: tuple[int, int]  # from the end of a frame until firmware acts on it
     serial_number: int  # of the right drive; the left one has the next number
+    command_latency_ns: tuple[int, int] = (0, 0)  # from a frame's end until firmware acts on it
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,7 +107,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
         settle_memory()
         refused = go_realtime(PLANT_PRIORITY)
         record = partial(_record, link, others, rows[len(units) :], brief.schedule.period_s)
-        wall = RealtimeLoop(brief, units, end, poses, rows[: len(units)], say, record)
+        wall = RealtimeLoop(brief, units, end, hub, poses, rows[: len(units)], say, record)
         counters, progress_of = wall.counters, wall.progress
         body = partial(wall.run, epoch_ns)
     else:

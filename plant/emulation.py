@@ -24,10 +24,20 @@ def emulations(
     return {bus: _emulation(brief, bus, group, begin(group)) for bus, group in by_bus.items()}
 
 
-def _emulation(brief: PlantBrief, bus: str, units: Sequence[Unit], begin: Begin) -> Emulation:
-    schedule = brief.schedule
+def wire_bus(brief: PlantBrief, bus: str, units: Sequence[Unit], begin: Begin) -> WireBus:
+    """A bus with the bit timing that the brief wants.
+
+    Raises:
+        ValueError: it wants none.
+    """
     if brief.wire is None:
-        return IdealBus(units, schedule, brief.substeps, begin)
-    step_ns = schedule.period_ns // brief.substeps
+        raise ValueError(f"bus {bus} is ideal")
+    step_ns = brief.schedule.period_ns // brief.substeps
     random = Random(f"{brief.seed}/{bus}/firmware")
-    return WireBus(units, schedule, brief.wire, step_ns, begin, random)
+    return WireBus(units, brief.schedule, brief.wire, step_ns, begin, random)
+
+
+def _emulation(brief: PlantBrief, bus: str, units: Sequence[Unit], begin: Begin) -> Emulation:
+    if brief.wire is None:
+        return IdealBus(units, brief.schedule, brief.substeps, begin)
+    return wire_bus(brief, bus, units, begin)
