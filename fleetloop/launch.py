@@ -158,9 +158,12 @@ class ProcessRun:
             return NetworkLink(run, link.endpoint, user, plan.passwords[user])
 
         ticks = schedule(scenario, self._speed)
+        emulated = tuple(r for r in self._robots if deployment.emulates(r))
         recorder = RecorderBrief(
             str(self._record),
             self._robots,
+            emulated if scenario.bus.record else (),
+            scenario.bus.record,
             to_toml(scenario),
             ticks.period_ns,
             ticks.start_deadline_s,

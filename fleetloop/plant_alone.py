@@ -129,7 +129,7 @@ def _run(
     units = [unit_of(robot) for robot in brief.robots]
     nowhere = _Nowhere()
     rows = [RowBuffer(PLANT_ROW, lambda *_: None) for _ in units]
-    loop = RealtimeLoop(brief, units, end, hub, [nowhere] * len(units), rows, nowhere.put)
+    loop = RealtimeLoop(brief, units, end, hub, [nowhere] * len(units), rows, nowhere.put, {})
     refused = go_realtime(PLANT_PRIORITY)
     if options.serve_stdin:
         threading.Thread(target=_serve_stdin, args=(units, loop, stop), daemon=True).start()

@@ -5,11 +5,12 @@ IdealLive   frames take no time: who sends torques is answered at once, what is 
 WireLive    a bus of ours with bit timing: frames end when the wire says, drives answer cyclically
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from bridge.can_bus.ends import DriveEnd
 from bridge.can_bus.hub import Hub
 from bridge.frame import Frame
+from bridge.telemetry import FROM_DRIVE, Tap, no_tap
 from configs.brief import PlantBrief
 from plant.emulation import wire_bus
 from plant.unit import Unit
@@ -20,8 +21,9 @@ class IdealLive:
     """The robots of a bus on which frames take no time."""
 
     def __init__(
-        self, name: str, units: Sequence[Unit], end: DriveEnd, zero_ns: int, step_ns: int
+        self, name: str, units: Sequence[Unit], end: DriveEnd, zero_ns: int, step_ns: int, tap: Tap
     ) -> None:
+        self._tap = tap
         self.units = units
         self._name = name
         self._end = end
@@ -36,12 +38,14 @@ class IdealLive:
         """Take what others sent, and answer."""
         self._move(now_ns)
         said = self._end.take(self._name)
+        self._tap(now_ns, said, 0)
         replies: list[Frame] = []
         for unit in self.units:
             for frame in said:
                 replies += unit.hear(frame, now_ns)
             replies += unit.feedback(now_ns)
         if replies:
+            self._tap(now_ns, replies, FROM_DRIVE)
             self._end.deliver(self._name, now_ns, replies)
 
     def advance(self, now_ns: int) -> None:
@@ -55,6 +59,7 @@ class IdealLive:
         """Say what is due at a tick."""
         frames = [frame for unit in self.units for frame in unit.frames_due(bus_ns)]
         if frames:
+            self._tap(bus_ns, frames, FROM_DRIVE)
             self._end.deliver(self._name, bus_ns, frames)
 
     def _move(self, to_ns: int) -> None:
@@ -102,7 +107,11 @@ Live = IdealLive | WireLive
 
 
 def live_buses(
-    brief: PlantBrief, units: Sequence[Unit], end: DriveEnd, hub: Hub
+    brief: PlantBrief,
+    units: Sequence[Unit],
+    end: DriveEnd,
+    hub: Hub,
+    taps: Mapping[str, Tap],
 ) -> dict[str, Live]:
     """All buses by name; those on `hub` have bit timing if the brief wants it."""
     by_bus: dict[str, list[Unit]] = {}
@@ -113,9 +122,10 @@ def live_buses(
     step_ns = brief.schedule.period_ns // brief.substeps
     lives: dict[str, Live] = {}
     for name, group in by_bus.items():
+        tap = taps.get(name, no_tap)
         if brief.wire is not None and name in ours:
-            bus = wire_bus(brief, name, group, lambda _: None)
+            bus = wire_bus(brief, name, group, lambda _: None, tap)
             lives[name] = WireLive(name, bus, hub)
         else:
-            lives[name] = IdealLive(name, group, end, zero_ns, step_ns)
+            lives[name] = IdealLive(name, group, end, zero_ns, step_ns, tap)
     return lives

@@ -10,14 +10,14 @@ cyclically, as always.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from bridge.can_bus.ends import DriveEnd
 from bridge.can_bus.hub import Hub
 from bridge.link import Publisher
 from bridge.messages import PoseFix, Progress
 from bridge.process import Stop
-from bridge.telemetry import RowBuffer
+from bridge.telemetry import RowBuffer, Tap
 from configs.brief import PlantBrief
 from plant.live import WireLive, live_buses
 from plant.loop import REPORT_EVERY_NS, Counters
@@ -39,6 +39,7 @@ class RealtimeLoop:
         poses: Sequence[Publisher],
         rows: Sequence[RowBuffer],
         report: Callable[[Progress], None],
+        taps: Mapping[str, Tap],
         record_others: Callable[[int], None] = lambda _: None,
     ) -> None:
         self._schedule = brief.schedule
@@ -46,7 +47,7 @@ class RealtimeLoop:
         self._zero_ns = brief.schedule.bus_time_ns(0)
         self._end = end
         self._report = report
-        self._buses = live_buses(brief, units, end, hub)
+        self._buses = live_buses(brief, units, end, hub, taps)
         self._wires = [bus for bus in self._buses.values() if isinstance(bus, WireLive)]
         self._poses = dict(zip(units, poses, strict=True))
         self._rows = dict(zip(units, rows, strict=True))

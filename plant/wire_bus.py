@@ -24,6 +24,7 @@ from bridge.can_bus.traffic import Key, Passed, Said
 from bridge.can_bus.wire import Wire
 from bridge.drives import DriveNode
 from bridge.frame import ERR, Frame
+from bridge.telemetry import FROM_DRIVE, Tap
 from configs.brief import Schedule, WireModel
 from plant.buses import Ask, Begin, Steps
 from plant.unit import Unit
@@ -55,8 +56,10 @@ class WireBus:
         model: WireModel,
         step_ns: int,
         begin: Begin,
+        tap: Tap,
         random: Random,
     ) -> None:
+        self._tap = tap
         self.units = units
         self.wire = Wire(model.bitrate_bit_s)
         self._model = model
@@ -209,6 +212,7 @@ class WireBus:
         end_ns, sender, frame = event.end_ns, event.sender, event.frame
         key = self._key_of.get(sender)
         self._passed.append(Passed(end_ns, frame, key))
+        self._tap(end_ns, (frame,), FROM_DRIVE if key is None else 0)
         drive = self._of_node.get(sender)
         if drive is not None:
             if drive.backlog:
