@@ -217,9 +217,12 @@ class ProcessRun:
             if ready and "plant" in self._seen:
                 return None
             if (failure := self._cause()) is not None:
+                if failure.rank >= GAVE_UP and (absent := self._elsewhere.absent()):
+                    raise InfrastructureError(f"not there: {', '.join(absent)}; {failure.text}")
                 return failure
             if time.monotonic() > deadline:
-                absent = sorted(set(self._processes) - self._alive) or ["the plant's first tick"]
+                absent = self._elsewhere.absent() or sorted(set(self._processes) - self._alive)
+                absent = absent or ["the plant's first tick"]
                 raise InfrastructureError(
                     f"not ready within {self._scenario.clock.start_deadline_s:g} s:"
                     f" {', '.join(absent)}"

@@ -14,7 +14,9 @@ def robots_of_plant(brief: PlantBrief, deployment: Deployment) -> PlantBrief:
     """The plant's brief with the robots that it emulates, and the others as it sees them."""
     emulated = tuple(r for r in brief.robots if deployment.emulates(r.robot))
     attached = tuple(
-        (r.bus, deployment.bus_of(r.robot)) for r in emulated if not deployment.is_ours(r.robot)
+        (r.bus, deployment.plant_bus_of(r.robot))
+        for r in emulated
+        if not deployment.is_ours(r.robot)
     )
     witnessed = tuple((r.robot, r.pose) for r in brief.robots if r not in emulated)
     return replace(brief, robots=emulated, attached=attached, witnessed=witnessed)
