@@ -14,14 +14,17 @@ SLOW_GUEST = (
 
 
 def on_socketcan(folder: Path, channels: Mapping[str, str]) -> Path:
-    """A deployment file that puts the buses of these robots on these interfaces."""
+    """A deployment file that puts the buses of these robots on these interfaces.
+
+    "can0 can1": the plant on can0 and the controller on can1, two nodes of one wire.
+    """
     lines = ["schema = 1"]
     for robot, channel in channels.items():
-        lines += [
-            f"[robot.{robot}]",
-            "emulated = true",
-            f'bus = {{ interface = "socketcan", channel = "{channel}" }}',
-        ]
+        plant, _, host = channel.rpartition(" ")
+        lines += [f"[robot.{robot}]", "emulated = true"]
+        lines.append(f'bus = {{ interface = "socketcan", channel = "{host}" }}')
+        if plant:
+            lines.append(f'plant_bus = {{ interface = "socketcan", channel = "{plant}" }}')
     path = folder / "deployment.toml"
     path.write_text("\n".join(lines) + "\n", "utf-8")
     return path

@@ -181,7 +181,7 @@ def test_a_wrong_password_is_refused_within_the_start_deadline(tmp_path, agents)
         assert "no session with the router at tcp/localhost:" in said
         status, out = run.end()
         assert status == 3
-        assert re.search("fleetloop: not (there|ready within 6 s): agent/r2(;|$)", out, re.M), out
+        assert re.search(r"fleetloop: not (there|ready within 6 s): agent/r2[;\n]", out), out
     finally:
         run.kill()
     assert psutil.Process().children() == []
