@@ -169,6 +169,10 @@ def plant(
             "--stdin", help="Answer requests on standard input (poses), and end when it ends."
         ),
     ] = False,
+    join: Annotated[
+        bool,
+        typer.Option("--join", help="Be the plant of the deployment's run; its launcher waits."),
+    ] = False,
 ) -> None:
     """Emulate drives and physics alone, in real time, for your own CAN host code."""
     from fleetloop.plant_alone import Options, run_plant
@@ -180,6 +184,7 @@ def plant(
         overrides=tuple(overrides or []),
         as_json=as_json,
         serve_stdin=stdin,
+        join=join,
     )
     raise typer.Exit(run_plant(scenario, options))
 

@@ -59,6 +59,24 @@ def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
     return passwords(deployment.network, tuple(identities))
 
 
+def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.AccessPlan:
+    """Who may say and hear what, and everybody's credentials.
+
+    Raises:
+        ScenarioError: the deployment's credentials lack somebody.
+    """
+    graph, network = scenario.topology, deployment.network
+    return access.plan(
+        run,
+        scenario.names,
+        graph.hears,
+        graph.leader,
+        witnessed=[robot for robot in scenario.names if not deployment.emulates(robot)],
+        guests=guests(scenario, deployment),
+        certified=network is not None and network.tls is not None,
+    )
+
+
 def network_link(scenario: Scenario, deployment: Deployment, role: str) -> NetworkLink:
     """How a role that is started by itself reaches the router.
 

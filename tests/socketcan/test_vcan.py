@@ -135,7 +135,6 @@ def test_cansend_of_a_stranger_stops_an_axis_and_the_robot_stops_itself(tmp_path
         status, out = process.end(within_s=60.0)
         assert status == 1, out
         stopped = process.summary()["stopped_robots"]
-        assert set(stopped) == {"r1"}
         assert "left drive (node 1) dropped out: ESTOP_REQUESTED" in stopped["r1"]
     finally:
         process.kill()

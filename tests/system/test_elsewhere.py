@@ -187,6 +187,33 @@ def test_a_wrong_password_is_refused_within_the_start_deadline(tmp_path, agents)
     assert psutil.Process().children() == []
 
 
+def test_the_plant_may_be_elsewhere_too(tmp_path) -> None:
+    (tmp_path / "users").write_text("plant:secret\n")
+    (tmp_path / "users").chmod(0o600)
+    where = tmp_path / "where.toml"
+    where.write_text(
+        'roles = ["recorder", "agent/r1", "agent/r2"]\n'
+        f'network = {{ endpoint = "tcp/127.0.0.1:{free_port()}", users = "users" }}\n'
+    )
+    common = (*SCENARIO, "--set", "duration_s=2.0", "--deployment", str(where))
+    run = Run(tmp_path / "run", *common)
+    with subprocess.Popen(
+        [sys.executable, "-m", "fleetloop", "plant", *common, "--join"],
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as plant:
+        try:
+            status, out = run.end()
+            _, said = plant.communicate(timeout=10.0)
+        finally:
+            run.kill()
+            plant.kill()
+    assert status == 0, out
+    assert plant.returncode == 0, said
+    assert "ended after tick 200" in said
+    assert run.summary()["ticks"] == 200
+
+
 def certificates(folder: Path, names: tuple[str, ...]) -> None:
     """An authority and a certificate for each name, by openssl."""
 
