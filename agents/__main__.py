@@ -33,7 +33,7 @@ from bridge.process import (
 )
 from bridge.profile import Sampler
 from bridge.telemetry import AGENT_ROW, RowBuffer
-from bridge.zenoh_link import open_client
+from bridge.zenoh_link import open_polled
 from configs.brief import AgentBrief
 from configs.errors import FleetloopError
 
@@ -47,7 +47,7 @@ def run(brief: AgentBrief, stop: Stop) -> str:
     Returns why it stopped before the end of the run, "" if it did not.
     """
     name_process(f"agent {brief.robot}")
-    with open_client(brief.network, brief.schedule.start_deadline_s) as link:
+    with open_polled(brief.network, brief.schedule.start_deadline_s) as link:
         if brief.detached:
             link.on_gone(keys.live(brief.network.run, LAUNCHER), partial(stop.end, LAUNCHER_GONE))
         with open_bus(brief.robot, brief.bus) as bus:
@@ -116,6 +116,7 @@ class _Wired(NamedTuple):
         Returns why the body stopped early, "" if it did not.
         """
         sampler = Sampler()
+        began_ns = cpu_ns()
         failure = ""
         try:
             with sampler if self.agent.brief.schedule.profile else nullcontext():
@@ -132,7 +133,7 @@ class _Wired(NamedTuple):
                 "stopped": self.agent.stopped_because,
                 "refused": ", ".join(refused),
                 "failure": failure,
-                "cpu_ns": cpu_ns(),
+                "cpu_ns": cpu_ns() - began_ns,
             }
             self.report.put(Report(values).encode())
             stop.await_release()

@@ -77,8 +77,6 @@ class Agent:
         """What the loop measured of the clock at this tick, for the record."""
         self.hear = self._drives.hear
         """Take one frame from the bus: identifier, data, bus time [ns] at which it came."""
-        self.complete = self._drives.complete
-        """Whether both encoder frames of a bus time [ns] are here: the tick may be computed."""
 
     # --- what arrives ------------------------------------------------------------------------
 

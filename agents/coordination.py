@@ -17,6 +17,7 @@ from typing import NamedTuple
 from configs.brief import Coordination
 
 Matrix = list[list[float]]
+_new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
 class CoordinationState(NamedTuple):
@@ -48,11 +49,12 @@ class Coordinator:
         v_hat, mu, s = state
         (v_v, v_in, v_r_in), (mu_v, mu_mu, mu_s, mu_V, mu_r, mu_S), last = rows
         s_v, s_mu, s_s, s_V, s_r, s_S = last
-        return CoordinationState(
+        after = (
             v_v * v_hat + v_in * sum_v + v_r_in * v_r,
             mu_v * v_hat + mu_mu * mu + mu_s * s + mu_V * sum_v + mu_r * v_r + mu_S * sum_s,
             s_v * v_hat + s_mu * mu + s_s * s + s_V * sum_v + s_r * v_r + s_S * sum_s,
         )
+        return _new(CoordinationState, after)
 
     def _map(self, n: int) -> tuple[tuple[float, ...], ...]:
         """Rows of exp([A B; 0 0] h) for states (v̂, μ, s) and inputs (V, v_r, S)."""

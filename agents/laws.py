@@ -14,6 +14,8 @@ from agents.paths import Reference
 from agents.wheel_torque import Projection, Row, adapt, wheel_torques
 from configs.brief import Gains, Wheels
 
+_new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
+
 
 class Sense(NamedTuple):
     """The motion that the controller believes in."""
@@ -130,7 +132,7 @@ def _dsc(gains: Gains, wheels: Wheels, period_s: float, *, robust: bool) -> Law:
             next_1 = adapt(theta_1, f_1, e_1 * _calm(f_1, rates_1, k4), rates_1, bounds)
             next_2 = adapt(theta_2, f_2, e_2 * _calm(f_2, rates_2, k4), rates_2, bounds)
             next_kappa = keep * kappa + gain * hypot(e_1, e_2)
-        after = LawState(
+        after = (
             alpha_theta + a1 * (bar_theta - alpha_theta),
             alpha_v + a2 * (bar_v - alpha_v),
             alpha_omega + a3 * (bar_omega - alpha_omega),
@@ -139,7 +141,8 @@ def _dsc(gains: Gains, wheels: Wheels, period_s: float, *, robust: bool) -> Law:
             next_kappa,
         )
         signals = (x_e, y_e, theta_e, alpha_theta, alpha_v, alpha_omega, e_1, e_2)
-        return LawOutput(tau_right, tau_left, after, (*signals, *theta_1, *theta_2, kappa))
+        said = (*signals, *theta_1, *theta_2, kappa)
+        return _new(LawOutput, (tau_right, tau_left, _new(LawState, after), said))
 
     return step
 

@@ -1,19 +1,23 @@
 """One controller in lockstep: the bus is the clock.
 
-Both encoder frames of an instant are the tick; then come the pose and the in-neighbours' path
-states that the schedule says are due. The torque frames are the answer. A path state is said as
+Both encoder frames of a tick are the tick; then come the pose and the in-neighbours' path states
+that the schedule says are due. The torque frames are the answer. A path state is said as
 soon as it is known, at the end of the tick before the one that it is due at: so it travels while
 others still compute, and a graph with cycles can't deadlock.
 """
 
+import errno
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import can
 
 from agents.agent import Agent, Phase
+from agents.bus_clock import BusClock
 from bridge.barrier import Hellos
 from bridge.can_bus.convert import can_id_of, to_message
+from bridge.frame import Frame
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import LeaderSpeed, PathState, PoseFix
 from bridge.process import Stop
@@ -37,6 +41,7 @@ class Counters:
     bus_ns: int = 0
     listen_ns: int = 0
     compute_ns: int = 0
+    unsent: int = 0  # frames that found the transmit queue full
     undecodable: int = 0
 
 
@@ -85,22 +90,26 @@ class LockstepLoop:
         agent = self._agent
         counters = self.counters
         message: can.Message | None = first
-        answered_ns = -1
         asked_ns = time.monotonic_ns()
-        hear, complete, schedule, send = agent.hear, agent.complete, self._schedule, self._bus.send
-        while message is not None:
-            now_ns = round(message.timestamp * 1e9)
-            hear(can_id_of(message), message.data, now_ns)
-            # Replies to somebody else may follow at an instant that is answered already.
-            if now_ns > answered_ns and complete(now_ns):
-                answered_ns = now_ns
+        hear, clock, schedule = (
+            agent.hear,
+            BusClock(self._schedule, agent.heard_since),
+            self._schedule,
+        )
+        timeout_s = BUS_SHARE * schedule.tick_deadline_s
+        while True:
+            if message is None:
+                tick: int | None = clock.passed()
+            else:
+                now_ns = round(message.timestamp * 1e9)
+                hear(can_id_of(message), message.data, now_ns)
+                tick = clock.due(now_ns)
+            if tick is not None:
                 came_ns = time.monotonic_ns()
-                tick = schedule.tick_of(now_ns)
                 if schedule.owes(tick):
                     self._listen(tick, stop)
                 heard_ns = time.monotonic_ns()
-                for can_id, data in agent.step(tick) if not stop.requested else agent.leave():
-                    send(to_message(can_id, data))
+                self._send(agent.step(tick) if not stop.requested else agent.leave())
                 if schedule.shares(tick + 1):
                     self._path.put(agent.share(tick + 1).encode())
                 counters.bus_ns += came_ns - asked_ns
@@ -110,11 +119,23 @@ class LockstepLoop:
                 counters.ticks += 1
                 if agent.phase is Phase.DONE:
                     return
-            message = self._receive(BUS_SHARE * self._schedule.tick_deadline_s)
-        raise InfrastructureError(
-            f"{self._robot}: no encoder frames within"
-            f" {BUS_SHARE * self._schedule.tick_deadline_s:g} s after {counters.ticks} ticks"
-        )
+            message = self._receive(timeout_s)
+            if message is None and time.monotonic_ns() - asked_ns > timeout_s * 0.9e9:
+                raise InfrastructureError(
+                    f"{self._robot}: no encoder frames within {timeout_s:g} s after"
+                    f" {counters.ticks} ticks"
+                )
+
+    def _send(self, frames: Sequence[Frame]) -> None:
+        send = self._bus.send
+        for can_id, data in frames:
+            try:
+                send(to_message(can_id, data))
+            except can.CanOperationError as error:
+                if error.error_code != errno.ENOBUFS:
+                    raise PeerLostError(f"{self._robot}: lost its bus: {error}") from error
+                # As on hardware: the next one is newer.
+                self.counters.unsent += 1
 
     def _listen(self, tick: int, stop: Stop) -> None:
         """Wait for what the schedule owes this tick, or for a stop."""

@@ -48,15 +48,20 @@ def await_hellos(
         InfrastructureError: something was still missing after `within_s`; the text names it.
     """
     deadline = time.monotonic() + within_s
+    next_hello = time.monotonic()
     while absent := tuple(missing()):
         if stop.requested:
             return
-        if time.monotonic() > deadline:
+        now = time.monotonic()
+        if now > deadline:
             raise InfrastructureError(
                 f"{who}: not ready after {within_s:g} s: heard nothing of {', '.join(absent)}"
             )
-        hellos.say()
-        arrival = link.receive(HELLO_EVERY_S)
+        if now >= next_hello:
+            # Never sooner: a hello that answers a hello would be a storm on a ring.
+            next_hello = now + HELLO_EVERY_S
+            hellos.say()
+        arrival = link.receive(max(next_hello - time.monotonic(), 0.0))
         while arrival is not None:
             take(arrival)
             arrival = link.receive(0.0)

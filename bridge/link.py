@@ -28,8 +28,8 @@ class Publisher(Protocol):
 class Link(Protocol):
     """One process's connection to the others."""
 
-    def publisher(self, key: str) -> Publisher:
-        """A publisher on `key`."""
+    def publisher(self, key: str, *, express: bool = True) -> Publisher:
+        """A publisher on `key`; not express, its messages may travel with others a little later."""
 
     def subscribe(self, key: str, tag: str) -> None:
         """Queue what is put on `key`, marked with `tag`."""

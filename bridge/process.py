@@ -165,7 +165,7 @@ def go_realtime(priority: int) -> list[str]:
 
 
 def cpu_ns() -> int:
-    """Processor time of this process so far, all threads."""
+    """Processor time of this process so far, all threads; a run counts from its first tick."""
     return time.process_time_ns()
 
 

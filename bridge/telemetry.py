@@ -26,10 +26,12 @@ PLANT_SIGNALS: tuple[Signal, ...] = (
     Signal("theta_rad", "rad", "true heading, not wrapped"),
     Signal("v_m_s", "m/s", "true forward speed"),
     Signal("omega_rad_s", "rad/s", "true turn rate"),
-    Signal("demand_right_Nm", "N·m", "torque asked of the right motor during the last period"),
-    Signal("demand_left_Nm", "N·m", "torque asked of the left motor during the last period"),
-    Signal("motor_right_Nm", "N·m", "torque that the right wheel felt during the last period"),
-    Signal("motor_left_Nm", "N·m", "torque that the left wheel felt during the last period"),
+    Signal("input_right_Nm", "N·m", "torque that the right drive was last told, before limits"),
+    Signal("input_left_Nm", "N·m", "torque that the left drive was last told, before limits"),
+    Signal("demand_right_Nm", "N·m", "torque asked of the right motor at last, after limits"),
+    Signal("demand_left_Nm", "N·m", "torque asked of the left motor at last, after limits"),
+    Signal("motor_right_Nm", "N·m", "torque that the right wheel felt at last"),
+    Signal("motor_left_Nm", "N·m", "torque that the left wheel felt at last"),
 )
 """Truth of one robot at one tick, before the controller answers."""
 

@@ -1,23 +1,28 @@
 """A link over Zenoh: client sessions to one router, which enforces the graph.
 
 Client mode, multicast and gossip off, so that nobody can talk past the router; shared memory off;
-reliable, blocking, express, real-time priority: nothing is dropped, nothing waits for a batch.
+reliable, blocking, real-time priority: nothing is dropped. Express, nothing waits for a batch.
 Subscribers run on Zenoh's network thread and only queue. Every session is closed in a `with`: one
 that isn't can keep its process from ending.
+
+Each session keeps few threads: a message that wakes one instead of five costs half as much. In a
+router what hears and what says stay apart, so that somebody who doesn't read can't stop the rest.
 """
 
 import contextlib
 import json
+import os
 import re
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 import zenoh
-from zenoh.handlers import Callback
+from zenoh.handlers import Callback, FifoChannel
 
 from bridge.access import AccessPlan
 from bridge.link import Arrival, Inbox, Publisher
@@ -28,6 +33,12 @@ LEASE_MS = 1000
 """A peer that is silent for this long is gone."""
 CLOSE_S = 1.0
 _PORT_TRIES = 5
+_POLLED_DEPTH = 4096
+"""Messages that wait for who polls; many times more than any schedule lets be on their way."""
+_YIELDS = 20
+_PAUSE_S, _LONGEST_PAUSE_S = 50e-6, 2e-3
+_ONE_THREAD = "(app: (worker_threads: 1), net: {0}, acc: {0}, rx: {0}, tx: {1})"
+_APP, _OWN = "(handover: app)", "(worker_threads: 1)"
 
 
 class ZenohLink:
@@ -40,13 +51,13 @@ class ZenohLink:
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
         self.receive = self._inbox.receive
 
-    def publisher(self, key: str) -> Publisher:
+    def publisher(self, key: str, *, express: bool = True) -> Publisher:
         """A publisher on `key`; a put blocks rather than drops."""
         return self._session.declare_publisher(
             key,
             congestion_control=zenoh.CongestionControl.BLOCK,
             priority=zenoh.Priority.REAL_TIME,
-            express=True,
+            express=express,
             reliability=zenoh.Reliability.RELIABLE,
             allowed_destination=zenoh.Locality.REMOTE,
         )
@@ -130,6 +141,53 @@ class ZenohLink:
         self.close()
 
 
+class PolledLink(ZenohLink):
+    """A link for who looks at given times: what comes wakes nobody and runs no Python.
+
+    `receive` looks at all subscribers in turn. Waiting is looking again: a few times giving way to
+    others, then with pauses that grow.
+    """
+
+    def __init__(self, session: zenoh.Session) -> None:
+        super().__init__(session)
+        self._polled: list[tuple[str, str, Callable[[], zenoh.Sample | None]]] = []
+        self.receive = self._receive
+
+    def subscribe(self, key: str, tag: str) -> None:
+        """Keep what others put on `key`, marked with `tag`."""
+        subscriber = self._session.declare_subscriber(
+            key, FifoChannel(_POLLED_DEPTH), allowed_origin=zenoh.Locality.REMOTE
+        )
+        self._declared.append(subscriber)
+        self._polled.append((tag, key, subscriber.try_recv))
+
+    def _receive(self, timeout_s: float) -> Arrival | None:
+        polled = self._polled
+        for tag, key, look in polled:
+            if (sample := look()) is not None:
+                return Arrival(tag, key, sample.payload.to_bytes())
+        if timeout_s <= 0.0:
+            return None
+        deadline = time.monotonic() + timeout_s
+        looks, pause_s = 0, _PAUSE_S
+        while (left_s := deadline - time.monotonic()) > 0.0:
+            if looks < _YIELDS:
+                os.sched_yield()
+            else:
+                time.sleep(min(pause_s, left_s))
+                pause_s = min(1.5 * pause_s, _LONGEST_PAUSE_S)
+            looks += 1
+            for tag, key, look in polled:
+                if (sample := look()) is not None:
+                    return Arrival(tag, key, sample.payload.to_bytes())
+        return None
+
+    def close(self) -> None:
+        """Close the session and all that it declared."""
+        self._polled.clear()
+        super().close()
+
+
 class RouterLink(ZenohLink):
     """The launcher's link: its session is the router."""
 
@@ -144,6 +202,15 @@ def open_client(network: NetworkLink, timeout_s: float) -> ZenohLink:
     Raises:
         InfrastructureError: nobody answers there, or the login was refused.
     """
+    return ZenohLink(_client(network, timeout_s))
+
+
+def open_polled(network: NetworkLink, timeout_s: float) -> PolledLink:
+    """The same for who looks at given times."""
+    return PolledLink(_client(network, timeout_s))
+
+
+def _client(network: NetworkLink, timeout_s: float) -> zenoh.Session:
     config = _config("client")
     _set(config, "connect/endpoints", [network.endpoint])
     _set(config, "connect/timeout_ms", int(timeout_s * 1000))
@@ -155,7 +222,8 @@ def open_client(network: NetworkLink, timeout_s: float) -> ZenohLink:
         f"{network.user}: no session with the router at {network.endpoint} within {timeout_s:g} s:"
         " nobody listens there, or it refused the login"
     )
-    return ZenohLink(_open_bounded(config, timeout_s + 1.0, failure))
+    with _few_threads(_APP):
+        return _open_bounded(config, timeout_s + 1.0, failure)
 
 
 @contextlib.contextmanager
@@ -181,6 +249,19 @@ def open_router(
         yield link
 
 
+@contextlib.contextmanager
+def _few_threads(tx: str) -> Iterator[None]:
+    """Around the first session of a process: Zenoh reads it then, and children don't inherit it."""
+    if "ZENOH_RUNTIME" in os.environ:
+        yield
+        return
+    os.environ["ZENOH_RUNTIME"] = _ONE_THREAD.format(_APP, tx)
+    try:
+        yield
+    finally:
+        del os.environ["ZENOH_RUNTIME"]
+
+
 def _listen(
     endpoint: str | None, access: AccessPlan, dictionary: Path, outside: Outside | None
 ) -> RouterLink:
@@ -195,7 +276,9 @@ def _listen(
         _set(config, "transport/auth/usrpwd/dictionary_file", str(dictionary))
         config.insert_json5("access_control", access.access_control())
         try:
-            return RouterLink(_open_bounded(config, 10.0, f"{at}: the router did not open"), at)
+            with _few_threads(_OWN):
+                session = _open_bounded(config, 10.0, f"{at}: the router did not open")
+            return RouterLink(session, at)
         except InfrastructureError as error:
             reason = str(error)
     where = " and ".join(

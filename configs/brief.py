@@ -330,7 +330,73 @@ class DriveModel:
     torques_period_ns: int  # 0: only on request
     watchdog_ns: int  # 0: off
     zero_torque_on_disarm: bool
+    command_latency_ns: tuple[int, int]  # from the end of a frame until firmware acts on it
     serial_number: int  # of the right drive; the left one has the next number
+
+
+@dataclass(frozen=True, slots=True)
+class MotorModel:
+    """The motor behind a drive, with its power stage: see `plant.motor`."""
+
+    torque_constant_N_m_A: float  # of the motor
+    assumed_torque_constant_N_m_A: float  # set in the drive
+    current_limit_A: float  # of the power stage
+    current_loop_s: float  # time constant
+    compute_delay_s: float
+    winding_resistance_ohm: float  # heat is R i²
+    fet_resistance_ohm: float
+    viscous_friction_N_m_s: float
+    coulomb_friction_N_m: float
+    ambient_C: float
+    motor_thermal_resistance_K_W: float
+    motor_thermal_time_s: float
+    fet_thermal_resistance_K_W: float
+    fet_thermal_time_s: float
+    torque_noise_N_m: float  # rms, of the drive's estimate
+    current_quantum_A: float  # of the drive's measurement; 0: none
+
+
+@dataclass(frozen=True, slots=True)
+class EncoderModel:
+    """The encoder on a wheel, and the drive's estimator behind it: see `plant.encoder`."""
+
+    counts_per_rev: int
+    index: bool
+    noise_counts: float  # rms
+    pll_bandwidth_rad_s: float
+    pll_rate_hz: float
+
+
+@dataclass(frozen=True, slots=True)
+class SupplyModel:
+    """The source that feeds both drives of a robot: see `plant.supply`."""
+
+    voltage_V: float  # open circuit
+    resistance_ohm: float
+    absorbs: bool  # False: braking charges the bus capacitor instead
+    capacitance_F: float
+    standby_W: float  # of each drive
+
+
+@dataclass(frozen=True, slots=True)
+class PowertrainModel:
+    """What lies between a robot's drives and its wheels."""
+
+    motor: MotorModel
+    encoder: EncoderModel
+    supply: SupplyModel
+    seed: int  # of the robot's noise
+
+
+@dataclass(frozen=True, slots=True)
+class WireModel:
+    """How a bus is emulated that has a bit rate: see `bridge.can_bus.wire`."""
+
+    bitrate_bit_s: int
+    txqueuelen: int  # frames in a host's transmit queue
+    tx_mailboxes: int  # frames in a drive's controller
+    restart_ns: int | None  # a host starts to recover from bus-off this much later; None: never
+    drive_restart_ns: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -342,6 +408,7 @@ class RobotBrief:
     body: Body
     disturbance: Disturbance
     drive: DriveModel
+    powertrain: PowertrainModel | None  # None: ideal motors and encoders
     right_node: int
     left_node: int
     pose: Pose
@@ -358,7 +425,7 @@ class PlantBrief:
     substeps: int  # RK4 steps per control period
     speed: float  # real-time factor that the run is held to; 0: as fast as possible
     seed: int
-    bitrate_bit_s: int
+    wire: WireModel | None  # of every bus; None: ideal, frames take no time
     runtime_folder: str  # holds the buses' sockets; removed when the run ends
     network: NetworkLink
     listeners: tuple[tuple[str, int], ...] = ()  # bus, inherited file descriptor of its socket

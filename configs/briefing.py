@@ -10,22 +10,27 @@ from configs.brief import (
     Disturbance,
     DriveLink,
     DriveModel,
+    EncoderModel,
     FigureEightPath,
     FormationOffset,
     Gains,
     LeaderBrief,
     LinePath,
+    MotorModel,
     NetworkLink,
     PlantBrief,
     Pose,
+    PowertrainModel,
     ReferencePath,
     RobotBrief,
     Schedule,
     Settings,
     SplinePath,
     StructureOffset,
+    SupplyModel,
     VaryingOffset,
     Wheels,
+    WireModel,
     WorldOffset,
 )
 from configs.scenario import Scenario
@@ -117,14 +122,33 @@ def plant_brief(
     """What the plant is told."""
     ticks = schedule(scenario, speed, profile=profile)
     return PlantBrief(
-        robots=tuple(_robot(scenario, n, robot) for n, robot in enumerate(scenario.robot, 1)),
+        robots=robot_briefs(scenario),
         schedule=ticks,
         substeps=max(1, -(-ticks.period_ns // round(scenario.clock.plant_step_s * 1e9))),
         speed=speed,
         seed=scenario.seed,
-        bitrate_bit_s=scenario.bus.bitrate_bit_s,
+        wire=wire_model(scenario),
         runtime_folder=runtime_folder,
         network=network,
+    )
+
+
+def robot_briefs(scenario: Scenario) -> tuple[RobotBrief, ...]:
+    """All robots as the plant sees them."""
+    return tuple(_robot(scenario, n, robot) for n, robot in enumerate(scenario.robot, 1))
+
+
+def wire_model(scenario: Scenario) -> WireModel | None:
+    """How the buses are emulated; None: frames take no time."""
+    bus = scenario.bus
+    if bus.timing == "ideal":
+        return None
+    return WireModel(
+        bitrate_bit_s=bus.bitrate_bit_s,
+        txqueuelen=bus.txqueuelen,
+        tx_mailboxes=bus.tx_mailboxes,
+        restart_ns=None if bus.restart_s is None else round(bus.restart_s * 1e9),
+        drive_restart_ns=None if bus.drive_restart_s is None else round(bus.drive_restart_s * 1e9),
     )
 
 
@@ -176,6 +200,7 @@ def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief
         body=Body(**scenario.body_of(robot).model_dump()),
         disturbance=Disturbance(disturbance.amplitude_N_m, disturbance.rate_rad_s, float(number)),
         drive=_drive_model(scenario, number),
+        powertrain=_powertrain_model(scenario, number),
         right_node=scenario.drive.right_node,
         left_node=scenario.drive.left_node,
         pose=Pose(robot.pose.x_m, robot.pose.y_m, robot.pose.theta_rad),
@@ -186,7 +211,7 @@ def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief
 
 def _drive_model(scenario: Scenario, number: int) -> DriveModel:
     drive = scenario.drive
-    limited = drive.preset == "limited"
+    limited = drive.preset != "ideal"
     return DriveModel(
         protocol=drive.protocol,
         torque_constant_N_m_A=drive.torque_constant_N_m_A,
@@ -200,5 +225,32 @@ def _drive_model(scenario: Scenario, number: int) -> DriveModel:
         torques_period_ns=round(drive.torques_period_s * 1e9),
         watchdog_ns=round(drive.watchdog_s * 1e9),
         zero_torque_on_disarm=drive.zero_torque_on_disarm,
+        command_latency_ns=_latency_ns(drive),
         serial_number=SERIAL_NUMBER + 2 * number,
+    )
+
+
+def _latency_ns(drive: sections.Drive) -> tuple[int, int]:
+    if drive.preset != "realistic":
+        return 0, 0
+    least_s, most_s = drive.command_latency_s
+    return round(least_s * 1e9), round(most_s * 1e9)
+
+
+def _powertrain_model(scenario: Scenario, number: int) -> PowertrainModel | None:
+    drive, motor = scenario.drive, scenario.motor
+    if drive.preset != "realistic":
+        return None
+    constant, limit = motor.torque_constant_N_m_A, motor.current_limit_A
+    inherited = {"torque_constant_N_m_A", "current_limit_A"}
+    return PowertrainModel(
+        motor=MotorModel(
+            torque_constant_N_m_A=drive.torque_constant_N_m_A if constant is None else constant,
+            assumed_torque_constant_N_m_A=drive.torque_constant_N_m_A,
+            current_limit_A=drive.current_limit_A if limit is None else limit,
+            **motor.model_dump(exclude=inherited),
+        ),
+        encoder=EncoderModel(**scenario.encoder.model_dump()),
+        supply=SupplyModel(**scenario.supply.model_dump()),
+        seed=(scenario.seed << 9) + number,  # at most 256 robots
     )

@@ -93,11 +93,22 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
     drive = scenario.drive
     if drive.right_node == drive.left_node:
         yield Problem("drive.left_node", drive.left_node, "must differ from drive.right_node")
+    least_s, most_s = drive.command_latency_s
+    if least_s > most_s:
+        yield Problem("drive.command_latency_s", [least_s, most_s], "least before most")
     if drive.watchdog_s and drive.watchdog_s < 2 * scenario.clock.control_period_s:
         yield Problem(
             "drive.watchdog_s",
             drive.watchdog_s,
             "0 (off) or at least two control periods, or every torque comes too late",
+        )
+    encoder = scenario.encoder
+    if 2.0 * encoder.pll_bandwidth_rad_s >= encoder.pll_rate_hz:
+        yield Problem(
+            "encoder.pll_bandwidth_rad_s",
+            encoder.pll_bandwidth_rad_s,
+            f"must be below half of encoder.pll_rate_hz = {encoder.pll_rate_hz:g}, as drives want"
+            " it: twice the bandwidth times the loop period is a gain below 1",
         )
 
 

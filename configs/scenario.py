@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from configs.powertrain import Encoder, Motor, Supply
 from configs.sections import (
     Body,
     Bus,
@@ -52,6 +53,9 @@ class Scenario(Section):
     localisation: Localisation = Localisation()
     bus: Bus = Bus()
     drive: Drive = Drive()
+    motor: Motor = Motor()
+    encoder: Encoder = Encoder()
+    supply: Supply = Supply()
     disturbance: Disturbance = Disturbance()
     network: Network = Network()
     robot_types: dict[Name, Body] = Field(default_factory=dict)

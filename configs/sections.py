@@ -261,21 +261,45 @@ class Bus(Section):
 
     interface: Literal["fleetloop"] = "fleetloop"
     bitrate_bit_s: Annotated[int, Field(ge=10_000, le=1_000_000)] = 1_000_000
-    timing: Literal["ideal"] = Field("ideal", description="frames take no time")
+    timing: Literal["ideal", "wire"] = Field(
+        "ideal", description="ideal: frames take no time; wire: bit rate, arbitration and errors"
+    )
+    txqueuelen: Annotated[int, Field(ge=1, le=1000)] = Field(
+        10, description="frames that wait at a host before a send fails, as SocketCAN's"
+    )
+    tx_mailboxes: Annotated[int, Field(ge=1, le=32)] = Field(
+        3, description="frames that wait in a drive's controller"
+    )
+    restart_s: NotNegative | None = Field(
+        None, description="a host recovers from bus-off this much later; never if not given"
+    )
+    drive_restart_s: NotNegative | None = Field(
+        None, description="the same of a drive; as in the field, never if not given"
+    )
+    load_ceiling: Annotated[float, Field(gt=0, le=1)] = Field(
+        0.7, description="worst-case load above which a bus on a wire is refused"
+    )
 
 
 class Drive(Section):
     """The drives, two per robot."""
 
     protocol: Literal["odrive"] = "odrive"
-    preset: Literal["ideal", "limited"] = Field(
-        "ideal", description="ideal: torque as commanded; limited: with the limits below"
+    preset: Literal["ideal", "limited", "realistic"] = Field(
+        "ideal",
+        description="ideal: torque as commanded; limited: with the limits below; realistic: these,"
+        " and [motor], [encoder], [supply]",
     )
     right_node: Annotated[int, Field(ge=0, le=62)] = 0
     left_node: Annotated[int, Field(ge=0, le=62)] = 1
     heartbeat_period_s: Positive = 0.1
     torques_period_s: NotNegative = Field(0.0, description="0: only on request")
     watchdog_s: NotNegative = Field(0.1, description="0: off, as drives are delivered")
+    command_latency_s: Annotated[tuple[NotNegative, NotNegative], Field(strict=False)] = Field(
+        (0.0001, 0.0011),
+        description="least and most from the end of a frame until firmware acts on it; preset"
+        " realistic on buses with bit timing",
+    )
     zero_torque_on_disarm: bool = Field(False, description="False: as in the field")
     torque_constant_N_m_A: Positive = 0.05
     current_limit_A: Positive = 10.0

@@ -38,6 +38,7 @@ def findings(scenario: Scenario) -> list[Finding]:
         delay_class(graph, scenario.coordination.p, scenario.coordination.q),
         *(_sampling(scenario, robot) for robot in scenario.robot),
         *(_torque(scenario, robot) for robot in scenario.robot),
+        *_unused(scenario),
     ]
 
 
@@ -105,7 +106,7 @@ def _sampling(scenario: Scenario, robot: Robot) -> Finding:
 
 
 def _torque(scenario: Scenario, robot: Robot) -> Finding:
-    """Steady need d max(v)/r + |Δ| against the drive's limit."""
+    """Steady need d max(v)/r + |Δ|, and friction, against what drive and motor can do."""
     body, drive = scenario.body_of(robot), scenario.drive
     speed = max(abs(v) for _, v in leader_brief(scenario).speed_steps)
     disturbance = robot.disturbance or scenario.disturbance
@@ -115,8 +116,27 @@ def _torque(scenario: Scenario, robot: Robot) -> Finding:
     if drive.preset == "ideal":
         return Finding("ok", title, f"about {need:.3g} N·m at {speed:g} m/s; the drive is ideal")
     limit = drive.current_limit_A * drive.torque_constant_N_m_A
+    if drive.preset == "realistic":
+        motor = scenario.motor
+        need += motor.coulomb_friction_N_m
+        need += motor.viscous_friction_N_m_s * speed / body.wheel_radius_m
+        current = min(drive.current_limit_A, motor.current_limit_A or drive.current_limit_A)
+        limit = current * (motor.torque_constant_N_m_A or drive.torque_constant_N_m_A)
     level: Level = "error" if need >= limit else "warning" if 2 * need > limit else "ok"
     return Finding(level, title, f"about {need:.3g} of {limit:g} N·m; keep twice the need")
+
+
+def _unused(scenario: Scenario) -> list[Finding]:
+    """Sections that say something and aren't looked at."""
+    preset = scenario.drive.preset
+    if preset == "realistic":
+        return []
+    sections = {"motor": scenario.motor, "encoder": scenario.encoder, "supply": scenario.supply}
+    return [
+        Finding("warning", f"[{name}]", f'not used: drive.preset is "{preset}", not "realistic"')
+        for name, section in sections.items()
+        if section != type(section)()
+    ]
 
 
 def _inertias(body: Body) -> tuple[float, float]:

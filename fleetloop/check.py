@@ -6,8 +6,10 @@ from dataclasses import asdict
 from rich.console import Console
 from rich.table import Table
 
+from configs.briefing import robot_briefs
 from configs.loading import json_schema, load, shipped
 from configs.stability import findings
+from fleetloop.bus_load import bus_findings
 from fleetloop.summary import check_expectations
 from fleetloop.terminal import say
 
@@ -23,7 +25,7 @@ def check_scenario(source: str, overrides: tuple[str, ...], *, as_json: bool) ->
     """
     scenario = load(source, overrides)
     check_expectations(scenario.expect)
-    found = findings(scenario)
+    found = [*findings(scenario), *bus_findings(scenario, robot_briefs(scenario))]
     unsound = any(finding.level == "error" for finding in found)
     if as_json:
         say(json.dumps({"sound": not unsound, "findings": [asdict(f) for f in found]}, indent=2))

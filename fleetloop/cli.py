@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from configs.errors import FleetloopError
+from fleetloop.can.app import app as can_app
 
 app = typer.Typer(
     name="fleetloop",
@@ -24,6 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
+app.add_typer(can_app, name="can")
 
 ScenarioArg = Annotated[
     str,

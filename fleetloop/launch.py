@@ -23,7 +23,7 @@ from bridge.can_bus import places
 from bridge.clock import wall_of
 from bridge.link import Arrival, Link
 from bridge.messages import Go, LeaderSpeed, Progress, Report
-from bridge.process import Stop
+from bridge.process import Stop, cpu_ns
 from bridge.zenoh_link import RouterLink, open_router
 from configs.brief import NetworkLink
 from configs.briefing import leader_brief, schedule
@@ -61,6 +61,7 @@ class Outcome:
     wall_s: float = 0.0
     startup_s: float = 0.0
     teardown_s: float = 0.0
+    cpu_ns: int = 0  # of the launcher, since everybody was ready
     reports: dict[str, Report] = field(default_factory=dict)
 
 
@@ -106,7 +107,9 @@ class ProcessRun:
                 failure = self._await_ready(link, stop)
                 if failure is None and not stop.requested:
                     self.outcome.startup_s = time.monotonic() - began
+                    began_ns = cpu_ns()
                     failure = self._watch(link, stop)
+                    self.outcome.cpu_ns = cpu_ns() - began_ns
                 ending = time.monotonic()
                 self._end(link, stop, failure)
                 self.outcome.teardown_s = time.monotonic() - ending

@@ -5,29 +5,120 @@ the same bytes, so a run over processes must leave the same record, bit for bit.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 from agents.agent import Agent
+from agents.bus_clock import BusClock
+from bridge.can_bus.traffic import Said
+from bridge.frame import Frame
 from bridge.messages import LeaderSpeed, PathState, PoseFix, Progress
 from bridge.process import Stop, settled_memory
 from bridge.telemetry import AGENT_ROW, PLANT_ROW, RowBuffer
 from configs.brief import AgentBrief, LeaderBrief, PlantBrief
-from fleetloop.record.writer import RecordWriter, Source
-from plant.unit import Unit
+from fleetloop.record.background import BackgroundWriter
+from fleetloop.record.writer import Source
+from plant.buses import IdealBus
+from plant.emulation import Emulation, emulations
+from plant.unit import Unit, unit_of
+from plant.wire_bus import WireBus
 
 PROGRESS_EVERY_TICKS = 256
 
 
 @dataclass(slots=True)
-class _Lane:
-    """One robot: its body and drives, its controller, its rows."""
+class _Mind:
+    """A controller and its clock."""
 
-    unit: Unit
     agent: Agent
-    truth: RowBuffer
-    frames: int = 0
+    clock: BusClock
+
+    @classmethod
+    def of(cls, agent: Agent) -> "_Mind":
+        """A controller before its first tick."""
+        return cls(agent, BusClock(agent.brief.schedule, agent.heard_since))
+
+
+class _Lane:
+    """One bus with the controllers of its robots."""
+
+    __slots__ = ("frames", "minds", "name")
+
+    def __init__(self, name: str, units: Sequence[Unit], minds: Mapping[str, _Mind]) -> None:
+        self.name = name
+        self.minds = {unit.brief.robot: minds[unit.brief.robot] for unit in units}
+        self.frames = 0
+
+    def tick(self) -> None:
+        """One tick of the bus."""
+        raise NotImplementedError
+
+
+class _IdealLane(_Lane):
+    """A bus on which frames take no time."""
+
+    __slots__ = ("_steps",)
+
+    def __init__(self, name: str, bus: IdealBus, minds: Mapping[str, _Mind]) -> None:
+        super().__init__(name, bus.units, minds)
+        self._steps = bus.steps()
+
+    def tick(self) -> None:
+        steps = self._steps
+        ask = next(steps)
+        while ask is not None:
+            frames = [(ask.stamp_ns, frame) for frame in ask.frames]
+            answers: list[Frame] = []
+            for mind in self.minds.values():
+                answers += _think(mind, frames)
+            self.frames += len(frames) + len(answers)
+            ask = steps.send(answers)
+
+
+class _WireLane(_Lane):
+    """A bus with bit timing."""
+
+    __slots__ = ("_pending", "_steps", "_wire")
+
+    def __init__(self, name: str, bus: WireBus, minds: Mapping[str, _Mind]) -> None:
+        super().__init__(name, bus.units, minds)
+        self._wire = bus
+        self._steps = bus.steps()
+        self._pending: dict[str, list[tuple[int, Frame]]] = {robot: [] for robot in self.minds}
+
+    def tick(self) -> None:
+        steps, pending = self._steps, self._pending
+        ask = next(steps)
+        while ask is not None:
+            self.frames += len(ask.passed)
+            for robot, heard in pending.items():
+                heard += [(end_ns, frame) for end_ns, frame, key in ask.passed if key != robot]
+            robot = ask.asked
+            heard, pending[robot] = pending[robot], []
+            said = _think(self.minds[robot], heard)
+            ask = steps.send([Said(robot, frame) for frame in said[: self._wire.room(robot)]])
+
+
+def _lane(name: str, bus: Emulation, minds: Mapping[str, _Mind]) -> _Lane:
+    if isinstance(bus, WireBus):
+        return _WireLane(name, bus, minds)
+    return _IdealLane(name, bus, minds)
+
+
+def _think(mind: _Mind, heard: Sequence[tuple[int, Frame]]) -> list[Frame]:
+    """What a controller says to frames that it hears; to none at all: a tick has passed."""
+    agent, clock = mind.agent, mind.clock
+    said: list[Frame] = []
+    hear, due = agent.hear, clock.due
+    for at_ns, (can_id, data) in heard:
+        hear(can_id, data, at_ns)
+        tick = due(at_ns)
+        if tick is not None:
+            said += agent.step(tick)
+    if not heard:
+        said += agent.step(clock.passed())
+    return said
 
 
 class InProcessRun:
@@ -38,12 +129,11 @@ class InProcessRun:
         plant: PlantBrief,
         agents: list[AgentBrief],
         leader: LeaderBrief,
-        writer: RecordWriter,
+        writer: BackgroundWriter,
         on_progress: Callable[[Progress], None],
     ) -> None:
-        self._brief = plant
         self._schedule = plant.schedule
-        self._units = [Unit(robot) for robot in plant.robots]
+        self._units = [unit_of(robot) for robot in plant.robots]
         self._truths = [
             RowBuffer(PLANT_ROW, partial(_write, writer, unit.brief.robot, "plant"))
             for unit in self._units
@@ -60,11 +150,14 @@ class InProcessRun:
             for brief in agents
         }
         self._on_progress = on_progress
-        self._period_s = plant.schedule.period_s
-        self._lanes = [
-            _Lane(unit, agent, truth)
-            for unit, agent, truth in zip(self._units, self._agents, self._truths, strict=True)
-        ]
+        ends = dict(zip(self._units, zip(self._agents, self._truths, strict=True), strict=True))
+
+        def begin(group: Sequence[Unit]) -> Callable[[int], None]:
+            return partial(self._begin, [(unit, *ends[unit]) for unit in group])
+
+        minds = {agent.brief.robot: _Mind.of(agent) for agent in self._agents}
+        buses = emulations(plant, self._units, begin)
+        self._lanes = [_lane(name, bus, minds) for name, bus in buses.items()]
         for agent in self._agents:
             if agent.brief.hears_leader:
                 agent.take_leader(LeaderSpeed(leader.speed_steps))
@@ -74,7 +167,7 @@ class InProcessRun:
     @property
     def frames(self) -> dict[str, int]:
         """Frames that would have crossed each bus."""
-        return {lane.unit.brief.bus: lane.frames for lane in self._lanes}
+        return {lane.name: lane.frames for lane in self._lanes}
 
     @property
     def stopped_robots(self) -> dict[str, str]:
@@ -88,7 +181,8 @@ class InProcessRun:
     def run(self, stop: Stop) -> None:
         """Run from the first tick of the countdown to the closing tick, or until told to stop."""
         self._exchange_paths(-1)
-        self._localise(-1)
+        for unit, agent in zip(self._units, self._agents, strict=True):
+            _localise(unit, agent, -1, 0)
         with settled_memory():
             self._run(stop)
         for rows in (*self._truths, *self._telemetry):
@@ -110,37 +204,21 @@ class InProcessRun:
         self.wall_s = (time.monotonic_ns() - start_ns) * 1e-9
 
     def _tick(self, tick: int) -> None:
-        """One tick of all robots, one after the other: within a tick they don't meet."""
-        schedule, period_s, substeps = self._schedule, self._period_s, self._brief.substeps
-        bus_ns = schedule.bus_time_ns(tick)
-        t_s = tick * schedule.period_ns * 1e-9
-        if schedule.localises(tick):
-            self._localise(tick)
-        if schedule.shares(tick):
+        """One tick of all buses, one after the other: within a tick they don't meet."""
+        if self._schedule.shares(tick):
             self._exchange_paths(tick)
-        recorded = 0 <= tick < schedule.ticks
         for lane in self._lanes:
-            unit, agent, truth = lane.unit, lane.agent, lane.truth
-            frames = unit.frames_due(bus_ns)
-            hear = agent.hear
-            for can_id, data in frames:
-                hear(can_id, data, bus_ns)
-            answers = agent.step(tick)
-            lane.frames += len(frames) + len(answers)
-            for frame in answers:
-                for reply in unit.hear(frame, bus_ns):
-                    hear(*reply, bus_ns)
-            if recorded:
-                truth.add(tick, unit.row(t_s))
-                unit.advance(t_s, period_s, substeps)
+            lane.tick()
 
-    def _localise(self, tick: int) -> None:
-        t_ns = max(tick, 0) * self._schedule.period_ns
-        for unit, agent in zip(self._units, self._agents, strict=True):
-            x, y, theta, *_ = unit.state
-            fix = PoseFix.decode(PoseFix(tick, t_ns, x, y, theta).encode())
-            if fix is not None:
-                agent.take_pose(fix)
+    def _begin(self, group: Sequence[tuple[Unit, Agent, RowBuffer]], tick: int) -> None:
+        """As a plant's process does when a tick begins on a bus."""
+        schedule = self._schedule
+        t_ns = tick * schedule.period_ns
+        for unit, agent, truth in group:
+            if 0 <= tick < schedule.ticks:
+                truth.add(tick, unit.row(t_ns * 1e-9))
+            if schedule.localises(tick):
+                _localise(unit, agent, tick, t_ns)
 
     def _exchange_paths(self, tick: int) -> None:
         for agent in self._agents:
@@ -151,8 +229,21 @@ class InProcessRun:
                     hearer.take_path(robot, state)
 
 
+def _localise(unit: Unit, agent: Agent, tick: int, t_ns: int) -> None:
+    x, y, theta, *_ = unit.state
+    fix = PoseFix.decode(PoseFix(tick, t_ns, x, y, theta).encode())
+    if fix is not None:
+        agent.take_pose(fix)
+
+
 def _write(
-    writer: RecordWriter, robot: str, source: Source, first: int, count: int, rows: bytes, _: bool
+    writer: BackgroundWriter,
+    robot: str,
+    source: Source,
+    first: int,
+    count: int,
+    rows: bytes,
+    _: bool,
 ) -> None:
     if count:
         writer.add(robot, source, first, rows)

@@ -27,7 +27,7 @@ def agent_bus(deployment: Deployment, robot: str, *, pace: str, socket: str = ""
     settings = deployment.bus_of(robot)
     if not deployment.is_ours(robot):
         return settings
-    ours = dict(settings) | {pace: True}
+    ours = dict(settings) | {pace: robot if pace == "paced" else True}
     if socket:
         ours["channel"] = socket
     return tuple(sorted(ours.items()))

@@ -37,7 +37,7 @@ from fleetloop.terminal import note, say
 from plant.__main__ import PLANT_PRIORITY, join
 from plant.__main__ import run as plant_of_a_run
 from plant.realtime import RealtimeLoop
-from plant.unit import Unit
+from plant.unit import Unit, unit_of
 
 FOREVER_TICKS = 1 << 53
 GO_AHEAD_NS = 1_000_000
@@ -154,7 +154,7 @@ def _buses(brief: PlantBrief, folder: Path) -> dict[str, Settings]:
 def _run(
     brief: PlantBrief, end: DriveEnd, buses: dict[str, Settings], options: Options, stop: Stop
 ) -> None:
-    units = [Unit(robot) for robot in brief.robots]
+    units = [unit_of(robot) for robot in brief.robots]
     nowhere = _Nowhere()
     rows = [RowBuffer(PLANT_ROW, lambda *_: None) for _ in units]
     loop = RealtimeLoop(brief, units, end, [nowhere] * len(units), rows, nowhere.put)

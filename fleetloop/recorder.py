@@ -70,6 +70,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         )
         link.declare_live(keys.live(name, "recorder"))
         next_report = 0.0
+        began_ns = cpu_ns()
         quiet_since = time.monotonic()
         while recorder.unfinished:
             arrival = link.receive(PROGRESS_EVERY_S)
@@ -82,7 +83,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
             if now >= next_report:
                 next_report = now + PROGRESS_EVERY_S
                 progress.put(Progress(recorder.ticks, 0, 0).encode())
-        values = {"undecodable": recorder.undecodable, "cpu_ns": cpu_ns()}
+        values = {"undecodable": recorder.undecodable, "cpu_ns": cpu_ns() - began_ns}
         report.put(Report(values).encode())
         stop.await_release()
     return f"{brief.path} is complete up to tick {recorder.ticks}"

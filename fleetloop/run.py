@@ -17,6 +17,7 @@ from configs.scenario import Scenario
 from fleetloop import placing, run_folder
 from fleetloop.launch import Outcome, ProcessRun
 from fleetloop.lockstep import InProcessRun
+from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.reader import Record
 from fleetloop.record.writer import RecordWriter
 from fleetloop.results import print_results
@@ -102,7 +103,6 @@ def _over_processes(
     on_progress: Callable[[Progress], None],
     stop: Stop,
 ) -> RunStats:
-    began_ns = time.process_time_ns()
     run = ProcessRun(
         scenario,
         run=f"{folder.name}-{time.monotonic_ns() % 1_000_000:06d}",
@@ -112,9 +112,7 @@ def _over_processes(
         on_progress=on_progress,
         deployment=deployment,
     )
-    stats = _stats(run.run(stop), realtime=scenario.clock.mode == "realtime")
-    stats.cpu_s["launcher"] = round((time.process_time_ns() - began_ns) * 1e-9, 3)
-    return stats
+    return _stats(run.run(stop), realtime=scenario.clock.mode == "realtime")
 
 
 def _in_process(
@@ -127,7 +125,10 @@ def _in_process(
     began = time.monotonic()
     record = folder / run_folder.RECORD
     period_ns = schedule(scenario).period_ns
-    with RecordWriter(record, scenario.names, to_toml(scenario), period_ns) as writer:
+    with (
+        RecordWriter(record, scenario.names, to_toml(scenario), period_ns) as file,
+        BackgroundWriter(file) as writer,
+    ):
         run = InProcessRun(
             plant_brief(scenario, network=network),
             [agent_brief(scenario, r, network=network, bus=()) for r in scenario.names],
@@ -157,6 +158,7 @@ def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
         startup_s=outcome.startup_s,
         teardown_s=outcome.teardown_s,
     )
+    stats.cpu_s["launcher"] = round(outcome.cpu_ns * 1e-9, 3)
     for process, report in outcome.reports.items():
         waits = {
             name.removesuffix("_ns"): round(report.number(name) * 1e-9, 4)

@@ -28,7 +28,7 @@ from configs.brief import PlantBrief, Settings
 from configs.errors import FleetloopError, InfrastructureError
 from plant.loop import Counters, LockstepLoop, bus_frames
 from plant.realtime import RealtimeLoop
-from plant.unit import Unit
+from plant.unit import unit_of
 from plant.witness import Witness
 
 PLANT_PRIORITY = 45
@@ -45,7 +45,7 @@ def run(brief: PlantBrief, stop: Stop) -> str:
             if brief.detached:
                 gone = partial(stop.end, LAUNCHER_GONE)
                 link.on_gone(keys.live(brief.network.run, LAUNCHER), gone)
-            hub = Hub(listeners, stop.wake_fd)
+            hub = Hub(listeners, stop.wake_fd, queue=brief.wire.txqueuelen if brief.wire else 0)
             end: DriveEnd = hub
             try:
                 end = join(hub, brief.attached)
@@ -75,9 +75,11 @@ def join(hub: Hub, attached: Sequence[tuple[str, Settings]]) -> DriveEnd:
 
 def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> Counters:
     name = brief.network.run
-    units = [Unit(robot) for robot in brief.robots]
+    units = [unit_of(robot) for robot in brief.robots]
     others = [Witness(robot, start) for robot, start in brief.witnessed]
-    poses = [link.publisher(keys.pose(name, unit.brief.robot)) for unit in units]
+    # In real time all poses are of one instant: they travel together.
+    express = not brief.schedule.realtime
+    poses = [link.publisher(keys.pose(name, u.brief.robot), express=express) for u in units]
     robots = [*(unit.brief.robot for unit in units), *(other.robot for other in others)]
     truths = [link.publisher(keys.truth(name, robot)) for robot in robots]
     rows = [RowBuffer(PLANT_ROW, partial(_put_rows, truth)) for truth in truths]
@@ -116,6 +118,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
         loop = LockstepLoop(brief, units, hub, poses, rows, say)
         counters, progress_of, body = loop.counters, loop.progress, loop.run
     sampler = Sampler()
+    began_ns = cpu_ns()
     try:
         with sampler if brief.schedule.profile else nullcontext():
             body(stop)
@@ -132,7 +135,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
             "wall_ns": counters.wall_ns,
             "waited_ns": counters.waited_ns,
             "overruns": counters.overruns,
-            "cpu_ns": cpu_ns(),
+            "cpu_ns": cpu_ns() - began_ns,
             "refused": ", ".join(refused),
             **bus_frames(counters),
             **{f"trouble.{bus}": text for bus, text in end.troubles().items()},

@@ -8,6 +8,8 @@ from math import cos, sin
 
 from plant.robot import Robot, State
 
+_new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
+
 
 def rk4(
     robot: Robot, state: State, tau_right: float, tau_left: float, t_s: float, step_s: float
@@ -35,7 +37,7 @@ def rk4(
     travel = sixth * (v + 2.0 * (v2 + v3) + v4)
     turn = sixth * (omega + 2.0 * (omega2 + omega3) + omega4)
     rolled, turned = travel * robot.inv_r, turn * robot.b * robot.inv_r
-    return State(
+    after = (
         x
         + sixth * (v * cos(theta) + 2.0 * (v2 * cos(theta2) + v3 * cos(theta3)) + v4 * cos(theta4)),
         y
@@ -46,3 +48,4 @@ def rk4(
         right_angle + rolled + turned,
         left_angle + rolled - turned,
     )
+    return _new(State, after)

@@ -1,12 +1,12 @@
 """The lockstep clock: the plant owns time, everybody else answers.
 
-    robot's tick k   its drives' frames to its bus, its pose to Zenoh when the schedule localises;
-                     when its controller has answered: its torques to the drives, its body to
-                     t_{k+1} with the torques held, and on to its tick k + 1
+    bus's tick k   its robots' poses to Zenoh when the schedule localises; then what `plant.buses`
+                   or `plant.wire_bus` do between questions and answers; and on to its tick k + 1
 
-Robots meet only in their controllers' messages, for which each controller waits by tick. So a robot
-need not wait for all others at every tick: it may be up to `WINDOW_TICKS` ahead of the slowest,
-which keeps all cores at work and changes no value. Held to a speed, all go tick by tick together.
+Robots of different buses meet only in their controllers' messages, for which each controller waits
+by tick. So a bus need not wait for all others at every tick: it may be up to `WINDOW_TICKS` ahead
+of the slowest, which keeps all cores at work and changes no value. Held to a speed, all go tick by
+tick together.
 
 Bus time runs from power-up; scenario time is 0 when control starts, after the countdown in which
 the controllers arm their drives and the bodies are held as the scenario puts them. The run ends
@@ -16,16 +16,20 @@ with one closing tick at which the controllers disarm.
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from typing import NamedTuple
 
 from bridge.can_bus.hub import Hub
-from bridge.frame import Frame
 from bridge.link import Publisher
 from bridge.messages import PoseFix, Progress
 from bridge.process import Stop
 from bridge.telemetry import RowBuffer
 from configs.brief import PlantBrief
 from configs.errors import InfrastructureError, PeerLostError
+from plant.buses import Ask, IdealBus
+from plant.emulation import Emulation, emulations
 from plant.unit import Unit
+from plant.wire_bus import WireBus
 
 WINDOW_TICKS = 16
 REPORT_EVERY_NS = 100_000_000
@@ -48,18 +52,85 @@ class Counters:
 
 
 class _Lane:
-    """One robot on its way through the ticks."""
+    """One bus on its way through the ticks."""
 
-    __slots__ = ("asked_ns", "bus", "done", "pose", "rows", "tick", "unit")
+    __slots__ = ("asked", "asked_ns", "bus", "done", "robots", "tick")
 
-    def __init__(self, unit: Unit, pose: Publisher, rows: RowBuffer, tick: int) -> None:
-        self.bus = unit.brief.bus
-        self.unit = unit
-        self.pose = pose
-        self.rows = rows
+    def __init__(self, bus: str, units: Sequence[Unit], tick: int) -> None:
+        self.bus = bus
+        self.robots = [unit.brief.robot for unit in units]
         self.tick = tick
-        self.asked_ns = 0  # when its controller was asked to answer; 0: it was not
+        self.asked = ""  # the robot that was asked; "": all
+        self.asked_ns = 0  # when it was asked to answer; 0: nobody was
         self.done = False
+
+    def begin(self) -> Ask | None:
+        """Begin the next tick."""
+        raise NotImplementedError
+
+    def go_on(self, hub: Hub) -> Ask | None:
+        """Hand on what the clients had to say, up to the next question; None: the tick is over."""
+        raise NotImplementedError
+
+    def put(self, hub: Hub, ask: Ask) -> None:
+        """Put a question to the clients."""
+        raise NotImplementedError
+
+
+class _IdealLane(_Lane):
+    """A bus on which frames take no time."""
+
+    __slots__ = ("_steps",)
+
+    def __init__(self, bus: str, emulation: IdealBus, tick: int) -> None:
+        super().__init__(bus, emulation.units, tick)
+        self._steps = emulation.steps()
+
+    def begin(self) -> Ask | None:
+        return next(self._steps)
+
+    def go_on(self, hub: Hub) -> Ask | None:
+        return self._steps.send(hub.take(self.bus))
+
+    def put(self, hub: Hub, ask: Ask) -> None:
+        hub.deliver(self.bus, ask.stamp_ns, ask.frames)
+
+
+class _WireLane(_Lane):
+    """A bus with bit timing."""
+
+    __slots__ = ("_steps", "_wire")
+
+    def __init__(self, bus: str, emulation: WireBus, tick: int) -> None:
+        super().__init__(bus, emulation.units, tick)
+        self._wire = emulation
+        self._steps = emulation.steps()
+
+    def begin(self) -> Ask | None:
+        return next(self._steps)
+
+    def go_on(self, hub: Hub) -> Ask | None:
+        for key in hub.departed(self.bus):
+            self._wire.depart(key)
+        return self._steps.send(hub.say(self.bus))
+
+    def put(self, hub: Hub, ask: Ask) -> None:
+        for key, count in ask.freed:
+            hub.left_queue(self.bus, key, count)
+        hub.pass_on(self.bus, ask.stamp_ns, ask.passed, ask.asked)
+
+
+def _lane(bus: str, emulation: Emulation, tick: int) -> _Lane:
+    if isinstance(emulation, WireBus):
+        return _WireLane(bus, emulation, tick)
+    return _IdealLane(bus, emulation, tick)
+
+
+class _Ends(NamedTuple):
+    """Where a robot's pose and truth go."""
+
+    pose: Publisher
+    rows: RowBuffer
 
 
 class LockstepLoop:
@@ -75,21 +146,24 @@ class LockstepLoop:
         report: Callable[[Progress], None],
     ) -> None:
         self._schedule = schedule = brief.schedule
-        self._period_ns, self._period_s = schedule.period_ns, schedule.period_s
-        self._countdown, self._ticks = schedule.countdown_ticks, schedule.ticks
-        self._substeps = brief.substeps
+        self._period_ns, self._ticks = schedule.period_ns, schedule.ticks
         self._tick_wall_ns = int(schedule.period_ns / brief.speed) if brief.speed > 0.0 else 0
         self._window = 0 if self._tick_wall_ns else WINDOW_TICKS
         self._limit_s = ANSWER_SHARE * schedule.tick_deadline_s
         self._hub = hub
         self._report = report
         first = -schedule.countdown_ticks
-        self._lanes = {
-            unit.brief.bus: _Lane(unit, pose, buffer, first)
-            for unit, pose, buffer in zip(units, poses, rows, strict=True)
+        ends = {
+            unit: _Ends(pose, truth) for unit, pose, truth in zip(units, poses, rows, strict=True)
         }
+
+        def begin(group: Sequence[Unit]) -> Callable[[int], None]:
+            return partial(self._begin, [(unit, ends[unit]) for unit in group])
+
+        buses = emulations(brief, units, begin)
+        self._lanes = {name: _lane(name, bus, first) for name, bus in buses.items()}
         self._slowest = first
-        self._at_slowest = len(units)
+        self._at_slowest = len(self._lanes)
         self._held: list[_Lane] = []
         self._start_ns = 0
         self.counters = Counters()
@@ -110,9 +184,7 @@ class LockstepLoop:
             after_ns = time.monotonic_ns()
             self.counters.waited_ns += after_ns - now_ns
             for bus in answered:
-                lane = self._lanes[bus]
-                if not self._reply(lane):
-                    self._take_on(lane, after_ns)
+                self._go_on(self._lanes[bus], after_ns)
             now_ns = time.monotonic_ns()
             if not answered:
                 self._look_for_the_absent(now_ns)
@@ -130,41 +202,38 @@ class LockstepLoop:
         self.counters.ticks = max(tick, 0)
         return Progress(tick, tick * self._schedule.period_ns, time.monotonic_ns() - self._start_ns)
 
-    # --- one robot -----------------------------------------------------------------------------
+    # --- one bus -------------------------------------------------------------------------------
+
+    def _begin(self, robots: Sequence[tuple[Unit, _Ends]], tick: int) -> None:
+        """A tick begins: what is true now goes to the record, where a robot is to the robot."""
+        t_ns = tick * self._period_ns
+        for unit, ends in robots:
+            if 0 <= tick < self._ticks:
+                ends.rows.add(tick, unit.row(t_ns * 1e-9))
+            if self._schedule.localises(tick):
+                state = unit.state
+                ends.pose.put(PoseFix(tick, t_ns, state.x, state.y, state.theta).encode())
 
     def _ask(self, lane: _Lane, now_ns: int) -> None:
-        """Begin a robot's tick: its frames are the tick, its pose follows when one is due."""
-        unit, tick = lane.unit, lane.tick
-        bus_ns = (tick + self._countdown) * self._period_ns
-        lane.asked_ns = now_ns
-        self._hub.deliver(lane.bus, bus_ns, unit.frames_due(bus_ns))
-        if self._schedule.localises(tick):
-            state = unit.state
-            t_ns = tick * self._period_ns
-            lane.pose.put(PoseFix(tick, t_ns, state.x, state.y, state.theta).encode())
+        """Begin the next tick of a bus."""
+        ask = lane.begin()
+        if ask is not None:
+            self._put(lane, ask, now_ns)
 
-    def _reply(self, lane: _Lane) -> bool:
-        """Hand the drives what came over their bus; return whether they replied anything.
+    def _go_on(self, lane: _Lane, now_ns: int) -> None:
+        ask = lane.go_on(self._hub)
+        if ask is not None:
+            self._put(lane, ask, now_ns)
+        else:
+            self._take_on(lane, now_ns)
 
-        Replies go out within the same instant, so their bus is waited for once more.
-        """
-        bus, hear = lane.bus, lane.unit.hear
-        bus_ns = (lane.tick + self._countdown) * self._period_ns
-        replies: list[Frame] = []
-        for frame in self._hub.take(bus):
-            replies += hear(frame, bus_ns)
-        if replies:
-            self._hub.deliver(bus, bus_ns, replies)
-            return True
-        return False
+    def _put(self, lane: _Lane, ask: Ask, now_ns: int) -> None:
+        lane.asked_ns, lane.asked = now_ns, ask.asked
+        lane.put(self._hub, ask)
 
     def _take_on(self, lane: _Lane, now_ns: int) -> None:
-        """A robot from its tick to the next, and on as far as the slowest allows."""
+        """A bus from its tick to the next, and on as far as the slowest allows."""
         tick = lane.tick
-        if 0 <= tick < self._ticks:
-            t_s = tick * self._period_ns * 1e-9
-            lane.rows.add(tick, lane.unit.row(t_s))
-            lane.unit.advance(t_s, self._period_s, self._substeps)
         lane.asked_ns = 0
         lane.tick = tick + 1
         lane.done = tick >= self._ticks
@@ -196,7 +265,7 @@ class LockstepLoop:
             self._pace()
 
     def _release(self, now_ns: int) -> None:
-        """Ask the controllers of all robots that the window lets go on."""
+        """Ask the controllers of all buses that the window lets go on."""
         latest = self._slowest + self._window
         going = [lane for lane in self._held if lane.tick <= latest]
         if going:
@@ -219,7 +288,7 @@ class LockstepLoop:
         limit_ns = int(self._limit_s * 1e9)
         for bus, lane in self._lanes.items():
             when = f"tick {lane.tick} (t = {lane.tick * self._schedule.period_ns * 1e-9:.3f} s)"
-            robot = lane.unit.brief.robot
+            robot = lane.asked or " or ".join(lane.robots)
             if bus in left and not lane.done:
                 raise PeerLostError(f"{when}: the controller of {robot} left its bus")
             if lane.asked_ns and now_ns - lane.asked_ns > limit_ns:

@@ -1,14 +1,271 @@
 """The motor behind a drive: what torque the wheel feels for what the drive asks of it.
 
-The ideal motor makes what it is asked for at once. Current loop, friction and heating belong here.
+    i* = τ*/k_d, held to ±i_max and to what the bus voltage allows                              (1)
+    T di/dt = i*(t − d) − i                        current loop, exact for a held demand        (2)
+    τ_m = k i,   P = τ_m ν + (R + R_f) i²          torque and electrical power                  (3)
+    |R i* + k ν| ≤ (√3/2) V                        space-vector modulation of the bus voltage   (4)
+    T_th dθ/dt = θ_a + R_th R i² − θ               temperature of windings, and of FETs         (5)
+    τ = τ_m − b ν⁺ − F sgn(ν⁺)                     at the wheel; ν⁺: speed after the step       (6)
+
+    τ* demand [N·m]   k, k_d torque constant: the motor's, and the one set in the drive [N·m/A]
+    i  q-axis current [A]   T loop time constant, d compute delay [s]   ν wheel speed [rad/s]
+    V  bus voltage [V]   R, R_f winding and FET resistance [ohm], such that R i² is the heat (1.5
+    times the phase resistance where currents are amplitudes)   R_th [K/W]   θ, θ_a ambient [°C]
+    b  viscous [N·m·s/rad], F Coulomb friction [N·m]
+
+Friction is discretised implicitly: (6) is solved for ν⁺ of a wheel with inertia J, so sgn(0) takes
+whatever value in [−1, 1] holds the wheel. It sticks, neither reverses the wheel nor chatters, and
+never adds energy, at any step, as long as J isn't above the inertia that the body has in truth:
+give min(m̄_1, m̄_2). Source: R. Kikuuwe, N. Takesue, A. Sano, H. Mochiyama, H. Fujimoto, Admittance
+and impedance representations of friction based on implicit Euler integration, IEEE Transactions on
+Robotics 22(6), 2006.
+
+    fault                   drive measures    shaft                      amount (default)
+    TORQUE_STUCK            last current      last torque
+    TORQUE_HALF             i                 k i / 2
+    TORQUE_ZERO             0                 0
+    TORQUE_REVERSED         i                 −k i
+    FET_OVER_TEMPERATURE    θ_FET + amount    as without                 rise [K] (100)
+    MOTOR_OVER_TEMPERATURE  θ_motor + amount  as without                 rise [K] (100)
+
+A demand or speed that isn't finite acts as the largest one, NaN as 0: what comes out is finite.
 """
 
+from enum import Enum
+from math import exp, expm1, inf, isfinite, sqrt
+from random import Random
 
-class Motor:
-    """One ideal motor."""
+from configs.brief import MotorModel
+from plant.supply import Supply
+
+_MODULATION = sqrt(3.0) / 2.0
+_FASTEST_RAD_S = 1e6
+"""No wheel turns faster; above it powers would overflow."""
+
+
+class MotorFault(Enum):
+    """What can be wrong with a motor or its power stage; the value is its name in scenarios."""
+
+    TORQUE_STUCK = "torque_stuck"
+    TORQUE_HALF = "torque_half"
+    TORQUE_ZERO = "torque_zero"
+    TORQUE_REVERSED = "torque_reversed"
+    FET_OVER_TEMPERATURE = "fet_over_temperature"
+    MOTOR_OVER_TEMPERATURE = "motor_over_temperature"
+
+
+_RISE_K = 100.0
+
+
+class IdealMotor:
+    """Makes what it is asked for, at once."""
 
     __slots__ = ()
 
-    def torque(self, demand_N_m: float, speed_rad_s: float) -> float:  # noqa: ARG002
-        """Torque at the wheel [N·m] for the drive's demand at a wheel speed."""
+    def step(self, demand_N_m: float, speed_rad_s: float, dt_s: float) -> float:  # noqa: ARG002
+        """Torque at the wheel [N·m] for the drive's demand."""
         return demand_N_m
+
+
+class Motor:
+    """One motor on the bus of its robot.
+
+    `inertia_kg_m2` is J of (6): the least inertia that the body shows to its wheels.
+    """
+
+    __slots__ = (
+        "_acting_A",
+        "_asked_A",
+        "_constant",
+        "_decay",
+        "_dt_s",
+        "_fet_K",
+        "_fet_K_A2",
+        "_fet_keep",
+        "_fet_zero_C",
+        "_inertia",
+        "_inertia_rate",
+        "_mean",
+        "_mean_square",
+        "_model",
+        "_motor_zero_C",
+        "_override_A",
+        "_pending",
+        "_random",
+        "_resistance",
+        "_supply",
+        "_winding_K",
+        "_winding_K_A2",
+        "_winding_keep",
+        "current_A",
+        "fet_C",
+        "motor_C",
+        "power_W",
+        "torque_N_m",
+    )
+
+    def __init__(
+        self, model: MotorModel, inertia_kg_m2: float, supply: Supply, random: Random
+    ) -> None:
+        self._model = model
+        self._inertia = inertia_kg_m2
+        self._supply = supply
+        self._random = random
+        self._constant = model.torque_constant_N_m_A
+        self._resistance = model.winding_resistance_ohm + model.fet_resistance_ohm
+        self._override_A: float | None = None
+        self._asked_A = self._acting_A = 0.0
+        self._pending: list[tuple[float, float]] = []  # seconds from now, current from then on
+        self._dt_s = 0.0
+        self._fet_K = self._winding_K = 0.0  # above ambient
+        self._fet_zero_C = self._motor_zero_C = model.ambient_C  # with what faults add
+        self.current_A = 0.0
+        """q-axis current at the end of the last step."""
+        self.torque_N_m = 0.0
+        """τ_m, mean of the last step: what the motor made, before friction."""
+        self.power_W = 0.0
+        """P of (3), mean of the last step; negative while it feeds the bus."""
+        self.fet_C = self.motor_C = model.ambient_C
+        """What the thermistors say."""
+
+    def step(self, demand_N_m: float, speed_rad_s: float, dt_s: float) -> float:
+        """Mean torque at the wheel [N·m] over `dt_s`, for a demand and a speed at its start."""
+        if dt_s != self._dt_s:
+            self._discretise(dt_s)
+        if not -_FASTEST_RAD_S <= speed_rad_s <= _FASTEST_RAD_S:
+            speed_rad_s = _clamped(speed_rad_s, _FASTEST_RAD_S)
+        asked = self._current_for(demand_N_m, speed_rad_s)
+        if asked == self._asked_A and not self._pending:
+            off = self.current_A - asked
+            self.current_A = asked + off * self._decay
+            mean = asked + off * self._mean
+            square = asked * asked + off * (2.0 * asked * self._mean + off * self._mean_square)
+        else:
+            mean, square = self._switch(asked, dt_s)
+        torque = self.torque_N_m = self._constant * mean
+
+        self.power_W = torque * speed_rad_s + self._resistance * square
+        windings = self._winding_K = (
+            self._winding_K * self._winding_keep + self._winding_K_A2 * square
+        )
+        fets = self._fet_K = self._fet_K * self._fet_keep + self._fet_K_A2 * square
+        self.motor_C = windings + self._motor_zero_C
+        self.fet_C = fets + self._fet_zero_C
+
+        coulomb = self._model.coulomb_friction_N_m
+        push = self._inertia_rate * speed_rad_s + torque
+        if -coulomb <= push <= coulomb:
+            return torque - push
+        if push < 0.0:
+            coulomb = -coulomb
+        viscous = self._model.viscous_friction_N_m_s
+        return torque - coulomb - viscous * (push - coulomb) / (self._inertia_rate + viscous)
+
+    def sense(self) -> tuple[float, float]:
+        """(torque estimate [N·m], current [A]) as the drive has them: noisy, and in steps.
+
+        The estimate knows the current and the drive's torque constant, not the motor's. Draws one
+        number from the generator, so call it at instants that don't depend on who listens.
+        """
+        model = self._model
+        current = self.current_A
+        torque = model.assumed_torque_constant_N_m_A * current
+        if model.torque_noise_N_m:
+            torque += self._random.gauss(0.0, model.torque_noise_N_m)
+        quantum = model.current_quantum_A
+        return torque, quantum * round(current / quantum) if quantum else current
+
+    def inject(self, fault: MotorFault, amount: float | None = None) -> None:
+        """Set a fault; `amount` as in the module's table.
+
+        Raises:
+            ValueError: the amount isn't finite.
+        """
+        rise = _RISE_K if amount is None else amount
+        if not isfinite(rise):
+            raise ValueError(f"{fault.value} = {rise}: must be a finite rise in K")
+        constant = self._model.torque_constant_N_m_A
+        match fault:
+            case MotorFault.TORQUE_STUCK:
+                self._override_A = self.current_A
+            case MotorFault.TORQUE_ZERO:
+                self._override_A = 0.0
+            case MotorFault.TORQUE_HALF:
+                self._constant = 0.5 * constant
+            case MotorFault.TORQUE_REVERSED:
+                self._constant = -constant
+            case MotorFault.FET_OVER_TEMPERATURE:
+                self._fet_zero_C = self._model.ambient_C + rise
+                self.fet_C = self._fet_K + self._fet_zero_C
+            case MotorFault.MOTOR_OVER_TEMPERATURE:
+                self._motor_zero_C = self._model.ambient_C + rise
+                self.motor_C = self._winding_K + self._motor_zero_C
+
+    def clear_faults(self) -> None:
+        """A sound motor again; heat and current are those of this moment."""
+        self._constant = self._model.torque_constant_N_m_A
+        self._override_A = None
+        ambient = self._fet_zero_C = self._motor_zero_C = self._model.ambient_C
+        self.fet_C, self.motor_C = self._fet_K + ambient, self._winding_K + ambient
+
+    def _discretise(self, dt_s: float) -> None:
+        model = self._model
+        x = dt_s / model.current_loop_s
+        self._dt_s = dt_s
+        self._decay = exp(-x)
+        self._mean = -expm1(-x) / x
+        self._mean_square = -expm1(-2.0 * x) / (2.0 * x)
+        gain = -expm1(-dt_s / model.motor_thermal_time_s)
+        self._winding_keep = 1.0 - gain
+        self._winding_K_A2 = (
+            gain * model.motor_thermal_resistance_K_W * model.winding_resistance_ohm
+        )
+        gain = -expm1(-dt_s / model.fet_thermal_time_s)
+        self._fet_keep = 1.0 - gain
+        self._fet_K_A2 = gain * model.fet_thermal_resistance_K_W * model.fet_resistance_ohm
+        self._inertia_rate = self._inertia / dt_s
+
+    def _current_for(self, demand_N_m: float, speed_rad_s: float) -> float:
+        """i* of (1) and (4)."""
+        model = self._model
+        limit = model.current_limit_A
+        current = demand_N_m / model.assumed_torque_constant_N_m_A
+        if not -limit <= current <= limit:
+            current = _clamped(current, limit)
+        if self._override_A is not None:
+            current = self._override_A
+        resistance, back = model.winding_resistance_ohm, self._constant * speed_rad_s
+        most = _MODULATION * self._supply.bus_V
+        if -most <= resistance * current + back <= most:
+            return current
+        current = min(max(current, (-most - back) / resistance), (most - back) / resistance)
+        return min(max(current, -limit), limit)
+
+    def _switch(self, asked_A: float, dt_s: float) -> tuple[float, float]:
+        """(mean i, mean i²) of a step within which the demand that acts changes, by (2)."""
+        pending = self._pending
+        if asked_A != self._asked_A:
+            self._asked_A = asked_A
+            pending.append((self._model.compute_delay_s, asked_A))
+        current, acting, now = self.current_A, self._acting_A, 0.0
+        charge = heat = 0.0
+        later = []
+        for at, following in [*pending, (dt_s, inf)]:
+            if at > dt_s:
+                later.append((at - dt_s, following))
+                continue
+            x = (at - now) / self._model.current_loop_s
+            off, once, twice = current - acting, -expm1(-x), -0.5 * expm1(-2.0 * x)
+            charge += acting * x + off * once
+            heat += acting * acting * x + off * (2.0 * acting * once + off * twice)
+            current, now = acting + off * (1.0 - once), at
+            if following != inf:
+                acting = following
+        self.current_A, self._acting_A, self._pending = current, acting, later
+        periods = dt_s / self._model.current_loop_s
+        return charge / periods, heat / periods
+
+
+def _clamped(value: float, limit: float) -> float:
+    """A value outside ±limit brought to the nearer one, NaN to 0."""
+    return limit if value > limit else -limit if value < -limit else 0.0

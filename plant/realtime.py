@@ -84,7 +84,7 @@ class RealtimeLoop:
                 self._serve((due_ns - now_ns) * 1e-9, power_up_ns)
                 continue
             self.counters.overruns += now_ns > due_ns + schedule.period_ns
-            self._keep_tick()
+            self._keep_tick(power_up_ns)
             self._tick += 1
             if now_ns >= self._next_report_ns:
                 self._next_report_ns = now_ns + REPORT_EVERY_NS
@@ -113,7 +113,8 @@ class RealtimeLoop:
         if replies:
             self._hub.deliver(bus, now_ns, replies)
 
-    def _keep_tick(self) -> None:
+    def _keep_tick(self, power_up_ns: int) -> None:
+        """What a tick brings, robot by robot; who sends torques meanwhile doesn't wait for all."""
         schedule, tick = self._schedule, self._tick
         bus_ns, t_ns = schedule.bus_time_ns(tick), tick * schedule.period_ns
         if 0 <= tick < schedule.ticks:
@@ -128,6 +129,7 @@ class RealtimeLoop:
             if schedule.localises(tick):
                 state = unit.state
                 lane.pose.put(PoseFix(tick, t_ns, state.x, state.y, state.theta).encode())
+            self._serve(0.0, power_up_ns)
 
     def _move(self, lane: _Lane, to_ns: int) -> None:
         """A body on to a bus time; before tick 0 it is held, and time doesn't go back."""

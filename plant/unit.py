@@ -2,18 +2,24 @@
 
     bus frames ─► drive ─torque demand─► motor ─torque─► body ─wheel angle, speed─► encoder ─► drive
 
-A unit is told the time and never asks for it. Between two ticks the torques are held.
+A unit is told the time and never asks for it. A step of the integration holds the torques.
+
+    Unit        ideal motors and encoders: what a drive asks for acts at once, what it hears is true
+    RealUnit    motors, supply and encoders of `plant.powertrain`
 """
 
 from collections.abc import Sequence
 
-from bridge.drives import DRIVES
+from bridge.drives import DRIVES, DriveNode, Feeling
 from bridge.frame import Frame
-from configs.brief import RobotBrief
+from configs.brief import PowertrainModel, RobotBrief
 from plant.encoder import PER_RADIAN
 from plant.integrate import rk4
-from plant.motor import Motor
+from plant.powertrain import powertrain
 from plant.robot import Robot, State
+
+FEEL_EVERY_S = 0.001
+"""How often a drive's firmware reads its thermistors and currents, at most."""
 
 
 class Unit:
@@ -25,12 +31,12 @@ class Unit:
         "_demand_left",
         "_demand_right",
         "_left",
-        "_motor_left",
-        "_motor_right",
         "_right",
         "_torque_left",
         "_torque_right",
         "brief",
+        "drives",
+        "moved_ns",
         "state",
     )
 
@@ -40,9 +46,10 @@ class Unit:
         self._body = Robot(brief.body, brief.disturbance)
         self._right = node(brief.drive, brief.right_node, brief.drive.serial_number)
         self._left = node(brief.drive, brief.left_node, brief.drive.serial_number + 1)
+        self.drives: tuple[DriveNode, DriveNode] = (self._right, self._left)
+        self.moved_ns = 0
+        """Bus time up to which the body has moved, for who moves it from event to event."""
         self._answered_ns = 0
-        self._motor_right = Motor()
-        self._motor_left = Motor()
         self._demand_right = self._demand_left = 0.0
         self._torque_right = self._torque_left = 0.0
         pose = brief.pose
@@ -50,7 +57,7 @@ class Unit:
             pose.x_m, pose.y_m, pose.theta_rad, brief.v_m_s, brief.omega_rad_s, 0.0, 0.0
         )
 
-    def _feed(self) -> None:
+    def feed(self) -> None:
         """Tell both drives what their encoders see."""
         state = self.state
         right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
@@ -62,29 +69,32 @@ class Unit:
         if min(self._right.fed_ns, self._left.fed_ns) <= self._answered_ns:
             return ()
         self._answered_ns = now_ns
-        self._feed()
+        self.feed()
         return self._right.feedback(now_ns), self._left.feedback(now_ns)
 
     def frames_due(self, now_ns: int) -> list[Frame]:
         """What both drives send at this instant, in order of arbitration."""
-        self._feed()
+        self.feed()
         frames = [*self._right.due(now_ns), *self._left.due(now_ns)]
-        frames.sort()
+        if len(frames) > 1:
+            frames.sort()
         return frames
 
     def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
-        """Give one frame from the bus to both drives and return their replies."""
-        right, left = self._right.hear(frame, now_ns), self._left.hear(frame, now_ns)
-        return [*right, *left] if right or left else ()
+        """Give one frame from the bus to the drives that it may concern; return their replies."""
+        can_id, right, left = frame[0], self._right, self._left
+        if can_id == right.setpoint_id != left.setpoint_id:
+            return right.hear(frame, now_ns)
+        if can_id == left.setpoint_id != right.setpoint_id:
+            return left.hear(frame, now_ns)
+        replies = right.hear(frame, now_ns), left.hear(frame, now_ns)
+        return [*replies[0], *replies[1]] if any(replies) else ()
 
     def advance(self, t_s: float, period_s: float, substeps: int) -> None:
         """Integrate one control period from scenario time `t_s`, torques held."""
         state = self.state
-        right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
-        self._demand_right = self._right.torque_demand()
-        self._demand_left = self._left.torque_demand()
-        right = self._torque_right = self._motor_right.torque(self._demand_right, right_speed)
-        left = self._torque_left = self._motor_left.torque(self._demand_left, left_speed)
+        right = self._torque_right = self._demand_right = self._right.torque_demand(period_s)
+        left = self._torque_left = self._demand_left = self._left.torque_demand(period_s)
         if substeps == 1:
             self.state = rk4(self._body, state, right, left, t_s, period_s)
             return
@@ -103,8 +113,61 @@ class Unit:
             theta,
             v,
             omega,
+            self._right.input_torque,
+            self._left.input_torque,
             self._demand_right,
             self._demand_left,
             self._torque_right,
             self._torque_left,
         )
+
+
+class RealUnit(Unit):
+    """One robot with real motors, supply and encoders."""
+
+    __slots__ = ("_felt_s", "_train")
+
+    def __init__(self, brief: RobotBrief, model: PowertrainModel) -> None:
+        super().__init__(brief)
+        self._train = powertrain(model, min(self._body.mbar_1, self._body.mbar_2))
+        self._felt_s = 0.0
+
+    def feed(self) -> None:
+        """The encoders have told their drives already, at every step."""
+
+    def advance(self, t_s: float, period_s: float, substeps: int) -> None:
+        """Integrate one span from scenario time `t_s`; drives, motors and encoders step with it."""
+        step = period_s / substeps
+        state, body, train = self.state, self._body, self._train
+        right, left = self._right, self._left
+        demands = torques = (0.0, 0.0)
+        for n in range(substeps):
+            demands = right.torque_demand(step), left.torque_demand(step)
+            speeds = body.wheel_speeds(state.v, state.omega)
+            torques = train.step(demands, speeds, step)
+            state = rk4(body, state, *torques, t_s + n * step, step)
+            right.feed(*train.right_encoder.step(state.right_angle, step))
+            left.feed(*train.left_encoder.step(state.left_angle, step))
+        self.state = state
+        self._demand_right, self._demand_left = demands
+        self._torque_right, self._torque_left = torques
+        self._felt_s += period_s
+        if self._felt_s >= FEEL_EVERY_S:
+            self._felt_s = 0.0
+            self._feel()
+
+    def _feel(self) -> None:
+        """Tell both drives what they measure of their motors and of the supply."""
+        train = self._train
+        supply = train.supply
+        for drive, motor, amps in (
+            (self._right, train.right_motor, supply.right_A),
+            (self._left, train.left_motor, supply.left_A),
+        ):
+            torque, current = motor.sense()
+            drive.feel(Feeling(torque, current, motor.fet_C, motor.motor_C, supply.bus_V, amps))
+
+
+def unit_of(brief: RobotBrief) -> Unit:
+    """The emulation of a robot as its brief wants it."""
+    return Unit(brief) if brief.powertrain is None else RealUnit(brief, brief.powertrain)

@@ -10,6 +10,10 @@ until it has answered. All others (loggers, host code under test) come, go, cras
 they like: what they send is taken at the next instant, what they don't read is kept for them up to
 `BACKLOG` frames and then dropped and counted. A client's frames go to all other clients of its bus,
 and back to itself only if it asked for that. One thread, one epoll, no clock but for the bound.
+
+A bus with a `queue` has bit timing: the hub then carries and doesn't forward. Who emulates the wire
+takes with `say` who sent what, gives with `pass_on` what ended when and who had sent it, and tells
+with `left_queue` whose transmit queue has room again.
 """
 
 import contextlib
@@ -20,6 +24,7 @@ from collections import deque
 from collections.abc import Collection, Mapping, Sequence
 
 from bridge.can_bus import packet as wire
+from bridge.can_bus.traffic import Key, Passed, Said, Stamped
 from bridge.frame import Frame
 
 BACKLOG = 100_000
@@ -41,20 +46,53 @@ class Counters:
 
 
 class _Client:
-    __slots__ = ("backlog", "bus", "gathered", "joined", "name", "owes", "own", "paced", "sock")
+    __slots__ = (
+        "backlog",
+        "bus",
+        "gathered",
+        "gone",
+        "joined",
+        "key",
+        "name",
+        "owes",
+        "own",
+        "paced",
+        "pending",
+        "receive",
+        "send",
+        "sock",
+    )
 
     def __init__(self, sock: socket.socket, bus: "_Bus") -> None:
         self.sock = sock
+        self.receive, self.send = sock.recv, sock.send
         self.bus = bus
         self.name = ""
+        self.key: Key = 0
+        self.gone = 0  # frames that left its transmit queue
+        self.pending: list[Stamped] = []  # for a paced client, until it is asked
         self.joined = self.paced = self.gathered = self.own = self.owes = False
         self.backlog: deque[bytes] = deque()
 
 
 class _Bus:
-    __slots__ = ("clients", "counters", "listener", "name", "owing", "stamp_ns", "taken")
+    __slots__ = (
+        "clients",
+        "counters",
+        "departed",
+        "listener",
+        "name",
+        "owing",
+        "queue",
+        "said",
+        "stamp_ns",
+        "taken",
+    )
 
-    def __init__(self, name: str, listener: socket.socket) -> None:
+    def __init__(self, name: str, listener: socket.socket, queue: int) -> None:
+        self.queue = queue
+        self.said: list[Said] = []
+        self.departed: list[Key] = []
         self.name = name
         self.listener = listener
         self.stamp_ns = -1  # not powered up yet
@@ -65,11 +103,22 @@ class _Bus:
 
 
 class Hub:
-    """All buses of one process; `listeners` are bound, listening sockets by bus name."""
+    """All buses of one process; `listeners` are bound, listening sockets by bus name.
 
-    def __init__(self, listeners: Mapping[str, socket.socket], wake_fd: int | None = None) -> None:
-        self._buses = {name: _Bus(name, sock) for name, sock in listeners.items()}
+    `queue` is how many frames may wait at a client, on buses with bit timing; 0: they have none.
+    """
+
+    def __init__(
+        self,
+        listeners: Mapping[str, socket.socket],
+        wake_fd: int | None = None,
+        *,
+        queue: int = 0,
+    ) -> None:
+        self._buses = {name: _Bus(name, sock, queue) for name, sock in listeners.items()}
+        self._joined = 0
         self._epoll = select.epoll()
+        self._poll = self._epoll.poll
         self._readers: dict[int, _Client | _Bus | None] = {}
         self._answered: list[str] = []
         self._left: list[str] = []
@@ -90,8 +139,14 @@ class Hub:
         if not clients:
             return
         together = wire.encode_frames(0, stamp_ns, frames)
-        if len(clients) > 1:
-            clients = clients.copy()
+        if len(clients) == 1:
+            (client,) = clients
+            if client.owes is False and client.paced and not client.backlog:
+                client.owes = True
+                bus.owing += 1
+                self._send(client, together)
+                return
+        clients = clients.copy()
         for client in clients:
             if client.gathered:
                 if client.paced and not client.owes:
@@ -102,6 +157,55 @@ class Hub:
                 # One frame a packet: a readable descriptor must mean one more frame.
                 for frame in frames:
                     self._send(client, wire.encode_frames(0, stamp_ns, (frame,)))
+
+    def pass_on(
+        self, name: str, stamp_ns: int, frames: Sequence[Passed], asked: str | None = None
+    ) -> None:
+        """Tell the clients of a bus with bit timing what ended on it until `stamp_ns`.
+
+        Paced clients hear it when they are `asked`: by name, "" asks all of them.
+        """
+        bus = self._buses[name]
+        bus.stamp_ns = stamp_ns
+        for client in bus.clients.copy():
+            heard = [Stamped(end, frame) for end, frame, key in frames if key != client.key]
+            if client.own:
+                mine = [Stamped(end, frame) for end, frame, key in frames if key == client.key]
+                for one in mine:
+                    self._send(client, wire.encode_stamped(wire.OWN, stamp_ns, [one], client.gone))
+            if client.paced:
+                client.pending += heard
+                if asked is not None and asked in ("", client.name):
+                    heard, client.pending = client.pending, []
+                    bus.owing += not client.owes
+                    client.owes = True
+                    self._send(client, wire.encode_stamped(0, stamp_ns, heard, client.gone))
+            elif client.gathered and heard:
+                self._send(client, wire.encode_stamped(0, stamp_ns, heard, client.gone))
+            else:
+                for one in heard:
+                    self._send(client, wire.encode_stamped(0, stamp_ns, [one], client.gone))
+
+    def say(self, name: str) -> list[Said]:
+        """What the clients of a bus with bit timing sent since the last call, in order."""
+        bus = self._buses[name]
+        said, bus.said = bus.said, []
+        return said
+
+    def departed(self, name: str) -> list[Key]:
+        """Keys of clients that left a bus with bit timing since the last call."""
+        bus = self._buses[name]
+        departed, bus.departed = bus.departed, []
+        return departed
+
+    def left_queue(self, name: str, key: Key, count: int) -> None:
+        """Frames of a client have left its transmit queue; it hears it with the next frames."""
+        for client in self._buses[name].clients:
+            if client.key == key:
+                client.gone += count
+                if not client.paced:
+                    stamp_ns = self._buses[name].stamp_ns
+                    self._send(client, wire.encode_stamped(0, stamp_ns, (), client.gone))
 
     def collect(self, timeout_s: float) -> list[str]:
         """Buses whose paced clients have all answered what was delivered, since the last call.
@@ -127,7 +231,7 @@ class Hub:
 
     def heard(self) -> list[str]:
         """Buses with something to take."""
-        return [name for name, bus in self._buses.items() if bus.taken]
+        return [name for name, bus in self._buses.items() if bus.taken or bus.said]
 
     def take(self, name: str) -> list[Frame]:
         """What the clients of a bus sent since the last take, in order."""
@@ -182,8 +286,9 @@ class Hub:
     def _handle(self, timeout_s: float) -> bool:
         """Handle what is ready; return whether the wake-up descriptor was."""
         woken = False
-        for fd, event in self._epoll.poll(timeout_s):
-            reader = self._readers.get(fd)
+        readers = self._readers
+        for fd, event in self._poll(timeout_s):
+            reader = readers.get(fd)
             if isinstance(reader, _Client):
                 if event == _READ:
                     self._read(reader)
@@ -200,7 +305,7 @@ class Hub:
 
     def _read(self, client: _Client) -> None:
         try:
-            data = client.sock.recv(wire.MAX_BYTES)
+            data = client.receive(wire.MAX_BYTES)
         except BlockingIOError:
             return
         except OSError:
@@ -221,8 +326,11 @@ class Hub:
 
     def _take_frames(self, client: _Client, packet: wire.Packet) -> None:
         bus = client.bus
-        _, flags, _, stamp_ns, frames, _ = packet
-        if frames:
+        _, flags, _, stamp_ns, frames, *_ = packet
+        if frames and bus.queue:
+            bus.said += [Said(client.key, frame) for frame in frames]
+            bus.counters.from_clients += len(frames)
+        elif frames:
             bus.taken += frames
             bus.counters.from_clients += len(frames)
             if client.own or len(bus.clients) > 1:
@@ -266,23 +374,26 @@ class Hub:
             self._send(client, wire.encode_text(wire.REFUSED, refusal))
             self._drop(client)
             return
+        self._joined += 1
         client.name = hello.text
         client.paced = bool(hello.flags & wire.PACED)
         client.gathered = client.paced or bool(hello.flags & wire.GATHERED)
         client.own = bool(hello.flags & wire.OWN)
+        client.key = client.name if client.paced else self._joined
         client.joined = True
         bus.clients.append(client)
         bus.counters.joins += 1
-        self._send(
-            client, wire.encode_text(wire.WELCOME, count=wire.VERSION, stamp_ns=bus.stamp_ns)
+        welcome = wire.encode_text(
+            wire.WELCOME, count=wire.VERSION, stamp_ns=bus.stamp_ns, room=bus.queue
         )
+        self._send(client, welcome)
 
     def _send(self, client: _Client, data: bytes) -> None:
         if client.backlog:
             self._keep(client, data)
             return
         try:
-            client.sock.send(data)
+            client.send(data)
         except BlockingIOError:
             self._keep(client, data)
             self._epoll.modify(client.sock.fileno(), _READ | _WRITE)
@@ -316,6 +427,8 @@ class Hub:
         client.sock.close()
         if client in client.bus.clients:
             client.bus.clients.remove(client)
+            if client.bus.queue:
+                client.bus.departed.append(client.key)
         if client.owes:
             client.owes = False
             client.bus.owing -= 1

@@ -12,6 +12,7 @@ is for a controller in lockstep: it is gathered, the bus waits for it, and its n
 with nothing left to read says: that was all until now.
 """
 
+import errno
 import select
 import socket
 import struct
@@ -30,7 +31,12 @@ from bridge.frame import Frame
 FINE_S = 0.05
 """Waits below this are kept to the microsecond; the kernel's own bound counts in its ticks."""
 _TIMEVAL = struct.Struct("ll")
+_new = tuple.__new__  # of a frame, past its constructor: this is the hot path
 _IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ignore_config"})
+
+
+class BusClosedError(can.CanOperationError):
+    """The bus said goodbye, at the end of its run; the text has its reason."""
 
 
 class FleetloopBus(can.BusABC):
@@ -39,7 +45,8 @@ class FleetloopBus(can.BusABC):
     Args:
         channel: bus name ("r1"), run and bus ("<run>/r1"), or the path of the bus's socket.
         can_filters: see `can.BusABC.set_filters`.
-        paced: bus time waits for this client.
+        paced: bus time waits for this client; the name of the robot that it controls, where a
+            bus has several.
         gathered: frames of one instant travel together; a descriptor is readable once for all.
         receive_own_messages: frames sent come back, with `is_rx` False.
         connect_timeout: how long to wait for the bus to answer [s].
@@ -54,7 +61,7 @@ class FleetloopBus(can.BusABC):
         channel: str,
         can_filters: CanFilters | None = None,
         *,
-        paced: bool = False,
+        paced: bool | str = False,
         gathered: bool = False,
         receive_own_messages: bool = False,
         connect_timeout: float = 10.0,
@@ -65,13 +72,16 @@ class FleetloopBus(can.BusABC):
             raise TypeError(f"the fleetloop interface has no option {', '.join(unknown)}")
         if fd:
             raise can.CanInitializationError(f"bus {channel!r} is classic CAN: fd must be False")
-        self._paced = paced
-        self._gathered = gathered or paced
+        self._paced = bool(paced)
+        self._gathered = gathered or self._paced
+        self._name = paced if isinstance(paced, str) else socket.gethostname()
         self._inbox: deque[can.Message] = deque()
         self._outbox: list[Frame] = []
         self._stamp_ns = -1
         self._owes = False
         self._closed_because: str | None = None
+        self._queue = 0  # frames that may wait at this node; 0: frames take no time
+        self._said = self._gone = 0  # frames sent, and how many of them have left the queue
         self._timeout: float | None = None
         self.channel = str(channel)
         self._socket = self._connect(receive_own_messages, connect_timeout)
@@ -88,8 +98,8 @@ class FleetloopBus(can.BusABC):
             sock.connect(str(path))
             flags = wire.PACED if self._paced else wire.GATHERED if self._gathered else 0
             flags |= wire.OWN if own else 0
-            name = socket.gethostname()
-            sock.send(wire.encode_text(wire.HELLO, name, flags=flags, count=wire.VERSION))
+            hello = wire.encode_text(wire.HELLO, self._name, flags=flags, count=wire.VERSION)
+            sock.send(hello)
             answer = wire.decode(sock.recv(wire.MAX_BYTES))
         except (OSError, places.NoSuchBusError) as error:
             sock.close()
@@ -100,6 +110,7 @@ class FleetloopBus(can.BusABC):
             reason = answer.text if answer is not None else "it closed without a word"
             raise can.CanInitializationError(f"bus {self.channel!r} refused: {reason}")
         self._stamp_ns = answer.stamp_ns
+        self._queue = answer.room
         sock.settimeout(None)
         return sock
 
@@ -107,6 +118,8 @@ class FleetloopBus(can.BusABC):
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         """The next message, None if none came within `timeout` seconds (None: wait for ever).
+
+        A paced client's time is the bus's: None as well when a tick passed without a frame.
 
         Raises:
             can.CanOperationError: the bus is gone; everything received before was handed out.
@@ -126,18 +139,25 @@ class FleetloopBus(can.BusABC):
                     deadline = time.monotonic() + timeout
             else:
                 wait_s = max(0.0, deadline - time.monotonic())
-            if not self._receive(wait_s):
+            if not self._receive(wait_s) or (self._paced and not inbox):
                 return None
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Send one classic frame.
 
+        On a bus with bit timing it waits in this node's transmit queue until it wins the bus.
+
         Raises:
             can.CanOperationError: FD frame, the bus is gone, or no room within `timeout`.
         """
-        if msg.is_fd:
-            raise can.CanOperationError("the bus is classic CAN: no FD frames")
-        frame = to_frame(msg)
+        if msg.is_extended_id or msg.is_remote_frame or msg.is_error_frame or msg.is_fd:
+            if msg.is_fd:
+                raise can.CanOperationError("the bus is classic CAN: no FD frames")
+            frame = to_frame(msg)
+        else:
+            frame = _new(Frame, (msg.arbitration_id, bytes(msg.data)))
+        if self._queue:
+            self._await_room(timeout)
         if self._gathered:
             self._outbox.append(frame)
             return
@@ -179,7 +199,7 @@ class FleetloopBus(can.BusABC):
         elif self._outbox:
             self._flush(0)
         if self._closed_because is not None:
-            raise can.CanOperationError(f"bus {self.channel!r} closed: {self._closed_because}")
+            raise BusClosedError(f"bus {self.channel!r} closed: {self._closed_because}")
         try:
             if wait_s is not None and wait_s < FINE_S:
                 if not polling:
@@ -198,18 +218,37 @@ class FleetloopBus(can.BusABC):
 
     def _take(self, data: bytes) -> None:
         packet = wire.decode(data)
-        if packet is not None and packet.kind == wire.FRAMES:
-            self._stamp_ns = packet.stamp_ns
+        if packet is not None and packet[0] == wire.FRAMES:
+            _, flags, _, stamp_ns, frames, _, self._gone, before_ns = packet
+            self._stamp_ns = stamp_ns
             self._owes = self._paced
-            timestamp = packet.stamp_ns / 1e9
-            is_rx = not packet.flags & wire.OWN
-            for can_id, frame in packet.frames:
-                self._inbox.append(to_message(can_id, frame, timestamp, self.channel, is_rx))
+            timestamp, channel, is_rx = stamp_ns / 1e9, self.channel, not flags & wire.OWN
+            put = self._inbox.append
+            if before_ns:
+                for (can_id, content), ago_ns in zip(frames, before_ns, strict=True):
+                    at = (stamp_ns - ago_ns) / 1e9
+                    put(to_message(can_id, content, at, channel, is_rx))
+                return
+            for can_id, content in frames:
+                put(to_message(can_id, content, timestamp, channel, is_rx))
         elif packet is not None and packet.kind == wire.BYE:
             self._closed_because = packet.text
-            raise can.CanOperationError(f"bus {self.channel!r} closed: {packet.text}")
+            raise BusClosedError(f"bus {self.channel!r} closed: {packet.text}")
         elif not data:
             raise can.CanOperationError(f"bus {self.channel!r} closed without a word")
+
+    def _await_room(self, timeout: float | None) -> None:
+        """Take a place in the transmit queue, waiting at most `timeout`; None: not at all."""
+        deadline = time.monotonic() + (timeout or 0.0)
+        while (self._said - self._gone) & 0xFFFF_FFFF >= self._queue:
+            left_s = deadline - time.monotonic()
+            # A paced client holds the bus's time: waiting would be for ever.
+            if left_s <= 0.0 or self._paced or not self._receive(left_s):
+                raise can.CanOperationError(
+                    f"bus {self.channel!r}: transmit queue full, {self._queue} frames wait",
+                    errno.ENOBUFS,
+                )
+        self._said += 1
 
     def _flush(self, flags: int) -> None:
         frames, self._outbox = self._outbox, []

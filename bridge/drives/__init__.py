@@ -13,6 +13,17 @@ from bridge.frame import Frame
 from configs.brief import DriveLink, DriveModel
 
 
+class Feeling(NamedTuple):
+    """What a drive measures of its motor and of the supply."""
+
+    torque_N_m: float  # the motor's, estimated
+    current_A: float  # q axis
+    fet_C: float
+    motor_C: float  # NaN: no thermistor
+    bus_V: float
+    bus_A: float
+
+
 class DriveClient(Protocol):
     """The controller's end of the two drives of a robot."""
 
@@ -21,9 +32,6 @@ class DriveClient(Protocol):
 
     def hear(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         """Take any frame from the bus."""
-
-    def complete(self, now_ns: int) -> bool:
-        """Whether both wheels' encoder frames of this instant are here."""
 
     def heard_since(self, bus_ns: int) -> bool:
         """Whether both wheels' encoder frames came after this bus time."""
@@ -52,6 +60,8 @@ class DriveNode(Protocol):
 
     fed_ns: int
     """When it last took a set-point, bus time."""
+    setpoint_id: int
+    """The identifier of the set-point that it takes at its address now."""
 
     def feed(self, revolutions: float, rev_s: float) -> None:
         """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
@@ -65,8 +75,16 @@ class DriveNode(Protocol):
     def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Take one frame from the bus; return the replies."""
 
-    def torque_demand(self) -> float:
-        """Torque that the drive asks of its motor now [N·m]; always finite."""
+    input_torque: float
+    """The torque that the set-point said [N·m], before limits."""
+    next_due_ns: int
+    """The earliest bus time at which `due` has something to do."""
+
+    def feel(self, feeling: Feeling) -> None:
+        """Take what the drive measures."""
+
+    def torque_demand(self, dt_s: float) -> float:
+        """Torque that the drive asks of its motor for the next `dt_s` [N·m]; always finite."""
 
 
 class DriveProtocol(NamedTuple):

@@ -10,7 +10,7 @@ import pytest
 
 from configs.loading import load, shipped
 
-VERBS = ("run", "check", "report", "export", "diff", "init")
+VERBS = ("run", "check", "report", "export", "diff", "init", "can")
 
 
 def fleetloop(*args: str, cwd: Path) -> subprocess.CompletedProcess[str]:

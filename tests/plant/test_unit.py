@@ -11,14 +11,14 @@ from bridge.telemetry import PLANT_SIGNALS
 from configs.brief import NetworkLink
 from configs.briefing import plant_brief
 from configs.loading import load
-from plant.unit import Unit
+from plant.unit import Unit, unit_of
 
 COLUMNS = [signal.name for signal in PLANT_SIGNALS]
 
 
 def unit() -> Unit:
     scenario = load("two_robots", ("robot.r1.v_m_s=0.0", "robot.r1.pose.theta_rad=0.0"))
-    return Unit(plant_brief(scenario, network=NetworkLink("t", "", "", "")).robots[0])
+    return unit_of(plant_brief(scenario, network=NetworkLink("t", "", "", "")).robots[0])
 
 
 def arm(robot: Unit, right: float, left: float) -> None:

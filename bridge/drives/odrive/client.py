@@ -115,10 +115,6 @@ class OdriveClient:
             axis.hear_heartbeat(data, now_ns)
             self._note_heartbeat(now_ns)
 
-    def complete(self, now_ns: int) -> bool:
-        """Whether both wheels' encoder frames of this instant are here."""
-        return self._right.stamp_ns == now_ns and self._left.stamp_ns == now_ns
-
     def heard_since(self, bus_ns: int) -> bool:
         """Whether both wheels' encoder frames came after this bus time."""
         return self._right.stamp_ns > bus_ns and self._left.stamp_ns > bus_ns

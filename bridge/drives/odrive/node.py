@@ -64,7 +64,7 @@ class OdriveNode:
         self._next_heartbeat_ns = self._next_encoder_ns = self._next_torques_ns = 0
         self._next_other_ns = 0
         self._encoder_id = f.identifier(node_id, Command.GET_ENCODER_ESTIMATES)
-        self._torque_id = f.identifier(node_id, Command.SET_INPUT_TORQUE)
+        self.setpoint_id = f.identifier(node_id, Command.SET_INPUT_TORQUE)
 
     # --- the plant's end -------------------------------------------------------------------------
 
@@ -73,7 +73,7 @@ class OdriveNode:
         self._position = revolutions + self._offset
         self._velocity = rev_s
 
-    def torque_demand(self) -> float:
+    def torque_demand(self, dt_s: float = 0.0) -> float:  # noqa: ARG002
         """Torque that the drive asks of its motor now [N·m]; always finite."""
         if self.state is not AxisState.CLOSED_LOOP_CONTROL:
             return 0.0
@@ -86,6 +86,14 @@ class OdriveNode:
         torque = max(torque, (-self._velocity_limit - self._velocity) * gain)
         limit = self._current_limit * model.torque_constant_N_m_A
         return min(max(torque, -limit), limit)
+
+    @property
+    def next_due_ns(self) -> int:
+        """The earliest bus time at which `due` has something to do."""
+        return min(self._next_encoder_ns, self._next_other_ns)
+
+    def feel(self, feeling: object) -> None:
+        """Take what the drive measures."""
 
     def due(self, now_ns: int) -> Sequence[Frame]:
         """Cyclic frames due at this instant; the watchdog is looked at first."""
@@ -121,7 +129,7 @@ class OdriveNode:
     def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Take one frame from the bus; return the replies."""
         can_id, data = frame
-        if can_id == self._torque_id and len(data) == 4:
+        if can_id == self.setpoint_id and len(data) == 4:
             (torque,) = _UNPACK_FLOAT(data)
             if isfinite(torque):
                 self.fed_ns = now_ns
@@ -300,7 +308,7 @@ class OdriveNode:
         if node <= f.UNADDRESSED:
             self.node_id = node
             self._encoder_id = f.identifier(node, Command.GET_ENCODER_ESTIMATES)
-            self._torque_id = f.identifier(node, Command.SET_INPUT_TORQUE)
+            self.setpoint_id = f.identifier(node, Command.SET_INPUT_TORQUE)
 
     # --- what it says ----------------------------------------------------------------------------
 

@@ -1,0 +1,42 @@
+"""The bus as the clock of a controller in lockstep: which tick is due at what it heard.
+
+A tick is due once both drives' encoder frames of it are here, that came at its bus time or later;
+and when its period passes without them, for a controller on a starved bus acts as well, on what it
+knows. Each tick is due once, in order.
+"""
+
+from collections.abc import Callable
+
+from configs.brief import Schedule
+
+
+class BusClock:
+    """Counts the ticks of one controller.
+
+    Args:
+        heard_since: whether both encoder frames came after a bus time [ns].
+    """
+
+    __slots__ = ("_due_ns", "_heard_since", "_next", "_period_ns")
+
+    def __init__(self, schedule: Schedule, heard_since: Callable[[int], bool]) -> None:
+        self._heard_since = heard_since
+        self._period_ns = schedule.period_ns
+        self._next = -schedule.countdown_ticks
+        self._due_ns = schedule.bus_time_ns(self._next)
+
+    def due(self, now_ns: int) -> int | None:
+        """The tick to compute, a frame of bus time `now_ns` having been heard."""
+        if now_ns >= self._due_ns and self._heard_since(self._due_ns - 1):
+            return self._take()
+        return None
+
+    def passed(self) -> int:
+        """The tick to compute, its period having passed without its frames."""
+        return self._take()
+
+    def _take(self) -> int:
+        tick = self._next
+        self._next = tick + 1
+        self._due_ns += self._period_ns
+        return tick

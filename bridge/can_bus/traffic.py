@@ -1,0 +1,30 @@
+"""Frames on a bus with bit timing: when they ended, and whose they were."""
+
+from typing import NamedTuple
+
+from bridge.frame import Frame
+
+Key = str | int
+"""A client of a bus: the name of the robot that it controls in lockstep, else a number."""
+
+
+class Stamped(NamedTuple):
+    """A frame and the bus time at which it ended."""
+
+    end_ns: int
+    frame: Frame
+
+
+class Said(NamedTuple):
+    """A frame that a client wants to send."""
+
+    key: Key
+    frame: Frame
+
+
+class Passed(NamedTuple):
+    """A frame that ended on the bus; the key of the client that had sent it, None for a drive."""
+
+    end_ns: int
+    frame: Frame
+    key: Key | None = None

@@ -1,0 +1,1 @@
+"""The operator's CAN tools: `fleetloop can list | dump | send | gateway | slcan`."""

@@ -1,0 +1,215 @@
+"""`fleetloop can dump`: what goes over buses, as candump prints it.
+
+    console     (0000000012.345678)  r1  009   [8]  00 00 80 3F 00 00 00 00
+    log (-L)   (0000000012.345678) r1 009#0000803F00000000
+
+Times are bus time: seconds since the bus was powered up. Ends with the run, after `count` frames or
+a silence, when nobody reads any more, or by a signal (exit status 130).
+"""
+
+import contextlib
+import io
+import os
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import TextIO
+
+from bridge.can_bus import places
+from bridge.frame import EFF, Frame
+from configs.errors import ScenarioError
+from fleetloop.can import error_frames, filters, text
+from fleetloop.can.cansimple import words
+from fleetloop.can.client import Heard, Listener, open_bus
+from fleetloop.can.filters import Filter
+from fleetloop.terminal import note
+
+ANY = "any"
+STAMPS = "adzA"
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What to print of a frame, and when to end."""
+
+    stamps: str = ""  # of STAMPS, or empty
+    nanoseconds: bool = False
+    log_format: bool = False
+    ascii_too: bool = False
+    explain_errors: bool = False
+    decode: bool = False
+    count: int | None = None
+    silence_s: float | None = None
+
+    def check(self) -> None:
+        """Raise ScenarioError for what doesn't go together."""
+        if self.stamps and self.stamps not in STAMPS:
+            raise ScenarioError(f"-t {self.stamps}: right are a, d, z and A")
+        if self.log_format and (self.ascii_too or self.explain_errors or self.decode):
+            raise ScenarioError("-L is for programs: it doesn't go with -a, -e or --decode")
+
+
+class Stamps:
+    """Time stamps as candump writes them, with the blank after them."""
+
+    __slots__ = ("_first_ns", "_kind", "_nanoseconds")
+
+    def __init__(self, kind: str, *, nanoseconds: bool) -> None:
+        self._kind = kind
+        self._nanoseconds = nanoseconds
+        self._first_ns: int | None = None
+
+    def text(self, stamp_ns: int) -> str:
+        """The stamp of a frame, empty if none is wanted."""
+        kind = self._kind
+        if not kind:
+            return ""
+        if kind in "dz":
+            if self._first_ns is None:
+                self._first_ns = stamp_ns
+            elapsed_ns = max(stamp_ns - self._first_ns, 0)
+            if kind == "d":
+                self._first_ns = stamp_ns
+            seconds, rest_ns = divmod(elapsed_ns, 1_000_000_000)
+            return f"({seconds:03}.{self._fraction(rest_ns)}) "
+        seconds, rest_ns = divmod(stamp_ns, 1_000_000_000)
+        if kind == "A":
+            date = datetime.fromtimestamp(seconds).astimezone()
+            return f"({date:%Y-%m-%d %H:%M:%S}.{self._fraction(rest_ns)}) "
+        return f"({seconds:010}.{self._fraction(rest_ns)}) "
+
+    def _fraction(self, rest_ns: int) -> str:
+        return f"{rest_ns:09}" if self._nanoseconds else f"{rest_ns // 1000:06}"
+
+
+class Printer:
+    """Lines of frames; an 11-bit identifier moves right once a 29-bit one was seen."""
+
+    __slots__ = ("_indent", "_options", "_stamps", "_width")
+
+    def __init__(self, options: Options, names: Sequence[str]) -> None:
+        kind = options.stamps
+        if options.log_format and kind != "z":
+            kind = "a"
+        self._options = options
+        self._stamps = Stamps(kind, nanoseconds=options.nanoseconds)
+        self._width = max(map(len, names), default=0)
+        self._indent = False
+
+    def lines(self, heard: Heard) -> str:
+        """What a frame prints, newlines included."""
+        bus, frame, stamp_ns = heard
+        stamp = self._stamps.text(stamp_ns)
+        if self._options.log_format:
+            return f"{stamp}{bus:>{self._width}} {text.compact(frame)}\n"
+        if frame.can_id & EFF:
+            self._indent = True
+        shown = text.long(frame, indent=self._indent, ascii_too=self._options.ascii_too)
+        return f" {stamp} {bus:>{self._width}}  {self._with_words(shown, frame)}\n"
+
+    def _with_words(self, shown: str, frame: Frame) -> str:
+        if self._options.explain_errors:
+            shown += "".join(f"\n\t{line}" for line in error_frames.explain(frame))
+        if self._options.decode and (said := words(frame)):
+            columns = text.long_columns(indent=self._indent)
+            shown = f"{shown:<{columns}}   {said}"
+        return shown
+
+
+def dump(targets: Sequence[str], options: Options) -> int:
+    """Print the frames of buses, each named as `BUS[,filter]*`; return the exit status.
+
+    Raises:
+        ScenarioError: a filter or an option is wrong.
+        InfrastructureError: a bus isn't there.
+    """
+    options.check()
+    wanted = _wanted(targets)
+    with contextlib.ExitStack() as opened:
+        buses = {
+            name: opened.enter_context(open_bus(channel, gathered=True))
+            for name, (channel, _) in wanted.items()
+        }
+        with Listener(buses, _descriptor(sys.stdout)) as listener:
+            passes = {name: filtered for name, (_, filtered) in wanted.items()}
+            try:
+                _print_all(listener, passes, options)
+                sys.stdout.flush()
+            except KeyboardInterrupt:
+                return 130
+            except BrokenPipeError:
+                listener.abandoned = True
+            if listener.abandoned:
+                _forget_output()
+                return 0
+            for farewell in listener.farewells:
+                note(f"fleetloop: {farewell}")
+            return 3 if listener.broken else 0
+
+
+def _wanted(targets: Sequence[str]) -> dict[str, tuple[str, Filter]]:
+    """Channels and filters by the name to print."""
+    parsed = [filters.parse(target) for target in targets]
+    channels: list[tuple[str, Filter]] = []
+    for channel, filtered in parsed:
+        if channel == ANY:
+            channels += [(places.name_of(path), filtered) for path in places.live_buses()]
+        else:
+            channels.append((channel, filtered))
+    if not channels:
+        raise places.NoSuchBusError("no bus is up: none is running here")
+    counts = Counter(_short(channel) for channel, _ in channels)
+    wanted: dict[str, tuple[str, Filter]] = {}
+    for channel, filtered in channels:
+        name = _short(channel) if counts[_short(channel)] == 1 else channel
+        if name in wanted:
+            raise ScenarioError(f"bus {channel} is named twice")
+        wanted[name] = (channel, filtered)
+    return wanted
+
+
+def _short(channel: str) -> str:
+    return channel.rpartition("/")[2].removesuffix(places.SUFFIX)
+
+
+def _print_all(listener: Listener, wanted: dict[str, Filter], options: Options) -> None:
+    printer = Printer(options, list(wanted))
+    write, flush = sys.stdout.write, sys.stdout.flush
+    left = options.count if options.count is not None else sys.maxsize
+    silent_at = _deadline(options.silence_s)
+    while not listener.over:
+        wait_s = None if silent_at is None else silent_at - time.monotonic()
+        if wait_s is not None and wait_s <= 0:
+            return
+        heard = [item for item in listener.listen(wait_s) if wanted[item.bus].passes(item[1][0])]
+        if not heard:
+            continue
+        heard = heard[:left]
+        left -= len(heard)
+        write("".join(map(printer.lines, heard)))
+        flush()
+        if not left:
+            return
+        silent_at = _deadline(options.silence_s)
+
+
+def _deadline(silence_s: float | None) -> float | None:
+    return None if silence_s is None else time.monotonic() + silence_s
+
+
+def _descriptor(stream: TextIO) -> int | None:
+    try:
+        return stream.fileno()
+    except (io.UnsupportedOperation, ValueError):
+        return None
+
+
+def _forget_output() -> None:
+    """Nobody reads: what is still buffered must not raise when the interpreter ends."""
+    with contextlib.suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)

@@ -1,0 +1,260 @@
+"""`fleetloop can gateway`: joins a bus to another python-can bus, both ways.
+
+    came from      what                         happens
+    either         classic data, remote         sent to the other, never back
+    either         error frame                  counted; it is the state of one wire, not data
+    far            FD frame                     counted; ours is classic CAN
+    far            its echo of ours             dropped (see `fleetloop.can.echo`)
+
+A full far bus loses what waits for it, so a stall there ends in a gap and not in old set-points.
+Our bus ends with its run: the gateway says so and ends with 0. When the far bus is lost, it ends
+with 3, or tries for `retry_s` to open it again; what our bus says meanwhile is lost and counted.
+"""
+
+import contextlib
+import threading
+import time
+from dataclasses import dataclass, field
+
+import can
+
+from bridge.can_bus.convert import to_frame, to_message
+from bridge.can_bus.interface import BusClosedError
+from bridge.frame import MAX_DATA
+from configs.errors import InfrastructureError
+from fleetloop.can.client import open_bus
+from fleetloop.can.echo import EchoGuard
+from fleetloop.can.far_bus import FarBus
+from fleetloop.terminal import note, say
+
+SEND_S = 0.01
+WAIT_S = 0.1
+RETRY_EVERY_S = 0.5
+FAILURES = 10
+"""So many failures in a row mean that the far bus is lost; one may be a stranger's datagram."""
+
+
+@dataclass(slots=True)
+class Counters:
+    """What went one way, and what didn't."""
+
+    passed: int = 0
+    lost: int = 0
+    error_frames: int = 0
+    echoes: int = 0
+    fd_frames: int = 0
+    most_per_s: int = 0
+    _second: int = 0
+    _in_second: int = 0
+
+    def passes(self, now_s: float) -> None:
+        """One frame was passed on."""
+        self.passed += 1
+        if int(now_s) != self._second:
+            self._second, self._in_second = int(now_s), 0
+        self._in_second += 1
+        self.most_per_s = max(self.most_per_s, self._in_second)
+
+    def words(self) -> str:
+        """For people."""
+        parts = [f"{self.passed} frames"]
+        for count, what in (
+            (self.lost, "lost"),
+            (self.echoes, "own echoes dropped"),
+            (self.error_frames, "error frames not passed on"),
+            (self.fd_frames, "FD frames not passed on"),
+        ):
+            if count:
+                parts.append(f"{count} {what}")
+        return ", ".join(parts)
+
+
+@dataclass(slots=True)
+class Gateway:
+    """Two buses and what went between them; `near` is ours."""
+
+    near: can.BusABC
+    far: can.BusABC
+    guard: EchoGuard
+    outward: Counters = field(default_factory=Counters)
+    inward: Counters = field(default_factory=Counters)
+    over: threading.Event = field(default_factory=threading.Event)
+    near_gone: can.CanError | None = None
+    far_gone: str = ""
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def run(self) -> None:
+        """Pass frames on until `over` is set or one of the buses is gone."""
+        ways = [threading.Thread(target=way) for way in (self._go_out, self._come_in)]
+        for way in ways:
+            way.start()
+        try:
+            self.over.wait()
+        finally:
+            self.over.set()
+            for way in ways:
+                way.join()
+
+    # --- from ours to the far one ----------------------------------------------------------------
+
+    def _go_out(self) -> None:
+        failures = 0
+        try:
+            while not self.over.is_set():
+                message = self.near.recv(WAIT_S)
+                if message is None:
+                    continue
+                if message.is_error_frame:
+                    self.outward.error_frames += 1
+                    continue
+                try:
+                    self._send_out(message)
+                    failures = 0
+                except (can.CanError, OSError) as error:
+                    failures += 1
+                    self.outward.lost += 1 + drain(self.near)
+                    if failures > FAILURES:
+                        self.far_gone = f"can't send: {error}"
+                        return
+        except can.CanError as error:
+            self.near_gone = error
+        finally:
+            self.over.set()
+
+    def _send_out(self, message: can.Message) -> None:
+        frame = to_frame(message)
+        now_s = time.monotonic()
+        with self._lock:
+            self.guard.sent(frame, now_s)
+        # A message of its own: some interfaces take the channel from the message.
+        self.far.send(to_message(*frame), SEND_S)
+        self.outward.passes(now_s)
+
+    # --- from the far one to ours ----------------------------------------------------------------
+
+    def _come_in(self) -> None:
+        failures = 0
+        try:
+            while not self.over.is_set():
+                try:
+                    message = self.far.recv(WAIT_S)
+                except (can.CanError, OSError, ValueError) as error:
+                    failures += 1
+                    if failures > FAILURES:
+                        self.far_gone = str(error)
+                        return
+                    continue
+                failures = 0
+                if message is not None:
+                    self._take_in(message)
+                if self.guard.storm:
+                    self.far_gone = (
+                        "what goes out to it comes back: another gateway joins the same two buses,"
+                        " or the interface hands back what is sent (then: --echo yes)"
+                    )
+                    return
+        except can.CanError as error:
+            self.near_gone = error
+        finally:
+            self.over.set()
+
+    def _take_in(self, message: can.Message) -> None:
+        counters = self.inward
+        if message.is_error_frame:
+            counters.error_frames += 1
+            return
+        if message.is_fd or message.dlc > MAX_DATA:
+            counters.fd_frames += 1
+            return
+        now_s = time.monotonic()
+        frame = to_frame(message)
+        with self._lock:
+            echo = self.guard.is_echo(frame, now_s)
+        if echo:
+            counters.echoes += 1
+            return
+        try:
+            self.near.send(to_message(*frame), WAIT_S)
+        except BusClosedError:
+            raise
+        except can.CanOperationError:
+            # A full bus of ours loses the frame; whether it is gone, its reader finds out.
+            counters.lost += 1
+            return
+        counters.passes(now_s)
+
+
+def join(channel: str, far_bus: FarBus, *, retry_s: float = 0.0, with_rates: bool = False) -> int:
+    """Join a bus to another until its run ends or a signal comes; return the exit status.
+
+    Raises:
+        InfrastructureError: one of the buses can't be opened.
+    """
+    ways = Counters(), Counters()
+    start = time.monotonic()
+    with contextlib.ExitStack() as until_joined:
+        far = until_joined.enter_context(far_bus.open())
+        near = open_bus(channel)
+        until_joined.pop_all()  # from here on, who passes on closes what it passes on to
+    with near:
+        note(f"joined {channel} and {far_bus.name}; Ctrl-C ends it")
+        try:
+            status = _pass_on(near, far, far_bus, ways, retry_s)
+        except KeyboardInterrupt:
+            status = 130
+    wall_s = time.monotonic() - start
+    names = (f"{channel} → {far_bus.name}", f"{far_bus.name} → {channel}")
+    for name, counters in zip(names, ways, strict=True):
+        rates = f"; {counters.passed / wall_s:.0f}/s, at most {counters.most_per_s} in a second"
+        say(f"{name}: {counters.words()}{rates if with_rates else ''}")
+    return status
+
+
+def _pass_on(
+    near: can.BusABC,
+    far: can.BusABC,
+    far_bus: FarBus,
+    ways: tuple[Counters, Counters],
+    retry_s: float,
+) -> int:
+    """Pass frames on, over as many openings of the far bus as it takes; the exit status."""
+    reopened: can.BusABC | None = far
+    try:
+        while reopened is not None:
+            with reopened as current:
+                gateway = Gateway(near, current, EchoGuard(echoes=far_bus.echoes), *ways)
+                gateway.run()
+            if gateway.near_gone is not None:
+                raise gateway.near_gone
+            note(f"fleetloop: {far_bus.name}: {gateway.far_gone}")
+            if gateway.guard.storm:
+                return 3
+            reopened = _reopen(far_bus, near, ways[0], retry_s)
+    except can.CanError as gone:
+        note(f"fleetloop: {gone}")
+        return 0 if isinstance(gone, BusClosedError) else 3
+    return 3
+
+
+def drain(bus: can.BusABC) -> int:
+    """Drop what waits on a bus; return how many frames that were."""
+    dropped = 0
+    while bus.recv(0.0) is not None:
+        dropped += 1
+    return dropped
+
+
+def _reopen(
+    far_bus: FarBus, near: can.BusABC, outward: Counters, retry_s: float
+) -> can.BusABC | None:
+    deadline = time.monotonic() + retry_s
+    while time.monotonic() < deadline:
+        threading.Event().wait(RETRY_EVERY_S)
+        outward.lost += drain(near)
+        try:
+            far = far_bus.open()
+        except InfrastructureError:
+            continue
+        note(f"opened {far_bus.name} again")
+        return far
+    return None

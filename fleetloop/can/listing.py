@@ -1,0 +1,168 @@
+"""`fleetloop can list`: which buses are up, who is on them, how busy they are.
+
+It joins every bus for a short while and listens; that changes nothing for the run. How many clients
+a bus has is the kernel's word: connections to the bus's socket (`/proc/net/unix`).
+"""
+
+import contextlib
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from bridge.can_bus import places
+from configs.errors import InfrastructureError
+from fleetloop.can.census import Census, Node
+from fleetloop.can.client import Listener, open_bus
+from fleetloop.terminal import note, say
+
+_CONNECTED = "03"
+
+
+@dataclass(frozen=True, slots=True)
+class BusReport:
+    """What is known of one bus; None: unknown."""
+
+    run: str
+    bus: str
+    clients: int | None
+    frames_per_s: float | None
+    load: float | None
+    bit_rate: int
+    bus_time_s: float | None
+    real_time_factor: float | None
+    error_frames: int
+    other_frames: int
+    nodes: tuple[Node, ...]
+    problem: str = ""
+
+
+def list_buses(*, seconds: float, bit_rate: int, as_json: bool) -> int:
+    """Listen to all buses for `seconds` and print what there is; return the exit status."""
+    try:
+        reports = survey(seconds, bit_rate)
+    except KeyboardInterrupt:
+        return 130
+    if as_json:
+        say(json.dumps([asdict(report) for report in reports], indent=2))
+    elif reports:
+        say(_table(reports, bit_rate))
+        for report in reports:
+            if report.problem:
+                note(f"fleetloop: {report.run}/{report.bus}: {report.problem}")
+    else:
+        note(f"no bus is up in {places.base_folder()}")
+    return 0
+
+
+def survey(seconds: float, bit_rate: int) -> list[BusReport]:
+    """Listen to all buses at once; one that doesn't answer costs a little more time."""
+    clients = connections(Path("/proc/net/unix"))  # before we are one, or look who answers
+    paths = places.live_buses()
+    problems: dict[str, str] = {}
+    with contextlib.ExitStack() as opened:
+        buses = {}
+        for path in paths:
+            try:
+                buses[str(path)] = opened.enter_context(open_bus(str(path), gathered=True))
+            except InfrastructureError as error:
+                problems[str(path)] = str(error)
+        census = {name: Census(bit_rate) for name in buses}
+        with Listener(buses) as listener:
+            listener.listen(0.0)  # what gathered while the others were opened
+            start = time.monotonic()
+            while not listener.over and (left := start + seconds - time.monotonic()) > 0:
+                for name, frame, stamp_ns in listener.listen(left):
+                    census[name].count(frame, stamp_ns)
+            wall_s = time.monotonic() - start
+    return [
+        _report(path, census.get(str(path)), clients, wall_s, problems.get(str(path), ""))
+        for path in paths
+    ]
+
+
+def connections(table: Path) -> Mapping[str, int] | None:
+    """Connections by path of a Unix socket, from the kernel's table; None if it isn't readable."""
+    try:
+        lines = table.read_text("utf-8", "surrogateescape").splitlines()[1:]
+    except OSError:
+        return None
+    counts: dict[str, int] = {}
+    for line in lines:
+        fields = line.split(maxsplit=7)
+        if len(fields) == 8:
+            counts[fields[7]] = counts.get(fields[7], 0) + (fields[5] == _CONNECTED)
+    return counts
+
+
+def _report(
+    path: Path,
+    census: Census | None,
+    clients: Mapping[str, int] | None,
+    wall_s: float,
+    problem: str,
+) -> BusReport:
+    seen = census if census is not None else Census(1)
+    # A bus that isn't in the table lives where another kernel table counts (a container's).
+    return BusReport(
+        run=path.parent.name,
+        bus=path.name.removesuffix(places.SUFFIX),
+        clients=clients.get(str(path)) if clients is not None else None,
+        frames_per_s=seen.rate,
+        load=seen.load,
+        bit_rate=seen.bit_rate,
+        bus_time_s=seen.bus_time_s,
+        real_time_factor=seen.seconds / wall_s if seen.seconds > 0 else None,
+        error_frames=seen.error_frames,
+        other_frames=seen.other_frames,
+        nodes=tuple(seen.nodes),
+        problem=problem,
+    )
+
+
+def _table(reports: list[BusReport], bit_rate: int) -> str:
+    rows = [
+        ("BUS", "CLIENTS", "BUS TIME", "SPEED", "FRAMES/S", "LOAD", "NODES"),
+        *map(_row, reports),
+    ]
+    lines = []
+    run = ""
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    shown = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+    for report, line in zip(reports, shown[1:], strict=True):
+        if report.run != run:
+            lines += ["", f"run {report.run}", "  " + shown[0]]
+            run = report.run
+        lines.append("  " + line)
+    lines.append(f"\nload at {bit_rate / 1e6:g} Mbit/s; rates per second of bus time")
+    return "\n".join(lines).lstrip("\n")
+
+
+def _row(report: BusReport) -> tuple[str, ...]:
+    return (
+        report.bus,
+        _shown(report.clients, "{}"),
+        _shown(report.bus_time_s, "{:.2f} s"),
+        _shown(report.real_time_factor, "{:.2f} ×"),
+        _shown(report.frames_per_s, "{:.0f}"),
+        _shown(report.load, "{:.1%}"),
+        _nodes(report) or "none heard",
+    )
+
+
+def _nodes(report: BusReport) -> str:
+    shown = [
+        f"{node.node} {node.state}".rstrip()
+        + (f" ({node.errors})" if node.errors not in ("", "no error") else "")
+        for node in report.nodes
+    ]
+    if report.error_frames:
+        shown.append(f"{report.error_frames} error frames")
+    if report.other_frames:
+        shown.append(f"{report.other_frames} frames of other protocols")
+    return ", ".join(shown)
+
+
+def _shown(value: float | None, form: str) -> str:
+    return "-" if value is None else form.format(value)

@@ -1,0 +1,50 @@
+"""`fleetloop can send`: put frames on a bus, in cansend's syntax.
+
+A frame goes to all other clients and the drives of the bus, as from any node. Repeats keep absolute
+deadlines of the wall clock, so the mean rate holds.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+
+import can
+
+from bridge.can_bus.convert import to_message
+from configs.errors import InfrastructureError
+from fleetloop.can import text
+from fleetloop.can.client import open_bus
+
+FULL_S = 2.0
+"""How long a full bus may take to have room again."""
+
+
+def send(
+    channel: str,
+    frames: Sequence[str],
+    *,
+    count: int = 1,
+    gap_s: float = 0.0,
+    wait: Callable[[float], object] = time.sleep,
+) -> int:
+    """Send frames in order, `count` times, a gap between them; return the exit status.
+
+    Raises:
+        ScenarioError: a text is no frame; nothing was sent.
+        InfrastructureError: no such bus, or it ended.
+    """
+    messages = [to_message(*text.parse(frame)) for frame in frames]
+    with open_bus(channel) as bus:
+        sent = 0
+        start = time.monotonic()
+        try:
+            for _ in range(count):
+                for message in messages:
+                    if sent and gap_s and (left := start + sent * gap_s - time.monotonic()) > 0:
+                        wait(left)
+                    bus.send(message, FULL_S)
+                    sent += 1
+        except can.CanOperationError as error:
+            raise InfrastructureError(f"{error}, after {sent} frames") from error
+        except KeyboardInterrupt:
+            return 130
+    return 0

@@ -1,0 +1,55 @@
+"""What lies between the two drives of a robot and its wheels: motors, encoders, one supply.
+
+    demand ─► motor ─torque─► wheel ─angle─► encoder ─► drive
+                │ power
+              supply ─bus voltage─► both motors
+
+Every source of noise has a generator of its own, seeded by the scenario's seed, the robot and its
+place, so none depends on how often another one is asked.
+"""
+
+from random import Random
+from typing import NamedTuple
+
+from configs.brief import PowertrainModel
+from plant.encoder import Encoder
+from plant.motor import Motor
+from plant.supply import Supply
+
+
+class Powertrain(NamedTuple):
+    """The parts of one robot."""
+
+    supply: Supply
+    right_motor: Motor
+    left_motor: Motor
+    right_encoder: Encoder
+    left_encoder: Encoder
+
+    def step(
+        self,
+        demands_N_m: tuple[float, float],
+        speeds_rad_s: tuple[float, float],
+        dt_s: float,
+    ) -> tuple[float, float]:
+        """(right, left) torque at the wheels [N·m], held over `dt_s`; the supply follows."""
+        right = self.right_motor.step(demands_N_m[0], speeds_rad_s[0], dt_s)
+        left = self.left_motor.step(demands_N_m[1], speeds_rad_s[1], dt_s)
+        self.supply.step(self.right_motor.power_W, self.left_motor.power_W, dt_s)
+        return right, left
+
+
+def powertrain(model: PowertrainModel, inertia_kg_m2: float) -> Powertrain:
+    """Build the parts; `inertia_kg_m2` as `plant.motor.Motor` wants it."""
+    supply = Supply(model.supply)
+
+    def source(part: str) -> Random:
+        return Random(f"{model.seed}/{part}")
+
+    return Powertrain(
+        supply,
+        Motor(model.motor, inertia_kg_m2, supply, source("right motor")),
+        Motor(model.motor, inertia_kg_m2, supply, source("left motor")),
+        Encoder(model.encoder, source("right encoder")),
+        Encoder(model.encoder, source("left encoder")),
+    )

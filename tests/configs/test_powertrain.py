@@ -1,0 +1,125 @@
+"""Sections [motor], [encoder] and [supply]: defaults, what is refused, what the plant is told."""
+
+import math
+
+import pytest
+
+from configs.brief import NetworkLink, PowertrainModel, RobotBrief
+from configs.briefing import plant_brief
+from configs.errors import ScenarioError
+from configs.loading import load, loads, shipped
+from configs.stability import findings
+
+REALISTIC = "drive.preset='realistic'"
+NETWORK = NetworkLink("t", "", "", "")
+
+
+def robots(scenario: str, *overrides: str) -> tuple[RobotBrief, ...]:
+    return plant_brief(load(scenario, overrides), network=NETWORK).robots
+
+
+def model(*overrides: str) -> PowertrainModel:
+    powertrain = robots("two_robots", REALISTIC, *overrides)[0].powertrain
+    assert powertrain is not None
+    return powertrain
+
+
+def test_the_defaults_are_those_of_a_small_robot_on_odrives() -> None:
+    motor, encoder, supply = model().motor, model().encoder, model().supply
+    assert motor.torque_constant_N_m_A * motor.current_limit_A == pytest.approx(0.5)
+    assert (motor.current_loop_s, motor.compute_delay_s) == (0.001, 0.000125)
+    assert (motor.viscous_friction_N_m_s, motor.coulomb_friction_N_m) == (2e-4, 5e-3)
+    assert (motor.torque_noise_N_m, motor.current_quantum_A) == (1e-3, 0.01)
+    assert (motor.motor_thermal_time_s, motor.fet_thermal_time_s) == (60.0, 60.0)
+    assert motor.ambient_C == 25.0
+    assert (encoder.counts_per_rev, encoder.pll_bandwidth_rad_s) == (8192, 1000.0)
+    assert encoder.pll_rate_hz == 8000.0
+    assert (supply.voltage_V, supply.resistance_ohm, supply.absorbs) == (24.0, 0.1, True)
+
+
+@pytest.mark.parametrize("preset", ["ideal", "limited"])
+def test_the_simpler_presets_have_ideal_motors_and_encoders(preset: str) -> None:
+    assert all(robot.powertrain is None for robot in robots("paper", f"drive.preset='{preset}'"))
+
+
+def test_the_realistic_preset_has_the_limits_of_the_limited_one() -> None:
+    (limited, *_), (realistic, *_) = (
+        robots("two_robots", f"drive.preset='{preset}'") for preset in ("limited", "realistic")
+    )
+    assert realistic.drive == limited.drive
+    assert realistic.drive.torque_limiters
+
+
+def test_the_motor_has_the_torque_constant_and_limit_of_its_drive_if_not_its_own() -> None:
+    shared = model("drive.torque_constant_N_m_A=0.08", "drive.current_limit_A=5.0").motor
+    assert shared.torque_constant_N_m_A == shared.assumed_torque_constant_N_m_A == 0.08
+    assert shared.current_limit_A == 5.0
+    own = model("motor.torque_constant_N_m_A=0.045", "motor.current_limit_A=20.0").motor
+    assert (own.torque_constant_N_m_A, own.assumed_torque_constant_N_m_A) == (0.045, 0.05)
+    assert own.current_limit_A == 20.0
+
+
+def test_every_robot_of_every_seed_has_a_noise_of_its_own() -> None:
+    seeds = [
+        robot.powertrain.seed
+        for seed in range(4)
+        for robot in robots("twelve", REALISTIC, f"seed={seed}")
+        if robot.powertrain is not None
+    ]
+    assert len(set(seeds)) == len(seeds) == 48
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_every_shipped_scenario_can_be_checked_with_realistic_drives(name: str) -> None:
+    assert findings(load(name, (REALISTIC,)))
+
+
+@pytest.mark.parametrize(
+    ("override", "key", "right"),
+    [
+        ("motor.current_loop_s=0", "motor.current_loop_s", "greater than 0"),
+        ("motor.winding_resistance_ohm=-1.0", "motor.winding_resistance_ohm", "greater than 0"),
+        ("motor.ambient_C=-300.0", "motor.ambient_C", "greater than -273.15"),
+        ("motor.friction=1.0", "motor.friction", "unknown key"),
+        ("encoder.counts_per_rev=0", "encoder.counts_per_rev", "greater than or equal to 4"),
+        ("encoder.counts_per_rev=8192.5", "encoder.counts_per_rev", "integer"),
+        ("encoder.pll_bandwidth_rad_s=4000.0", "encoder.pll_bandwidth_rad_s", "below half"),
+        ("encoder.pll_rate_hz=1.0", "encoder.pll_rate_hz", "greater than or equal to 100"),
+        ("supply.voltage_V=0.0", "supply.voltage_V", "greater than 0"),
+        ("supply.absorbs=1", "supply.absorbs", "boolean"),
+        ("drive.preset='real'", "drive.preset", "realistic"),
+    ],
+)
+def test_one_wrong_value_gives_one_line_with_key_and_what_is_right(
+    override: str, key: str, right: str
+) -> None:
+    text = 'schema = 1\nname = "x"\n[[robot]]\nname = "r1"\npose = { x_m = 0.0, y_m = 0.0 }\n'
+    with pytest.raises(ScenarioError) as caught:
+        loads("file.toml", text, (override,))
+    (line,) = str(caught.value).splitlines()
+    assert line.startswith(f"file.toml: {key} = ")
+    assert right in line
+
+
+def test_a_section_that_the_preset_does_not_look_at_is_warned_of() -> None:
+    changed = ("motor.ambient_C=40.0", "encoder.index=true")
+    titles = [f.title for f in findings(load("paper", changed)) if "not used" in f.text]
+    assert titles == ["[motor]", "[encoder]"]
+    assert not [f for f in findings(load("paper", (*changed, REALISTIC))) if "not used" in f.text]
+
+
+def test_friction_counts_in_the_torque_that_a_realistic_robot_needs() -> None:
+    def text(*overrides: str) -> str:
+        found = findings(load("two_robots", overrides))
+        return next(f.text for f in found if f.title == "r1: steady wheel torque")
+
+    def need(*overrides: str) -> float:
+        return float(text(*overrides).split()[1])
+
+    free = ("motor.coulomb_friction_N_m=0.0", "motor.viscous_friction_N_m_s=0.0")
+    limited = need("drive.preset='limited'")
+    assert need(REALISTIC, *free) == limited
+    assert math.isclose(
+        need(REALISTIC, *free[1:], "motor.coulomb_friction_N_m=0.1"), limited + 0.1, rel_tol=1e-2
+    )
+    assert "of 0.25 N·m" in text(REALISTIC, "motor.current_limit_A=5.0")

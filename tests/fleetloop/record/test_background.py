@@ -1,0 +1,38 @@
+"""The background writer: the same file as the writer alone, and no failure is lost."""
+
+from pathlib import Path
+
+import pytest
+
+from bridge.telemetry import AGENT_ROW, PLANT_ROW
+from configs.errors import InfrastructureError
+from fleetloop.record.background import BackgroundWriter
+from fleetloop.record.writer import RecordWriter, Source
+
+BLOCKS: list[tuple[Source, int, bytes]] = [
+    (source, first, bytes(row.size * 100))
+    for first in range(0, 1000, 100)
+    for source, row in (("plant", PLANT_ROW), ("controller", AGENT_ROW))
+]
+
+
+def writer(path: Path) -> RecordWriter:
+    return RecordWriter(path, ("r1",), "schema = 1\n", 1_000_000)
+
+
+def test_the_file_is_the_same_as_without_it(tmp_path: Path) -> None:
+    with writer(tmp_path / "a.mcap") as alone:
+        for source, first, rows in BLOCKS:
+            alone.add("r1", source, first, rows)
+    with writer(tmp_path / "b.mcap") as file, BackgroundWriter(file) as behind:
+        for source, first, rows in BLOCKS:
+            behind.add("r1", source, first, rows)
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
+
+
+def test_what_fails_in_the_background_is_raised(tmp_path: Path) -> None:
+    with writer(tmp_path / "a.mcap") as file:
+        behind = BackgroundWriter(file)
+        behind.add("r1", "plant", 7, bytes(PLANT_ROW.size))
+        with pytest.raises(InfrastructureError, match="begin at tick 7, expected 0"):
+            behind.close()
