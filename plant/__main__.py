@@ -33,6 +33,9 @@ from plant.witness import Witness
 
 PLANT_PRIORITY = 45
 """SCHED_FIFO, above the controllers'."""
+GO_SHARE = 1.25
+"""Multiple of the start deadline that the plant waits for the go: whoever misses a peer names it
+first."""
 EARLY = -1
 """Tick of the poses that only prove the link, before the run."""
 
@@ -167,7 +170,8 @@ def _serve_until_go(
     brief: PlantBrief, end: DriveEnd, link: Link, hellos: Hellos, stop: Stop
 ) -> int:
     """Say hello and serve the buses until the launcher says when tick 0 is."""
-    deadline = time.monotonic() + brief.schedule.start_deadline_s
+    limit_s = GO_SHARE * brief.schedule.start_deadline_s
+    deadline = time.monotonic() + limit_s
     while time.monotonic() < deadline and not stop.requested:
         hellos.say()
         end.serve(0.02)
@@ -178,7 +182,7 @@ def _serve_until_go(
     if stop.requested:
         return time.monotonic_ns()
     raise InfrastructureError(
-        f"plant: not ready after {brief.schedule.start_deadline_s:g} s: no go from the launcher"
+        f"plant: not ready after {limit_s:g} s: no go from the launcher"
     )
 
 
