@@ -201,6 +201,7 @@ def check(
         ),
     ] = None,
     overrides: SetOption = None,
+    deployment: DeploymentOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON Schema of scenario files, for editors.")
@@ -214,7 +215,9 @@ def check(
     elif scenario is None:
         list_scenarios()
     else:
-        raise typer.Exit(check_scenario(scenario, tuple(overrides or []), as_json=as_json))
+        raise typer.Exit(
+            check_scenario(scenario, tuple(overrides or []), deployment=deployment, as_json=as_json)
+        )
 
 
 @app.command()

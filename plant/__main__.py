@@ -181,9 +181,7 @@ def _serve_until_go(
                 return monotonic_of(go.epoch_ns)
     if stop.requested:
         return time.monotonic_ns()
-    raise InfrastructureError(
-        f"plant: not ready after {limit_s:g} s: no go from the launcher"
-    )
+    raise InfrastructureError(f"plant: not ready after {limit_s:g} s: no go from the launcher")
 
 
 def _record(

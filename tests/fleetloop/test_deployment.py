@@ -1,5 +1,6 @@
 """The command line with deployments: what is refused, before anything is started."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from configs.errors import InfrastructureError, ScenarioError
 from configs.loading import load
 from fleetloop import placing
 from fleetloop.agent_alone import run_agent
+from fleetloop.check import check_scenario
 from fleetloop.plant_alone import Options as PlantOptions
 from fleetloop.plant_alone import run_plant
 from fleetloop.run import Options, run_scenario
@@ -98,4 +100,19 @@ def test_a_controller_is_told_its_bus_verbatim_and_the_pace_only_on_ours() -> No
         "interface": "fleetloop",
         "channel": "/x/r2.can",
         "gathered": True,
+    }
+
+
+def test_a_check_says_where_real_drives_would_be_driven(tmp_path, capsys) -> None:
+    file = tmp_path / "where.toml"
+    file.write_text('[robot.r2]\nbus = { interface = "socketcan", channel = "can0" }\n')
+    assert check_scenario("two_robots_100hz", (), deployment=file, as_json=True) == 0
+    places = {
+        finding["title"]: finding["text"]
+        for finding in json.loads(capsys.readouterr().out)["findings"]
+        if finding["title"].endswith("place")
+    }
+    assert places == {
+        "r1: place": "controller here, emulated drives on fleetloop r1",
+        "r2: place": "controller here, REAL drives on socketcan can0",
     }
