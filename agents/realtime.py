@@ -58,11 +58,14 @@ class RealtimeLoop:
         deadline = time.monotonic() + self._schedule.start_deadline_s
         while not stop.requested:
             self._hellos.say()
-            while (arrival := self._link.receive(0.02)) is not None:
+            arrival = self._link.receive(0.02)
+            while arrival is not None:
                 if arrival.tag != "go":
                     self.counters.undecodable += not give(self._agent, arrival)
                 elif (go := Go.decode(arrival.payload)) is not None:
                     return monotonic_of(go.epoch_ns)
+                # Others say hello all the time: wait for nothing here, or ours would not be said.
+                arrival = self._link.receive(0.0)
             if time.monotonic() > deadline:
                 raise InfrastructureError(
                     f"{self._robot}: the run did not start within"

@@ -99,8 +99,8 @@ def agent_brief(
         schedule=ticks,
         drives=DriveLink(
             protocol=drive.protocol,
-            right_node=scenario.drive.right_node,
-            left_node=scenario.drive.left_node,
+            right_node=scenario.nodes_of(name)[0],
+            left_node=scenario.nodes_of(name)[1],
             encoder_period_ns=drive.encoder_period_ns,
             velocity_limit_rev_s=drive.velocity_limit_rev_s,
             current_limit_A=drive.current_limit_A,
@@ -197,13 +197,13 @@ def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief
     disturbance = robot.disturbance or scenario.disturbance
     return RobotBrief(
         robot=robot.name,
-        bus=robot.name,
+        bus=scenario.bus_of(robot.name),
         body=Body(**scenario.body_of(robot).model_dump()),
         disturbance=Disturbance(disturbance.amplitude_N_m, disturbance.rate_rad_s, float(number)),
         drive=_drive_model(scenario, number),
         powertrain=_powertrain_model(scenario, number),
-        right_node=scenario.drive.right_node,
-        left_node=scenario.drive.left_node,
+        right_node=scenario.nodes_of(robot.name)[0],
+        left_node=scenario.nodes_of(robot.name)[1],
         pose=Pose(robot.pose.x_m, robot.pose.y_m, robot.pose.theta_rad),
         v_m_s=robot.v_m_s,
         omega_rad_s=robot.omega_rad_s,

@@ -7,6 +7,9 @@ from typing import NamedTuple
 from configs.scenario import ETSRO, Scenario
 from configs.topology import parse_edge
 
+MAX_NODE = 62
+"""63 is the address of drives that have none."""
+
 
 class Problem(NamedTuple):
     """One thing wrong with a scenario."""
@@ -93,6 +96,19 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
     drive = scenario.drive
     if drive.right_node == drive.left_node:
         yield Problem("drive.left_node", drive.left_node, "must differ from drive.right_node")
+        return
+    taken: dict[tuple[str, int], str] = {}
+    for name in scenario.names:
+        bus = scenario.bus_of(name)
+        for side, node in zip(("right", "left"), scenario.nodes_of(name), strict=True):
+            key = f"robot.{name}.{side}_node"
+            if node > MAX_NODE:
+                right = f"bus {bus} has no node left for it: 0 to {MAX_NODE}"
+                yield Problem(key, node, right)
+            elif (owner := taken.setdefault((bus, node), f"{name}'s {side} drive")) and (
+                owner != f"{name}'s {side} drive"
+            ):
+                yield Problem(key, node, f"on bus {bus} it is {owner} already; choose another")
     least_s, most_s = drive.command_latency_s
     if least_s > most_s:
         yield Problem("drive.command_latency_s", [least_s, most_s], "least before most")

@@ -48,6 +48,9 @@ class RobotSection(Section):
     """Where one robot is."""
 
     bus: BusSection = BusSection()
+    plant_bus: BusSection | None = Field(
+        None, description="the plant's own interface to that bus; the same if not given"
+    )
     emulated: bool | None = Field(
         None,
         description="the plant emulates its drives and its body; if not given: on our buses only,"
@@ -95,7 +98,12 @@ class Deployment(Section):
     def bus_of(self, robot: str) -> Settings:
         """Keyword arguments of `can.Bus` for a robot's bus, sorted."""
         bus = self.robot.get(robot, RobotSection()).bus
-        return tuple(sorted({"channel": robot, **bus.model_dump(exclude_none=True)}.items()))
+        return _settings(robot, bus)
+
+    def plant_bus_of(self, robot: str) -> Settings:
+        """Keyword arguments of `can.Bus` for the plant's end of a robot's bus, sorted."""
+        section = self.robot.get(robot, RobotSection())
+        return _settings(robot, section.plant_bus or section.bus)
 
     def is_ours(self, robot: str) -> bool:
         """Whether the plant holds the robot's bus itself."""
@@ -103,8 +111,10 @@ class Deployment(Section):
 
     def emulates(self, robot: str) -> bool:
         """Whether the plant emulates the robot."""
-        said = self.robot.get(robot, RobotSection()).emulated
-        return self.is_ours(robot) if said is None else said
+        section = self.robot.get(robot, RobotSection())
+        if section.emulated is not None:
+            return section.emulated
+        return self.is_ours(robot) or section.plant_bus is not None
 
     def runs_here(self, role: str) -> bool:
         """Whether `fleetloop run` starts this role."""
@@ -193,6 +203,10 @@ def passwords(network: NetworkSection | None, identities: tuple[str, ...]) -> di
     return {identity: known[identity] for identity in identities}
 
 
+def _settings(robot: str, bus: BusSection) -> Settings:
+    return tuple(sorted({"channel": robot, **bus.model_dump(exclude_none=True)}.items()))
+
+
 # --- check ----------------------------------------------------------------------------------------
 
 
@@ -220,7 +234,8 @@ def _problems(deployment: Deployment, scenario: Scenario) -> list[Problem]:
             right = f"no such robot; known: {', '.join(scenario.names)}"
             problems.append(Problem(key, robot, right))
             continue
-        problems += _bus_problems(key, section, realtime=realtime)
+        problems += _bus_problems(f"{key}.bus", section.bus, realtime=realtime)
+        problems += _emulation_problems(key, section)
         bus = section.bus
         other = places.setdefault((bus.interface, bus.channel or robot), robot)
         if other != robot:
@@ -229,26 +244,40 @@ def _problems(deployment: Deployment, scenario: Scenario) -> list[Problem]:
     return problems
 
 
-def _bus_problems(key: str, section: RobotSection, *, realtime: bool) -> list[Problem]:
-    bus = section.bus
+def _bus_problems(key: str, bus: BusSection, *, realtime: bool) -> list[Problem]:
     problems = [
-        Problem(f"{key}.bus.{name}", value, "must be a text, a number, true or false")
+        Problem(f"{key}.{name}", value, "must be a text, a number, true or false")
         for name, value in (bus.model_extra or {}).items()
         if not isinstance(value, str | int | float | bool)
     ]
-    if bus.interface != OURS:
-        if bus.channel is None:
-            right = f"must be given: what the interface {bus.interface} opens"
-            problems.append(Problem(f"{key}.bus.channel", MISSING, right))
-        if not realtime:
-            right = (
-                'in lockstep the plant holds the bus: "fleetloop"; or run with --clock realtime'
-                " at a rate and with gains for it"
-            )
-            problems.append(Problem(f"{key}.bus.interface", bus.interface, right))
-    elif section.emulated is False:
-        right = "a bus of the interface fleetloop has emulated drives; name another interface"
-        problems.append(Problem(f"{key}.emulated", False, right))
+    if bus.interface == OURS:
+        return problems
+    if bus.channel is None:
+        right = f"must be given: what the interface {bus.interface} opens"
+        problems.append(Problem(f"{key}.channel", MISSING, right))
+    if not realtime:
+        right = (
+            'in lockstep the plant holds the bus: "fleetloop"; or run with --clock realtime'
+            " at a rate and with gains for it"
+        )
+        problems.append(Problem(f"{key}.interface", bus.interface, right))
+    return problems
+
+
+def _emulation_problems(key: str, section: RobotSection) -> list[Problem]:
+    problems = []
+    ours = section.bus.interface == OURS
+    plant = section.plant_bus
+    if section.emulated is False and (ours or plant is not None):
+        why = (
+            "a bus of the interface fleetloop has emulated drives" if ours else "plant_bus says so"
+        )
+        problems.append(Problem(f"{key}.emulated", False, f"must be true: {why}"))
+    if plant is not None and OURS in (section.bus.interface, plant.interface):
+        right = "both ends must be on interfaces other than fleetloop, whose bus the plant holds"
+        problems.append(Problem(f"{key}.plant_bus.interface", plant.interface, right))
+    elif plant is not None:
+        problems += _bus_problems(f"{key}.plant_bus", plant, realtime=True)
     return problems
 
 

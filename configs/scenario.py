@@ -68,6 +68,28 @@ class Scenario(Section):
         return tuple(robot.name for robot in self.robot)
 
     @property
+    def buses(self) -> tuple[str, ...]:
+        """All buses, in the order of their first robots."""
+        return tuple(dict.fromkeys(self.bus_of(robot) for robot in self.names))
+
+    def bus_of(self, name: str) -> str:
+        """The bus of a robot."""
+        robot = next(robot for robot in self.robot if robot.name == name)
+        return robot.bus or robot.name
+
+    def nodes_of(self, name: str) -> tuple[int, int]:
+        """(right, left) node of a robot's drives: on a shared bus each robot has the next two."""
+        robot = next(robot for robot in self.robot if robot.name == name)
+        bus = self.bus_of(name)
+        number = [other for other in self.names if self.bus_of(other) == bus].index(name)
+        right, left = robot.right_node, robot.left_node
+        step = 2 * number
+        return (
+            self.drive.right_node + step if right is None else right,
+            self.drive.left_node + step if left is None else left,
+        )
+
+    @property
     def topology(self) -> Graph:
         """The directed graph, its generator carried out."""
         leader = self.graph.leader if self.graph.leader is not None else self.names[:1]

@@ -171,6 +171,10 @@ def plant(
             "--stdin", help="Answer requests on standard input (poses), and end when it ends."
         ),
     ] = False,
+    join: Annotated[
+        bool,
+        typer.Option("--join", help="Be the plant of the deployment's run; its launcher waits."),
+    ] = False,
 ) -> None:
     """Emulate drives and physics alone, in real time, for your own CAN host code."""
     from fleetloop.plant_alone import Options, run_plant
@@ -182,6 +186,7 @@ def plant(
         overrides=tuple(overrides or []),
         as_json=as_json,
         serve_stdin=stdin,
+        join=join,
     )
     raise typer.Exit(run_plant(scenario, options))
 
@@ -196,6 +201,7 @@ def check(
         ),
     ] = None,
     overrides: SetOption = None,
+    deployment: DeploymentOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON Schema of scenario files, for editors.")
@@ -209,7 +215,9 @@ def check(
     elif scenario is None:
         list_scenarios()
     else:
-        raise typer.Exit(check_scenario(scenario, tuple(overrides or []), as_json=as_json))
+        raise typer.Exit(
+            check_scenario(scenario, tuple(overrides or []), deployment=deployment, as_json=as_json)
+        )
 
 
 @app.command()

@@ -39,6 +39,10 @@ class Elsewhere:
         if process in self._processes:
             self._reports[process] = report
 
+    def absent(self) -> list[str]:
+        """Those that have not come yet."""
+        return sorted(self._processes - self._there)
+
     def ended(self) -> bool:
         """Whether all of them have said their last word or are lost."""
         return self._processes <= self._reports.keys() | self._gone_s.keys()

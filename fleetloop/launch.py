@@ -15,7 +15,7 @@ controllers follow it, the recorder takes what still comes; who doesn't is kille
 import contextlib
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridge import access, keys
@@ -25,11 +25,10 @@ from bridge.link import Arrival, Link
 from bridge.messages import Go, LeaderSpeed, Progress, Report
 from bridge.process import Stop, cpu_ns
 from bridge.zenoh_link import RouterLink, open_router
-from configs.brief import NetworkLink, RecorderBrief
-from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
+from configs.brief import NetworkLink
+from configs.briefing import leader_brief, schedule
 from configs.deployment import Deployment, roles_of
 from configs.errors import InfrastructureError
-from configs.loading import to_toml
 from configs.scenario import Scenario
 from fleetloop import placing
 from fleetloop.children import (
@@ -42,8 +41,8 @@ from fleetloop.children import (
     refuse_shadowed_roles,
 )
 from fleetloop.elsewhere import Elsewhere
-from fleetloop.nursery import FIRST_FD, Nursery
 from fleetloop.record.writer import finish_truncated
+from fleetloop.spawn import Orders, spawn
 
 WATCH_EVERY_S = 0.05
 GO_AHEAD_NS = 200_000_000
@@ -80,9 +79,9 @@ class ProcessRun:
         on_progress: Callable[[Progress], None],
         deployment: Deployment | None = None,
     ) -> None:
-        self._profile = profile
         self._scenario = scenario
         self._deployment = deployment or Deployment()
+        self._orders = Orders(scenario, self._deployment, record, speed, profile)
         self._run = placing.run_name(scenario, self._deployment) or run
         self._elsewhere = Elsewhere(self._deployment.elsewhere(scenario))
         self._record = record
@@ -125,7 +124,8 @@ class ProcessRun:
         scenario, run = self._scenario, self._run
         folder = places.create_run_folder(run)
         try:
-            plan, outside = self._access(), placing.outside(self._deployment)
+            plan = placing.access_plan(scenario, self._deployment, run)
+            outside = placing.outside(self._deployment)
             with open_router(scenario.network.endpoint, plan, folder, outside) as link:
                 link.declare_live(keys.live(run, access.LAUNCHER))
                 link.watch_live(keys.live_all(run), "live")
@@ -133,80 +133,14 @@ class ProcessRun:
                 for process in self._processes:
                     link.subscribe(keys.progress(run, process), "progress")
                     link.subscribe(keys.report(run, process), "report")
-                self._spawn(link, plan, folder)
+                links = {
+                    user: NetworkLink(run, link.endpoint, user, password)
+                    for user, password in plan.passwords.items()
+                }
+                spawn(self._orders, links, folder, self._children)
                 yield link
         finally:
             places.remove_run_folder(folder)
-
-    def _access(self) -> access.AccessPlan:
-        deployment, graph = self._deployment, self._scenario.topology
-        network = deployment.network
-        return access.plan(
-            self._run,
-            self._robots,
-            graph.hears,
-            graph.leader,
-            witnessed=[robot for robot in self._robots if not deployment.emulates(robot)],
-            guests=placing.guests(self._scenario, deployment),
-            certified=network is not None and network.tls is not None,
-        )
-
-    def _spawn(self, link: RouterLink, plan: access.AccessPlan, folder: Path) -> None:
-        scenario, run, deployment = self._scenario, self._run, self._deployment
-
-        def network(user: str) -> NetworkLink:
-            return NetworkLink(run, link.endpoint, user, plan.passwords[user])
-
-        ticks = schedule(scenario, self._speed)
-        emulated = tuple(r for r in self._robots if deployment.emulates(r))
-        recorder = RecorderBrief(
-            str(self._record),
-            self._robots,
-            emulated if scenario.bus.record else (),
-            scenario.bus.record,
-            to_toml(scenario),
-            ticks.period_ns,
-            ticks.start_deadline_s,
-            network("recorder"),
-        )
-        plant = plant_brief(
-            scenario,
-            network=network("plant"),
-            runtime_folder=str(folder),
-            speed=self._speed,
-            profile=self._profile,
-        )
-        plant = placing.robots_of_plant(plant, deployment)
-        here = deployment.runs_here
-        ours = [r for r in self._robots if deployment.is_ours(r) and here("plant")]
-        plant = replace(plant, listeners=tuple((r, FIRST_FD + n) for n, r in enumerate(ours)))
-        listeners = places.listen(folder, ours)
-        fds = [listeners[robot].fileno() for robot in ours]
-        pace = "gathered" if ticks.realtime else "paced"
-        try:
-            with Nursery(batch=not ticks.realtime) as nursery:
-                if here("plant"):
-                    self._children.append(Child(nursery, "plant", "plant", plant, fds))
-                for robot in self._robots:
-                    if not here(f"agent/{robot}"):
-                        continue
-                    socket = str(places.socket_path(folder, robot)) if robot in ours else ""
-                    bus = placing.agent_bus(deployment, robot, pace=pace, socket=socket)
-                    user = network(access.agent_user(robot))
-                    brief = agent_brief(
-                        scenario,
-                        robot,
-                        network=user,
-                        bus=bus,
-                        speed=self._speed,
-                        profile=self._profile,
-                    )
-                    self._children.append(Child(nursery, f"agent/{robot}", "agents", brief))
-                module = "fleetloop.recorder"
-                self._children.append(Child(nursery, "recorder", module, recorder))
-        finally:
-            for listener in listeners.values():
-                listener.close()
 
     def _await_ready(self, link: Link, stop: Stop) -> Failure | None:
         """Say the leader's speed until all tokens are there, then go until the plant ticks."""
@@ -223,9 +157,12 @@ class ProcessRun:
             if ready and "plant" in self._seen:
                 return None
             if (failure := self._cause()) is not None:
+                if failure.rank >= GAVE_UP and (absent := self._elsewhere.absent()):
+                    raise InfrastructureError(f"not there: {', '.join(absent)}; {failure.text}")
                 return failure
             if time.monotonic() > deadline:
-                absent = sorted(set(self._processes) - self._alive) or ["the plant's first tick"]
+                absent = self._elsewhere.absent() or sorted(set(self._processes) - self._alive)
+                absent = absent or ["the plant's first tick"]
                 raise InfrastructureError(
                     f"not ready within {self._scenario.clock.start_deadline_s:g} s:"
                     f" {', '.join(absent)}"

@@ -14,7 +14,9 @@ def robots_of_plant(brief: PlantBrief, deployment: Deployment) -> PlantBrief:
     """The plant's brief with the robots that it emulates, and the others as it sees them."""
     emulated = tuple(r for r in brief.robots if deployment.emulates(r.robot))
     attached = tuple(
-        (r.bus, deployment.bus_of(r.robot)) for r in emulated if not deployment.is_ours(r.robot)
+        (r.bus, deployment.plant_bus_of(r.robot))
+        for r in emulated
+        if not deployment.is_ours(r.robot)
     )
     witnessed = tuple((r.robot, r.pose) for r in brief.robots if r not in emulated)
     return replace(brief, robots=emulated, attached=attached, witnessed=witnessed)
@@ -55,6 +57,25 @@ def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
     if any(not deployment.emulates(robot) for robot in scenario.names):
         identities.append(access.LOCALISATION)
     return passwords(deployment.network, tuple(identities))
+
+
+def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.AccessPlan:
+    """Who may say and hear what, and everybody's credentials.
+
+    Raises:
+        ScenarioError: the deployment's credentials lack somebody.
+    """
+    graph, network = scenario.topology, deployment.network
+    return access.plan(
+        run,
+        scenario.names,
+        graph.hears,
+        graph.leader,
+        buses=scenario.buses,
+        witnessed=[robot for robot in scenario.names if not deployment.emulates(robot)],
+        guests=guests(scenario, deployment),
+        certified=network is not None and network.tls is not None,
+    )
 
 
 def network_link(scenario: Scenario, deployment: Deployment, role: str) -> NetworkLink:

@@ -5,6 +5,9 @@ bus may arm its drives and drive. It ends with a signal, after `--duration`, or 
 input if that is served: then each line asks, and is answered by a line of JSON.
 
     poses      bus time, and of each robot pose, speeds and the torques that act on its wheels
+
+With `--join` it is the plant of a run whose deployment has the role elsewhere, for example on the
+machine with the CAN adapters.
 """
 
 import json
@@ -24,18 +27,21 @@ from bridge.process import Stop, go_realtime, name_process, settled_memory
 from bridge.telemetry import PLANT_ROW, RowBuffer
 from configs.brief import NetworkLink, PlantBrief, Settings
 from configs.briefing import plant_brief
-from configs.deployment import Deployment, load_deployment
+from configs.deployment import PLANT, Deployment, load_deployment
 from configs.errors import ScenarioError
 from configs.loading import load
+from configs.scenario import Scenario
 from fleetloop import placing
 from fleetloop.signals import stop_on_signals
 from fleetloop.terminal import note, say
 from plant.__main__ import PLANT_PRIORITY, join
+from plant.__main__ import run as plant_of_a_run
 from plant.realtime import RealtimeLoop
 from plant.unit import Unit, unit_of
 
 FOREVER_TICKS = 1 << 53
 GO_AHEAD_NS = 1_000_000
+INTERRUPTED = 130
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +54,7 @@ class Options:
     overrides: tuple[str, ...] = ()
     as_json: bool = False
     serve_stdin: bool = False
+    join: bool = False
 
 
 class _Nowhere:
@@ -68,6 +75,8 @@ def run_plant(source: str, options: Options) -> int:
     deployment = Deployment()
     if options.deployment is not None:
         deployment = load_deployment(options.deployment, scenario)
+    if options.join:
+        return _join(scenario, deployment)
     brief = plant_brief(scenario, network=NetworkLink("alone", "", "", ""))
     brief = _alone(placing.robots_of_plant(brief, deployment), options)
     name_process(f"plant {scenario.name}")
@@ -75,7 +84,9 @@ def run_plant(source: str, options: Options) -> int:
         folder = places.create_run_folder(f"{scenario.name}-{os.getpid()}")
         try:
             attached = {bus for bus, _ in brief.attached}
-            ours = [robot.bus for robot in brief.robots if robot.bus not in attached]
+            ours = [
+                bus for bus in dict.fromkeys(r.bus for r in brief.robots) if bus not in attached
+            ]
             queue = brief.wire.txqueuelen if brief.wire else 0
             hub = Hub(places.listen(folder, ours), stop.wake_fd, queue=queue)
             end: DriveEnd = hub
@@ -87,6 +98,31 @@ def run_plant(source: str, options: Options) -> int:
         finally:
             places.remove_run_folder(folder)
     return 0
+
+
+def _join(scenario: Scenario, deployment: Deployment) -> int:
+    """Be the plant of a run whose launcher is elsewhere."""
+    network = placing.network_link(scenario, deployment, PLANT)
+    brief = placing.robots_of_plant(plant_brief(scenario, network=network), deployment)
+    attached = {bus for bus, _ in brief.attached}
+    ours = [bus for bus in dict.fromkeys(r.bus for r in brief.robots) if bus not in attached]
+    note(f"plant: waiting for run {network.run!r} at {network.endpoint}")
+    with stop_on_signals() as stop:
+        folder = places.create_run_folder(f"{network.run}-plant")
+        try:
+            listeners = places.listen(folder, ours)
+            brief = replace(
+                brief,
+                runtime_folder=str(folder),
+                listeners=tuple((bus, listener.detach()) for bus, listener in listeners.items()),
+                detached=True,
+            )
+            name_process("plant")
+            word = plant_of_a_run(brief, stop)
+        finally:
+            places.remove_run_folder(folder)
+    note(f"plant: {word}{f'; {stop.reason}' if stop.reason else ''}")
+    return INTERRUPTED if stop.reason.startswith("interrupted") else 0
 
 
 def _alone(brief: PlantBrief, options: Options) -> PlantBrief:

@@ -131,7 +131,7 @@ def _in_process(
             scenario.names,
             to_toml(scenario),
             period_ns,
-            buses=scenario.names,
+            buses=scenario.buses,
             formats=scenario.bus.record,
         ) as file,
         BackgroundWriter(file) as writer,

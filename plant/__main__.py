@@ -6,6 +6,7 @@ inherited file descriptors.
 
 import socket
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
@@ -33,6 +34,9 @@ from plant.witness import Witness
 
 PLANT_PRIORITY = 45
 """SCHED_FIFO, above the controllers'."""
+GO_SHARE = 1.25
+"""Multiple of the start deadline that the plant waits for the go: whoever misses a peer names it
+first."""
 EARLY = -1
 """Tick of the poses that only prove the link, before the run."""
 
@@ -176,7 +180,8 @@ def _serve_until_go(
     brief: PlantBrief, end: DriveEnd, link: Link, hellos: Hellos, stop: Stop
 ) -> int:
     """Say hello and serve the buses until the launcher says when tick 0 is."""
-    deadline = time.monotonic() + brief.schedule.start_deadline_s
+    limit_s = GO_SHARE * brief.schedule.start_deadline_s
+    deadline = time.monotonic() + limit_s
     while time.monotonic() < deadline and not stop.requested:
         hellos.say()
         end.serve(0.02)
@@ -186,9 +191,7 @@ def _serve_until_go(
                 return monotonic_of(go.epoch_ns)
     if stop.requested:
         return time.monotonic_ns()
-    raise InfrastructureError(
-        f"plant: not ready after {brief.schedule.start_deadline_s:g} s: no go from the launcher"
-    )
+    raise InfrastructureError(f"plant: not ready after {limit_s:g} s: no go from the launcher")
 
 
 def _record(
@@ -213,7 +216,7 @@ def _put_rows(publisher: Publisher, first: int, count: int, rows: bytes, final: 
 def _await_controllers(brief: PlantBrief, hub: Hub, hellos: Hellos, stop: Stop) -> None:
     """Say hello until every bus has its controller; bounded by the start deadline."""
     rounds = int(brief.schedule.start_deadline_s / 0.02)
-    buses = [robot.bus for robot in brief.robots]
+    buses = Counter(robot.bus for robot in brief.robots)
     for _ in range(rounds):
         hellos.say()
         missing = hub.await_paced(buses, 0.02)

@@ -1,6 +1,7 @@
 """Access control: generated from the graph, default deny, over real sessions."""
 
 import json
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -166,3 +167,40 @@ def test_a_liveliness_token_comes_and_goes_with_its_session(
     assert arrival is not None
     assert (keys.process_of(arrival.key), arrival.payload) == ("plant", b"0")
     assert router.receive(0.1) is None
+
+
+def test_guests_keep_their_passwords_and_show_certificates_if_they_must() -> None:
+    plan = access.plan(RUN, ROBOTS, HEARS, ("r1",), guests={"agent-r2": "agreed"}, certified=True)
+    assert plan.passwords["agent-r2"] == "agreed"
+    assert len(plan.passwords["agent-r1"]) >= 32
+    subjects = {s["id"]: s for s in json.loads(plan.access_control())["subjects"]}
+    assert subjects["agent-r2"]["cert_common_names"] == ["agent-r2"]
+    assert "cert_common_names" not in subjects["agent-r1"]
+
+
+def test_the_pose_of_a_robot_that_is_not_emulated_is_the_localisation_systems_alone() -> None:
+    plan = access.plan(RUN, ROBOTS, HEARS, ("r1",), witnessed=["r3"])
+    pose = keys.pose(RUN, "r3")
+    speakers = [user for user, rights in plan.rights.items() if pose in rights.puts]
+    assert speakers == [access.LOCALISATION]
+    assert pose in plan.rights[access.PLANT].hears
+    assert keys.pose(RUN, "r1") in plan.rights[access.PLANT].puts
+    assert access.LOCALISATION not in access.plan(RUN, ROBOTS, HEARS, ("r1",)).rights
+
+
+def test_a_token_that_is_withdrawn_or_whose_session_ends_is_noticed(
+    router: RouterLink, plan: access.AccessPlan
+) -> None:
+    token = keys.live(RUN, access.LAUNCHER)
+    gone = threading.Event()
+    with client(router, plan, "agent-r1") as watcher:
+        router.declare_live(token)
+        watcher.on_gone(token, gone.set)
+        assert not gone.wait(0.1)
+        router.withdraw_live(token)
+        assert gone.wait(5.0)
+        gone.clear()
+        router.declare_live(token)
+        assert not gone.wait(0.1)
+        router.close()
+        assert gone.wait(5.0)

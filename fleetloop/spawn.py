@@ -1,0 +1,112 @@
+"""Bring the roles of a run on this machine to life: sockets first, then a process each.
+
+Each is told, by its brief, exactly what it may know; its buses' listening sockets go to the plant.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from bridge import access
+from bridge.can_bus import places
+from configs.brief import AgentBrief, NetworkLink, PlantBrief, RecorderBrief
+from configs.briefing import agent_brief, plant_brief, schedule
+from configs.deployment import PLANT, RECORDER, Deployment, agent_role
+from configs.loading import to_toml
+from configs.scenario import Scenario
+from fleetloop import placing
+from fleetloop.children import Child
+from fleetloop.nursery import FIRST_FD, Nursery
+
+Links = Mapping[str, NetworkLink]
+"""How each identity reaches the router."""
+
+
+@dataclass(frozen=True, slots=True)
+class Orders:
+    """What is to be run, and how."""
+
+    scenario: Scenario
+    deployment: Deployment
+    record: Path
+    speed: float
+    profile: bool
+
+
+def spawn(orders: Orders, links: Links, folder: Path, children: list[Child]) -> None:
+    """Start the processes, the recorder last, and add them to `children` as they are born.
+
+    Raises:
+        InfrastructureError: a socket or a process can't be had.
+    """
+    scenario, deployment = orders.scenario, orders.deployment
+    realtime = schedule(scenario).realtime
+    here = deployment.runs_here
+    robots = [r for r in scenario.names if deployment.is_ours(r) and here(PLANT)]
+    ours = list(dict.fromkeys(scenario.bus_of(robot) for robot in robots))
+    listeners = places.listen(folder, ours)
+    try:
+        with Nursery(batch=not realtime) as nursery:
+            if here(PLANT):
+                plant = replace(
+                    _plant(orders, links, folder),
+                    listeners=tuple((bus, FIRST_FD + n) for n, bus in enumerate(ours)),
+                )
+                fds = [listeners[bus].fileno() for bus in ours]
+                children.append(Child(nursery, PLANT, "plant", plant, fds))
+            for robot in scenario.names:
+                if here(role := agent_role(robot)):
+                    bus = scenario.bus_of(robot)
+                    socket = str(places.socket_path(folder, bus)) if robot in robots else ""
+                    agent = _agent(orders, links, robot, socket, realtime=realtime)
+                    children.append(Child(nursery, role, "agents", agent))
+            recorder = _recorder(orders, links)
+            children.append(Child(nursery, RECORDER, "fleetloop.recorder", recorder))
+    finally:
+        for listener in listeners.values():
+            listener.close()
+
+
+def _plant(orders: Orders, links: Links, folder: Path) -> PlantBrief:
+    brief = plant_brief(
+        orders.scenario,
+        network=links[access.PLANT],
+        runtime_folder=str(folder),
+        speed=orders.speed,
+        profile=orders.profile,
+    )
+    return placing.robots_of_plant(brief, orders.deployment)
+
+
+def _agent(orders: Orders, links: Links, robot: str, socket: str, *, realtime: bool) -> AgentBrief:
+    pace = "gathered" if realtime else "paced"
+    return agent_brief(
+        orders.scenario,
+        robot,
+        network=links[access.agent_user(robot)],
+        bus=placing.agent_bus(orders.deployment, robot, pace=pace, socket=socket),
+        speed=orders.speed,
+        profile=orders.profile,
+    )
+
+
+def _recorder(orders: Orders, links: Links) -> RecorderBrief:
+    ticks = schedule(orders.scenario, orders.speed)
+    return RecorderBrief(
+        str(orders.record),
+        orders.scenario.names,
+        _recorded(orders),
+        orders.scenario.bus.record,
+        to_toml(orders.scenario),
+        ticks.period_ns,
+        ticks.start_deadline_s,
+        links[access.RECORDER],
+    )
+
+
+def _recorded(orders: Orders) -> tuple[str, ...]:
+    """The buses whose traffic the plant tells the recorder."""
+    scenario, emulates = orders.scenario, orders.deployment.emulates
+    if not scenario.bus.record:
+        return ()
+    return tuple(dict.fromkeys(scenario.bus_of(r) for r in scenario.names if emulates(r)))

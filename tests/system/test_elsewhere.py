@@ -1,0 +1,263 @@
+"""Controllers that somebody else starts: `fleetloop agent` against a run with roles excluded."""
+
+import re
+import secrets
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+from system.processes import Run
+
+from fleetloop.record.reader import Record
+
+pytestmark = pytest.mark.system
+SCENARIO = ("two_robots_100hz", "--set", "expect=[]")
+
+
+class Agent:
+    """A `fleetloop agent` that is going on."""
+
+    def __init__(self, robot: str, deployment: Path, *args: str) -> None:
+        self.process = subprocess.Popen(
+            [
+                *(sys.executable, "-m", "fleetloop", "agent", SCENARIO[0], robot, *SCENARIO[1:]),
+                *("--deployment", str(deployment), *args),
+            ],
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def end(self, within_s: float = 20.0) -> tuple[int, str]:
+        """(exit status, what it said)."""
+        _, said = self.process.communicate(timeout=within_s)
+        return self.process.returncode, said
+
+    def kill(self) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.communicate()
+
+
+@pytest.fixture
+def agents() -> Iterator[list[Agent]]:
+    started: list[Agent] = []
+    yield started
+    for agent in started:
+        agent.kill()
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def deployment(folder: Path, scheme: str = "tcp", extra: str = "", name: str = "where") -> Path:
+    """r2's controller is elsewhere."""
+    file = folder / f"{name}.toml"
+    file.write_text(
+        'roles = ["plant", "recorder", "agent/r1"]\n[network]\n'
+        f'endpoint = "{scheme}/localhost:{free_port()}"\n{extra}'
+    )
+    return file
+
+
+def with_password(folder: Path) -> Path:
+    users = folder / "users"
+    users.write_text(f"agent-r2:{secrets.token_hex(8)}\n")
+    users.chmod(0o600)
+    return deployment(folder, extra='users = "users"\n')
+
+
+def start(folder: Path, where: Path, *args: str) -> Run:
+    return Run(folder / "run", *SCENARIO, "--deployment", str(where), *args)
+
+
+def test_a_controller_elsewhere_drives_its_robot_to_the_end_of_the_run(tmp_path, agents) -> None:
+    where = with_password(tmp_path)
+    agents.append(Agent("r2", where, "--set", "duration_s=3.0"))
+    run = start(tmp_path, where, "--duration", "3")
+    try:
+        status, out = run.end()
+        assert status == 0, out
+        status, said = agents[0].end()
+        assert status == 0
+        assert "end of the run" in said
+    finally:
+        run.kill()
+    record = Record.open(tmp_path / "run" / "record.mcap")
+    for rows in (*record.plant.values(), *record.controller.values()):
+        assert rows["tick"].tolist() == list(range(300))
+    assert set(run.summary()["realtime"]["robots"]) == {"r1", "r2"}
+
+
+def multicast_goes_nowhere() -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+        try:
+            probe.sendto(b"", ("239.74.163.9", 43118))
+        except OSError:
+            return True
+    return False
+
+
+@pytest.mark.skipif(multicast_goes_nowhere(), reason="no route for multicast here")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_controller_elsewhere_stops_when_the_launcher_does(
+    number: signal.Signals, tmp_path, agents
+) -> None:
+    where = with_password(tmp_path)
+    # On a bus that outlives the launcher, as a real one does.
+    multicast = 'interface = "udp_multicast", channel = "239.74.163.9", port = 43117'
+    bus = f"[robot.r2]\nemulated = true\nbus = {{ {multicast}, hop_limit = 0 }}\n"
+    where.write_text(where.read_text() + bus)
+    agents.append(Agent("r2", where))
+    run = start(tmp_path, where)
+    try:
+        run.await_bus_time(1.5)
+        run.send(number)
+        status, out = run.end(within_s=10.0)
+        assert status == (130 if number == signal.SIGINT else -9), out
+        status, said = agents[0].end(within_s=5.0)
+    finally:
+        run.kill()
+    assert status == 3
+    assert "agent/r2: the launcher is gone, or the network to it: drives disarmed" in said
+
+
+def test_a_controller_elsewhere_that_is_killed_ends_the_run_with_its_name(tmp_path, agents) -> None:
+    where = with_password(tmp_path)
+    agents.append(Agent("r2", where))
+    run = start(tmp_path, where)
+    try:
+        run.await_bus_time(1.5)
+        agents[0].process.kill()
+        status, out = run.end(within_s=10.0)
+    finally:
+        run.kill()
+    assert status == 3
+    assert "agent/r2: lost; it, its machine or the network to it is gone" in out
+    assert run.survivors() == []
+
+
+def test_a_controller_elsewhere_that_is_interrupted_says_so_and_leaves_its_drives_idle(
+    tmp_path, agents
+) -> None:
+    where = with_password(tmp_path)
+    agents.append(Agent("r2", where))
+    run = start(tmp_path, where)
+    try:
+        run.await_bus_time(1.5)
+        agents[0].process.send_signal(signal.SIGTERM)
+        status, said = agents[0].end(within_s=10.0)
+        run.send(signal.SIGINT)
+        run.end(within_s=10.0)
+    finally:
+        run.kill()
+    assert status == 130
+    assert "interrupted by SIGTERM" in said
+    torque = Record.open(tmp_path / "run" / "record.mcap").plant["r2"]["motor_right_Nm"]
+    assert torque[-1] == 0.0
+
+
+def test_a_wrong_password_is_refused_within_the_start_deadline(tmp_path, agents) -> None:
+    where = with_password(tmp_path)
+    run = start(tmp_path, where, "--set", "clock.start_deadline_s=6.0")
+    try:
+        other = tmp_path / "other"
+        other.mkdir()
+        (other / "users").write_text("agent-r2:guess\n")
+        (other / "users").chmod(0o600)
+        (other / "where.toml").write_text(where.read_text())
+        deadline = ("--set", "clock.start_deadline_s=3.0")
+        agents.append(Agent("r2", other / "where.toml", *deadline))
+        status, said = agents[0].end()
+        assert status == 3
+        assert "no session with the router at tcp/localhost:" in said
+        status, out = run.end()
+        assert status == 3
+        assert re.search(r"fleetloop: not (there|ready within 6 s): agent/r2[;\n]", out), out
+    finally:
+        run.kill()
+    assert psutil.Process().children() == []
+
+
+def test_the_plant_may_be_elsewhere_too(tmp_path) -> None:
+    (tmp_path / "users").write_text("plant:secret\n")
+    (tmp_path / "users").chmod(0o600)
+    where = tmp_path / "where.toml"
+    where.write_text(
+        'roles = ["recorder", "agent/r1", "agent/r2"]\n'
+        f'network = {{ endpoint = "tcp/127.0.0.1:{free_port()}", users = "users" }}\n'
+    )
+    common = (*SCENARIO, "--set", "duration_s=2.0", "--deployment", str(where))
+    run = Run(tmp_path / "run", *common)
+    with subprocess.Popen(
+        [sys.executable, "-m", "fleetloop", "plant", *common, "--join"],
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as plant:
+        try:
+            status, out = run.end()
+            _, said = plant.communicate(timeout=10.0)
+        finally:
+            run.kill()
+            plant.kill()
+    assert status == 0, out
+    assert plant.returncode == 0, said
+    assert "ended after tick 200" in said
+    assert run.summary()["ticks"] == 200
+
+
+def certificates(folder: Path, names: tuple[str, ...]) -> None:
+    """An authority and a certificate for each name, by openssl."""
+
+    def openssl(*args: str) -> None:
+        subprocess.run(["openssl", *args], check=True, capture_output=True, cwd=folder, timeout=60)
+
+    curve = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")
+    ca = ("-keyout", "ca.key", "-out", "ca.pem", "-subj", "/CN=fleet")
+    openssl("req", "-x509", *curve, *ca, "-days", "2")
+    for name in names:
+        request = ("-keyout", f"{name}.key", "-out", f"{name}.csr", "-subj", f"/CN={name}")
+        openssl("req", *curve, *request)
+        (folder / "ext").write_text("subjectAltName=DNS:localhost\n")
+        sign = ("-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial", "-days", "2")
+        openssl(
+            *("x509", "-req", "-in", f"{name}.csr", "-out", f"{name}.pem", "-extfile", "ext"), *sign
+        )
+
+
+def with_certificate(folder: Path, machine: str, base: Path | None = None) -> Path:
+    tls = (
+        f'tls = {{ ca = "ca.pem", certificate = "{machine}.pem", private_key = "{machine}.key" }}\n'
+    )
+    if base is None:
+        return deployment(folder, "tls", tls, machine)
+    file = folder / f"{machine}.toml"
+    file.write_text(base.read_text().replace("router.", f"{machine}."))
+    return file
+
+
+def test_a_certificate_is_an_identity_and_another_one_is_not(tmp_path, agents) -> None:
+    certificates(tmp_path, ("router", "agent-r2", "agent-r1"))
+    where = with_certificate(tmp_path, "router")
+    impostor = with_certificate(tmp_path, "agent-r1", where)
+    deadline = ("--set", "clock.start_deadline_s=4.0")
+    run = start(tmp_path, where, "--duration", "2")
+    try:
+        # It may connect, but not speak as r2.
+        agents.append(Agent("r2", impostor, *deadline))
+        assert agents[0].end()[0] == 3
+        genuine = with_certificate(tmp_path, "agent-r2", where)
+        agents.append(Agent("r2", genuine, "--set", "duration_s=2.0"))
+        status, out = run.end()
+        assert status == 0, out
+        assert agents[1].end()[0] == 0
+    finally:
+        run.kill()
