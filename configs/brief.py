@@ -233,11 +233,11 @@ class DriveLink:
     right_node: int
     left_node: int
     encoder_period_ns: int
-    heartbeat_period_ns: int
-    encoder_age_limit_ns: int  # older: the drive has dropped out
-    heartbeat_age_limit_ns: int  # older: the drive has dropped out
     velocity_limit_rev_s: float  # of the motor shaft
     current_limit_A: float
+    heartbeat_period_ns: int = 100_000_000
+    encoder_age_limit_ns: int = 50_000_000  # older: the drive has dropped out
+    heartbeat_age_limit_ns: int = 500_000_000  # older: the drive has dropped out
     mounting: Mounting = Mounting()
 
 

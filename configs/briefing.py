@@ -124,11 +124,11 @@ def _drive_link(scenario: Scenario, robot: sections.Robot, drive: DriveModel) ->
         right_node=scenario.drive.right_node,
         left_node=scenario.drive.left_node,
         encoder_period_ns=drive.encoder_period_ns,
+        velocity_limit_rev_s=drive.velocity_limit_rev_s,
+        current_limit_A=drive.current_limit_A,
         heartbeat_period_ns=drive.heartbeat_period_ns,
         encoder_age_limit_ns=round(encoder_age_s * 1e9),
         heartbeat_age_limit_ns=round(host.heartbeat_age_limit_s * 1e9),
-        velocity_limit_rev_s=drive.velocity_limit_rev_s,
-        current_limit_A=drive.current_limit_A,
         mounting=Mounting(**scenario.mounting_of(robot).model_dump()),
     )
 
