@@ -21,7 +21,8 @@ class Problem(NamedTuple):
 
 def cross_problems(scenario: Scenario) -> list[Problem]:
     """All problems that no section can see alone."""
-    problems = [*_names(scenario), *_periods(scenario), *_drives(scenario), *_expects(scenario)]
+    problems = [*_names(scenario), *_periods(scenario), *_drives(scenario)]
+    problems += [*_host(scenario), *_expects(scenario)]
     edges = list(_edges(scenario))
     if not problems and not edges:
         edges = list(_graph(scenario))
@@ -126,6 +127,30 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
             f"must be below half of encoder.pll_rate_hz = {encoder.pll_rate_hz:g}, as drives want"
             " it: twice the bandwidth times the loop period is a gain below 1",
         )
+
+
+def _host(scenario: Scenario) -> Iterator[Problem]:
+    host, clock, heartbeat_s = scenario.host, scenario.clock, scenario.drive.heartbeat_period_s
+    delay_s = scenario.localisation.delay_s or clock.control_period_s
+    least = {
+        "heartbeat_age_limit_s": (2 * heartbeat_s, "two of drive.heartbeat_period_s"),
+        "encoder_age_limit_s": (2 * clock.control_period_s, "two of clock.control_period_s"),
+        "pose_age_limit_s": (
+            delay_s + 2 * clock.localisation_period_s,
+            "the delay and two of clock.localisation_period_s",
+        ),
+    }
+    if host.rearm:
+        least["rearm_after_s"] = 2 * heartbeat_s, "two of drive.heartbeat_period_s"
+        least["rearm_limit_s"] = 3 * heartbeat_s, "three of drive.heartbeat_period_s"
+        if scenario.localisation.source == "odometry":
+            right = "odometry alone doesn't know where a robot is after a fault: false, or fixes"
+            yield Problem("host.rearm", True, right)
+    for key, (limit, what) in least.items():
+        value = getattr(host, key)
+        if value is not None and value < limit:
+            right = f"{what}, {limit:g} s, or more, or a healthy robot stops or never arms"
+            yield Problem(f"host.{key}", value, right)
 
 
 def _expects(scenario: Scenario) -> Iterator[Problem]:

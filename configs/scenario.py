@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from configs.host import Host
 from configs.powertrain import Encoder, Motor, Supply
 from configs.sections import (
     Body,
@@ -23,6 +24,7 @@ from configs.sections import (
     GraphSection,
     Leader,
     Localisation,
+    Mounting,
     Name,
     Network,
     PathShape,
@@ -56,6 +58,8 @@ class Scenario(Section):
     motor: Motor = Motor()
     encoder: Encoder = Encoder()
     supply: Supply = Supply()
+    mounting: Mounting = Mounting()
+    host: Host = Host()
     disturbance: Disturbance = Disturbance()
     network: Network = Network()
     robot_types: dict[Name, Body] = Field(default_factory=dict)
@@ -104,6 +108,11 @@ class Scenario(Section):
         """The law and gains of a robot: the fleet's, with what the robot says differently."""
         changes = robot.control.model_dump(exclude_none=True)
         return Control(**{**self.control.model_dump(), **changes})
+
+    def mounting_of(self, robot: Robot) -> Mounting:
+        """How a robot's drives are mounted: the fleet's, with what the robot says differently."""
+        changes = robot.mounting.model_dump(exclude_none=True)
+        return Mounting(**{**self.mounting.model_dump(), **changes})
 
     def _edges(self) -> Sequence[tuple[str, str]]:
         graph = self.graph

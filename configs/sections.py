@@ -140,6 +140,17 @@ class Body(Section):
     )
 
 
+class Mounting(Section):
+    """How the drives sit on the wheels: positive torque at a shaft turns its wheel `sign` forward.
+
+    The drives' own values (limits, encoder) are the motor shaft's; all others are the wheels'.
+    """
+
+    right_sign: Literal[1, -1] = 1
+    left_sign: Literal[1, -1] = Field(1, description="-1: a drive mounted as a mirror image")
+    gear_ratio: Positive = Field(1.0, description="motor revolutions per wheel revolution")
+
+
 class Disturbance(Section):
     """Δ(t) = amplitude [sin(rate t + i), cos(rate t + i)] on the wheels of robot number i."""
 
@@ -207,9 +218,13 @@ if TYPE_CHECKING:
 
     class ControlChanges(Section):
         """Keys of `Control`, none required."""
+
+    class MountingChanges(Section):
+        """Keys of `Mounting`, none required."""
 else:
     BodyChanges = _changes("BodyChanges", Body)
     ControlChanges = _changes("ControlChanges", Control)
+    MountingChanges = _changes("MountingChanges", Mounting)
 
 
 class Robot(Section):
@@ -226,6 +241,7 @@ class Robot(Section):
     control: ControlChanges = Field(
         ControlChanges(), description="gains that differ from [control]"
     )
+    mounting: MountingChanges = Field(MountingChanges(), description="what differs from [mounting]")
     disturbance: Disturbance | None = None
     bus: Name | None = Field(None, description="robots may share one; of its own if not given")
     right_node: Node | None = Field(
