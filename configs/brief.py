@@ -366,6 +366,16 @@ class DriveModel:
     watchdog_ns: int  # 0: off
     zero_torque_on_disarm: bool
     serial_number: int  # of the right drive; the left one has the next number
+    velocity_integrator_gain_N_m_rev: float = 1.0 / 3.0
+    position_gain_1_s: float = 20.0
+    iq_period_ns: int = 0  # these as `torques_period_ns`
+    temperature_period_ns: int = 0
+    bus_period_ns: int = 0
+    error_period_ns: int = 0
+    powers_period_ns: int = 0
+    calibrated: bool = True
+    estop_blocks_arming: bool = True  # until Clear_Errors
+    firmware: tuple[int, int, int] = (0, 6, 10)
     command_latency_ns: tuple[int, int] = (0, 0)  # from a frame's end until firmware acts on it
 
 

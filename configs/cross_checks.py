@@ -110,6 +110,9 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
                 owner != f"{name}'s {side} drive"
             ):
                 yield Problem(key, node, f"on bus {bus} it is {owner} already; choose another")
+    for key, value in drive.model_dump().items():
+        if key.endswith("_period_s") and abs(value * 1e3 - round(value * 1e3)) > 1e-6:
+            yield Problem(f"drive.{key}", value, "a whole number of milliseconds, as drives count")
     least_s, most_s = drive.command_latency_s
     if least_s > most_s:
         yield Problem("drive.command_latency_s", [least_s, most_s], "least before most")

@@ -318,18 +318,30 @@ class Drive(Section):
     right_node: Node = 0
     left_node: Node = 1
     heartbeat_period_s: Positive = 0.1
-    torques_period_s: NotNegative = Field(0.0, description="0: only on request")
+    torques_period_s: NotNegative = Field(0.0, description="0: only on request; so the next ones")
+    iq_period_s: NotNegative = 0.0
+    temperature_period_s: NotNegative = 0.0
+    bus_period_s: NotNegative = 0.0
+    error_period_s: NotNegative = 0.0
+    powers_period_s: NotNegative = 0.0
     watchdog_s: NotNegative = Field(0.1, description="0: off, as drives are delivered")
     command_latency_s: Annotated[tuple[NotNegative, NotNegative], Field(strict=False)] = Field(
         (0.0001, 0.0011),
         description="least and most from the end of a frame until firmware acts on it; preset"
         " realistic on buses with bit timing",
     )
+    calibrated: bool = Field(True, description="False: it has to be calibrated before it arms")
+    estop_blocks_arming: bool = Field(True, description="until Clear_Errors")
+    firmware: Annotated[tuple[int, int, int], Field(strict=False)] = Field(
+        (0, 6, 10), description="from 0.6.11 on, SDO writes are answered"
+    )
     zero_torque_on_disarm: bool = Field(False, description="False: as in the field")
     torque_constant_N_m_A: Positive = 0.05
     current_limit_A: Positive = 10.0
     velocity_limit_rev_s: Positive = 10.0
     velocity_gain_N_m_s_rev: Positive = 1.0 / 6.0
+    velocity_integrator_gain_N_m_rev: NotNegative = 1.0 / 3.0
+    position_gain_1_s: NotNegative = 20.0
     overspeed_ratio: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.2
 
 

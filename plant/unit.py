@@ -13,7 +13,8 @@ Drives, motors and encoders are at the motor shaft, the body and what is recorde
 
 from collections.abc import Sequence
 
-from bridge.drives import DRIVES, DriveNode, Feeling
+from bridge.drives import DRIVES, DriveNode
+from bridge.drives.feeling import Feeling
 from bridge.frame import Frame
 from configs.brief import PowertrainModel, RobotBrief
 from plant.encoder import PER_RADIAN

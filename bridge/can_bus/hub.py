@@ -415,7 +415,8 @@ class Hub:
             self._keep(client, data)
             self._epoll.modify(client.sock.fileno(), _READ | _WRITE)
         except OSError:
-            self._drop(client)
+            # It has gone; what it said before is still to be read, and then its end.
+            client.bus.counters.dropped += 1
 
     def _keep(self, client: _Client, data: bytes) -> None:
         if len(client.backlog) < BACKLOG:

@@ -7,21 +7,11 @@ and the emulated drive of one wheel. Both ends are pure: frames in, frames out, 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
+from bridge.drives.feeling import Feeling
 from bridge.drives.odrive.client import Motion, OdriveClient
 from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import Frame
 from configs.brief import DriveLink, DriveModel
-
-
-class Feeling(NamedTuple):
-    """What a drive measures of its motor and of the supply."""
-
-    torque_N_m: float  # the motor's, estimated
-    current_A: float  # q axis
-    fet_C: float
-    motor_C: float  # NaN: no thermistor
-    bus_V: float
-    bus_A: float
 
 
 class DriveClient(Protocol):
@@ -91,10 +81,13 @@ class DriveNode(Protocol):
     def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Take one frame from the bus; return the replies."""
 
-    input_torque: float
-    """The torque that the set-point said [N·m], before limits."""
-    next_due_ns: int
-    """The earliest bus time at which `due` has something to do."""
+    @property
+    def input_torque(self) -> float:
+        """The torque that the set-point said [N·m], before limits."""
+
+    @property
+    def next_due_ns(self) -> int:
+        """The earliest bus time at which `due` has something to do; after its last call."""
 
     def feel(self, feeling: Feeling) -> None:
         """Take what the drive measures."""

@@ -1,0 +1,14 @@
+"""What a drive measures of its motor and of its supply, whatever its protocol."""
+
+from typing import NamedTuple
+
+
+class Feeling(NamedTuple):
+    """One reading."""
+
+    torque_N_m: float  # the motor's, estimated
+    current_A: float  # q axis
+    fet_C: float
+    motor_C: float  # NaN: no thermistor
+    bus_V: float
+    bus_A: float
