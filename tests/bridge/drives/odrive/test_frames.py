@@ -103,8 +103,18 @@ def test_every_cyclic_and_every_requested_frame_is_one_of_the_dbc(dbc) -> None:
 
 def test_every_frame_that_the_controller_sends_is_one_of_the_dbc(dbc) -> None:
     client = OdriveClient(LINK)
-    sent = [*client.arm(0), *client.arm(1), *client.arm(2), *client.torque(0.1, 0.2)]
-    sent += [*client.disarm(), *client.estop()]
+    drives = [OdriveNode(MODEL, node, node) for node in (0, 1)]
+    sent = []
+    for now_ns in range(0, 400_000_000, 1_000_000):
+        for frame in (frame for drive in drives for frame in drive.due(now_ns)):
+            client.hear(*frame, now_ns)
+        said = client.arm(now_ns)
+        for frame in said:
+            for drive in drives:
+                drive.hear(frame, now_ns)
+        sent += said
+    assert client.armed
+    sent += [*client.torque(0.1, 0.2), *client.disarm(), *client.estop()]
     names = [decoded(dbc, frame)[0] for frame in sent if frame.data]
     for command in ("Set_Limits", "Set_Controller_Mode", "Set_Axis_State", "Set_Input_Torque"):
         assert f"Axis0_{command}" in names
