@@ -197,7 +197,7 @@ def test_a_run_survives_an_interface_that_goes_down_and_up_and_arms_again(
             assert process.launcher.is_running()
         ip_link("vcan0", "up")
         with can.Bus(interface="socketcan", channel="vcan0") as bus:
-            after = heard(bus, 300, within_s=60.0)
+            after = heard(bus, 300, within_s=20.0)
         status, out = process.end(within_s=60.0)
         assert status == 0, out
         summary = process.summary()
