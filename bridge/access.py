@@ -6,10 +6,11 @@ each process is bound to its identity by a random password that it alone is give
     agent-<r>   puts   its own path, telemetry, progress, report; its own token
                 hears  path of exactly its in-neighbours, its own pose, leader/speed iff h_i = 1,
                        @clock/go
-    plant       puts   pose and truth of all robots, progress, report; its token
+    plant       puts   pose and truth of all robots, traffic of all buses, progress, report; its
+                       token
                 hears  @clock/go
     recorder    puts   progress, report; its token
-                hears  truth and telemetry of all robots
+                hears  truth and telemetry of all robots, traffic of all buses
     localisation       only with robots that aren't emulated:
                 puts   their poses
                 hears  @clock/go
@@ -124,6 +125,7 @@ def plan(
             watches=launcher,
         )
     truths = [keys.truth(run, robot) for robot in robots]
+    truths += [keys.traffic(run, robot) for robot in robots]
     poses = [keys.pose(run, robot) for robot in robots if robot not in witnessed]
     witnesses = [keys.pose(run, robot) for robot in robots if robot in witnessed]
     rights[PLANT] = Rights(

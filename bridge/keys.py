@@ -4,6 +4,7 @@
     fleetloop/<run>/robot/<name>/pose        from the localisation system to the robot
     fleetloop/<run>/robot/<name>/truth       the plant's rows, to the recorder
     fleetloop/<run>/robot/<name>/telemetry   the controller's rows, to the recorder
+    fleetloop/<run>/can/<bus>/traffic        what crosses a bus, to the recorder
     fleetloop/<run>/leader/speed             v_r; heard by the robots with h_i = 1
     fleetloop/<run>/@live/<process>          liveliness token: "ready"
     fleetloop/<run>/@clock/go                from the launcher to plant and controllers
@@ -34,6 +35,11 @@ def pose(run: str, robot: str) -> str:
 def truth(run: str, robot: str) -> str:
     """Where the plant says what really happened to a robot."""
     return f"{_run(run)}/robot/{_chunk(robot)}/truth"
+
+
+def traffic(run: str, bus: str) -> str:
+    """Where the plant says what crosses a bus."""
+    return f"{_run(run)}/can/{_chunk(bus)}/traffic"
 
 
 def telemetry(run: str, robot: str) -> str:

@@ -10,6 +10,8 @@ import struct
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from bridge.frame import Frame
+
 
 class Signal(NamedTuple):
     """One recorded signal."""
@@ -123,4 +125,49 @@ class RowBuffer:
         rows = bytes(memoryview(self._block)[: self._count * self._size])
         self._hand_on(self._first_tick, self._count, rows, final)
         self._first_tick += self._count
+        self._count = 0
+
+
+FRAME_ROW = struct.Struct("<qIBB2x8s")
+"""A frame that crossed a bus: end in bus time [ns], SocketCAN's identifier, length, flags, data."""
+FROM_DRIVE = 1
+"""Flag of a frame that a drive sent."""
+BLOCK_FRAMES = 1024
+
+Tap = Callable[[int, Sequence[Frame], int], None]
+"""Told what crosses a bus: end in bus time [ns], frames, flags."""
+
+
+def no_tap(end_ns: int, frames: Sequence[Frame], flags: int) -> None:
+    """Nobody listens."""
+
+
+class FrameBuffer:
+    """Gathers the frames of one bus and hands them on as blocks: (first, count, frames, final)."""
+
+    __slots__ = ("_block", "_count", "_first", "_hand_on")
+
+    def __init__(self, hand_on: Callable[[int, int, bytes, bool], None]) -> None:
+        self._hand_on = hand_on
+        self._block = bytearray(BLOCK_FRAMES * FRAME_ROW.size)
+        self._first = 0
+        self._count = 0
+
+    def add(self, end_ns: int, frames: Sequence[Frame], flags: int) -> None:
+        """Add frames that ended at one bus time."""
+        for can_id, data in frames:
+            at = self._count * FRAME_ROW.size
+            FRAME_ROW.pack_into(self._block, at, end_ns, can_id, len(data), flags, data)
+            self._count += 1
+            if self._count == BLOCK_FRAMES:
+                self._flush(final=False)
+
+    def finish(self) -> None:
+        """Hand on what is left and say that nothing follows."""
+        self._flush(final=True)
+
+    def _flush(self, *, final: bool) -> None:
+        frames = bytes(memoryview(self._block)[: self._count * FRAME_ROW.size])
+        self._hand_on(self._first, self._count, frames, final)
+        self._first += self._count
         self._count = 0

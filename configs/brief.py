@@ -330,8 +330,8 @@ class DriveModel:
     torques_period_ns: int  # 0: only on request
     watchdog_ns: int  # 0: off
     zero_torque_on_disarm: bool
-    command_latency_ns: tuple[int, int]  # from the end of a frame until firmware acts on it
     serial_number: int  # of the right drive; the left one has the next number
+    command_latency_ns: tuple[int, int] = (0, 0)  # from a frame's end until firmware acts on it
 
 
 @dataclass(frozen=True, slots=True)
@@ -426,6 +426,7 @@ class PlantBrief:
     speed: float  # real-time factor that the run is held to; 0: as fast as possible
     seed: int
     wire: WireModel | None  # of every bus; None: ideal, frames take no time
+    traffic: bool  # tell the recorder what crosses the buses
     runtime_folder: str  # holds the buses' sockets; removed when the run ends
     network: NetworkLink
     listeners: tuple[tuple[str, int], ...] = ()  # bus, inherited file descriptor of its socket
@@ -450,6 +451,8 @@ class RecorderBrief:
 
     path: str  # of the record
     robots: tuple[str, ...]
+    buses: tuple[str, ...]  # whose traffic is recorded
+    bus_formats: tuple[str, ...]  # "blf", "log"
     scenario_toml: str
     period_ns: int
     start_deadline_s: float

@@ -128,6 +128,7 @@ def plant_brief(
         speed=speed,
         seed=scenario.seed,
         wire=wire_model(scenario),
+        traffic=bool(scenario.bus.record),
         runtime_folder=runtime_folder,
         network=network,
     )

@@ -276,6 +276,9 @@ class Bus(Section):
     drive_restart_s: NotNegative | None = Field(
         None, description="the same of a drive; as in the field, never if not given"
     )
+    record: Annotated[tuple[Literal["blf", "log"], ...], Field(strict=False)] = Field(
+        ("blf",), description="recordings of every bus in the run's folder: Vector BLF, candump log"
+    )
     load_ceiling: Annotated[float, Field(gt=0, le=1)] = Field(
         0.7, description="worst-case load above which a bus on a wire is refused"
     )

@@ -65,8 +65,8 @@ def print_comparison(a: Path, b: Path, *, as_json: bool) -> int:
 
 def _first(robot: str, source: str, a: np.ndarray, b: np.ndarray) -> Difference | None:
     both = min(len(a), len(b))
-    bits_a = np.ascontiguousarray(a[:both]).view("<u8").reshape(both, len(a.dtype))
-    bits_b = np.ascontiguousarray(b[:both]).view("<u8").reshape(both, len(b.dtype))
+    bits_a = np.ascontiguousarray(a[:both]).view("<u8").reshape(both, len(a.dtype.names or ()))
+    bits_b = np.ascontiguousarray(b[:both]).view("<u8").reshape(both, len(b.dtype.names or ()))
     rows, columns = np.nonzero(bits_a != bits_b)
     if len(rows):
         row = int(rows[0])

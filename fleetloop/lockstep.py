@@ -15,7 +15,7 @@ from bridge.can_bus.traffic import Said
 from bridge.frame import Frame
 from bridge.messages import LeaderSpeed, PathState, PoseFix, Progress
 from bridge.process import Stop, settled_memory
-from bridge.telemetry import AGENT_ROW, PLANT_ROW, RowBuffer
+from bridge.telemetry import AGENT_ROW, PLANT_ROW, FrameBuffer, RowBuffer
 from configs.brief import AgentBrief, LeaderBrief, PlantBrief
 from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.writer import Source
@@ -156,7 +156,10 @@ class InProcessRun:
             return partial(self._begin, [(unit, *ends[unit]) for unit in group])
 
         minds = {agent.brief.robot: _Mind.of(agent) for agent in self._agents}
-        buses = emulations(plant, self._units, begin)
+        names = dict.fromkeys(unit.brief.bus for unit in self._units) if plant.traffic else {}
+        self._logs = {bus: FrameBuffer(partial(_write_traffic, writer, bus)) for bus in names}
+        taps = {bus: log.add for bus, log in self._logs.items()}
+        buses = emulations(plant, self._units, begin, taps)
         self._lanes = [_lane(name, bus, minds) for name, bus in buses.items()]
         for agent in self._agents:
             if agent.brief.hears_leader:
@@ -187,6 +190,8 @@ class InProcessRun:
             self._run(stop)
         for rows in (*self._truths, *self._telemetry):
             rows.finish()
+        for log in self._logs.values():
+            log.finish()
 
     def _run(self, stop: Stop) -> None:
         schedule = self._schedule
@@ -247,3 +252,10 @@ def _write(
 ) -> None:
     if count:
         writer.add(robot, source, first, rows)
+
+
+def _write_traffic(
+    writer: BackgroundWriter, bus: str, _first: int, count: int, frames: bytes, _final: bool
+) -> None:
+    if count:
+        writer.traffic(bus, frames)

@@ -86,11 +86,12 @@ def run_plant(source: str, options: Options) -> int:
         try:
             attached = {bus for bus, _ in brief.attached}
             ours = [robot.bus for robot in brief.robots if robot.bus not in attached]
-            hub = Hub(places.listen(folder, ours), stop.wake_fd)
+            queue = brief.wire.txqueuelen if brief.wire else 0
+            hub = Hub(places.listen(folder, ours), stop.wake_fd, queue=queue)
             end: DriveEnd = hub
             try:
                 end = join(hub, brief.attached)
-                _run(brief, end, _buses(brief, folder), options, stop)
+                _run(brief, hub, end, _buses(brief, folder), options, stop)
             finally:
                 end.close(stop.reason or "the plant has ended")
         finally:
@@ -153,12 +154,17 @@ def _buses(brief: PlantBrief, folder: Path) -> dict[str, Settings]:
 
 
 def _run(
-    brief: PlantBrief, end: DriveEnd, buses: dict[str, Settings], options: Options, stop: Stop
+    brief: PlantBrief,
+    hub: Hub,
+    end: DriveEnd,
+    buses: dict[str, Settings],
+    options: Options,
+    stop: Stop,
 ) -> None:
     units = [unit_of(robot) for robot in brief.robots]
     nowhere = _Nowhere()
     rows = [RowBuffer(PLANT_ROW, lambda *_: None) for _ in units]
-    loop = RealtimeLoop(brief, units, end, [nowhere] * len(units), rows, nowhere.put)
+    loop = RealtimeLoop(brief, units, end, hub, [nowhere] * len(units), rows, nowhere.put, {})
     refused = go_realtime(PLANT_PRIORITY)
     if options.serve_stdin:
         threading.Thread(target=_serve_stdin, args=(units, loop, stop), daemon=True).start()

@@ -5,27 +5,30 @@ outlives the launcher for as long as it takes to complete the file. Started by `
 """
 
 import time
+from pathlib import Path
 
 from bridge import keys
 from bridge.barrier import Hellos, await_hellos
 from bridge.link import Arrival
 from bridge.messages import Progress, Report, Rows
 from bridge.process import Stop, cpu_ns, serve
-from bridge.telemetry import AGENT_ROW, PLANT_ROW
+from bridge.telemetry import AGENT_ROW, FRAME_ROW, PLANT_ROW
 from bridge.zenoh_link import open_client
 from configs.brief import RecorderBrief
-from fleetloop.record.writer import RecordWriter, Source
+from fleetloop.record.run_record import RunRecord
+from fleetloop.record.writer import Source
 
 QUIET_S = 0.3
 """Once asked to stop, the recorder takes what still comes until nothing came for this long."""
 PROGRESS_EVERY_S = 0.25
-_ROW_SIZES = {"plant": PLANT_ROW.size, "controller": AGENT_ROW.size}
+_ROW_SIZES = {"plant": PLANT_ROW.size, "controller": AGENT_ROW.size, "can": FRAME_ROW.size}
 
 
 class _Recorder:
-    def __init__(self, brief: RecorderBrief, writer: RecordWriter) -> None:
-        self._writer = writer
-        sources = {f"{kind}/{robot}" for robot in brief.robots for kind in _ROW_SIZES}
+    def __init__(self, brief: RecorderBrief, record: RunRecord) -> None:
+        self._record = record
+        sources = {f"{kind}/{r}" for r in brief.robots for kind in ("plant", "controller")}
+        sources |= {f"can/{bus}" for bus in brief.buses}
         self.unheard = set(sources)
         self.unfinished = set(sources)
         self.undecodable = 0
@@ -38,9 +41,11 @@ class _Recorder:
             self.undecodable += 1
             return
         self.unheard.discard(arrival.tag)
-        if rows.length:
+        if rows.length and kind == "can":
+            self._record.traffic(robot, rows.rows)
+        elif rows.length:
             source: Source = "plant" if kind == "plant" else "controller"
-            self._writer.add(robot, source, rows.first_tick, rows.rows)
+            self._record.add(robot, source, rows.first_tick, rows.rows)
             self.ticks = max(self.ticks, rows.first_tick + rows.length)
         if rows.final:
             self.unfinished.discard(arrival.tag)
@@ -50,13 +55,22 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
     """Record until every source said its last, or until told to stop and nothing comes any more."""
     with (
         open_client(brief.network, brief.start_deadline_s) as link,
-        RecordWriter(brief.path, brief.robots, brief.scenario_toml, brief.period_ns) as writer,
+        RunRecord(
+            Path(brief.path),
+            brief.robots,
+            brief.scenario_toml,
+            brief.period_ns,
+            buses=brief.buses,
+            formats=brief.bus_formats,
+        ) as record,
     ):
         name = brief.network.run
-        recorder = _Recorder(brief, writer)
+        recorder = _Recorder(brief, record)
         for robot in brief.robots:
             link.subscribe(keys.truth(name, robot), f"plant/{robot}")
             link.subscribe(keys.telemetry(name, robot), f"controller/{robot}")
+        for bus in brief.buses:
+            link.subscribe(keys.traffic(name, bus), f"can/{bus}")
         progress = link.publisher(keys.progress(name, "recorder"))
         report = link.publisher(keys.report(name, "recorder"))
         await_hellos(
@@ -82,6 +96,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
                 break
             if now >= next_report:
                 next_report = now + PROGRESS_EVERY_S
+                record.flush()
                 progress.put(Progress(recorder.ticks, 0, 0).encode())
         values = {"undecodable": recorder.undecodable, "cpu_ns": cpu_ns() - began_ns}
         report.put(Report(values).encode())

@@ -19,7 +19,7 @@ from fleetloop.launch import Outcome, ProcessRun
 from fleetloop.lockstep import InProcessRun
 from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.reader import Record
-from fleetloop.record.writer import RecordWriter
+from fleetloop.record.run_record import RunRecord
 from fleetloop.results import print_results
 from fleetloop.signals import stop_on_signals
 from fleetloop.summary import RunStats, check_expectations, summarise, to_json
@@ -126,7 +126,14 @@ def _in_process(
     record = folder / run_folder.RECORD
     period_ns = schedule(scenario).period_ns
     with (
-        RecordWriter(record, scenario.names, to_toml(scenario), period_ns) as file,
+        RunRecord(
+            record,
+            scenario.names,
+            to_toml(scenario),
+            period_ns,
+            buses=scenario.names,
+            formats=scenario.bus.record,
+        ) as file,
         BackgroundWriter(file) as writer,
     ):
         run = InProcessRun(

@@ -89,11 +89,15 @@ def _agent(orders: Orders, links: Links, robot: str, socket: str, *, realtime: b
 
 
 def _recorder(orders: Orders, links: Links) -> RecorderBrief:
-    ticks = schedule(orders.scenario, orders.speed)
+    scenario = orders.scenario
+    ticks = schedule(scenario, orders.speed)
+    emulated = tuple(robot for robot in scenario.names if orders.deployment.emulates(robot))
     return RecorderBrief(
         str(orders.record),
-        orders.scenario.names,
-        to_toml(orders.scenario),
+        scenario.names,
+        emulated if scenario.bus.record else (),
+        scenario.bus.record,
+        to_toml(scenario),
         ticks.period_ns,
         ticks.start_deadline_s,
         links[access.RECORDER],

@@ -22,7 +22,7 @@ from bridge.link import Arrival, Link, Publisher
 from bridge.messages import Go, PoseFix, Progress, Report, Rows
 from bridge.process import LAUNCHER_GONE, Stop, cpu_ns, go_realtime, serve, settle_memory
 from bridge.profile import Sampler
-from bridge.telemetry import PLANT_ROW, RowBuffer
+from bridge.telemetry import PLANT_ROW, FrameBuffer, RowBuffer
 from bridge.zenoh_link import open_client
 from configs.brief import PlantBrief, Settings
 from configs.errors import FleetloopError, InfrastructureError
@@ -86,6 +86,13 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
     robots = [*(unit.brief.robot for unit in units), *(other.robot for other in others)]
     truths = [link.publisher(keys.truth(name, robot)) for robot in robots]
     rows = [RowBuffer(PLANT_ROW, partial(_put_rows, truth)) for truth in truths]
+    logs: dict[str, FrameBuffer] = {}
+    if brief.traffic:
+        for bus in dict.fromkeys(robot.bus for robot in brief.robots):
+            traffic = link.publisher(keys.traffic(name, bus), express=False)
+            truths.append(traffic)
+            logs[bus] = FrameBuffer(partial(_put_rows, traffic))
+    taps = {bus: log.add for bus, log in logs.items()}
     progress = link.publisher(keys.progress(name, "plant"))
     report = link.publisher(keys.report(name, "plant"))
     link.subscribe(keys.go(name), "go")
@@ -110,7 +117,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
         settle_memory()
         refused = go_realtime(PLANT_PRIORITY)
         record = partial(_record, link, others, rows[len(units) :], brief.schedule.period_s)
-        wall = RealtimeLoop(brief, units, end, poses, rows[: len(units)], say, record)
+        wall = RealtimeLoop(brief, units, end, hub, poses, rows[: len(units)], say, taps, record)
         counters, progress_of = wall.counters, wall.progress
         body = partial(wall.run, epoch_ns)
     else:
@@ -118,7 +125,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
         link.declare_live(keys.live(name, "plant"))
         _await_go(brief, link, hellos, stop)
         settle_memory()
-        loop = LockstepLoop(brief, units, hub, poses, rows, say)
+        loop = LockstepLoop(brief, units, hub, poses, rows, say, taps)
         counters, progress_of, body = loop.counters, loop.progress, loop.run
     sampler = Sampler()
     began_ns = cpu_ns()
@@ -132,6 +139,8 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
     finally:
         for buffer in rows:
             buffer.finish()
+        for log in logs.values():
+            log.finish()
         say(progress_of())
         values: dict[str, int | float | str] = {
             "ticks": counters.ticks,

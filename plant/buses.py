@@ -13,6 +13,7 @@ from typing import NamedTuple, TypeVar
 
 from bridge.can_bus.traffic import Key, Passed
 from bridge.frame import Frame
+from bridge.telemetry import FROM_DRIVE, Tap
 from configs.brief import Schedule
 from plant.unit import Unit
 
@@ -37,9 +38,10 @@ class IdealBus:
     """The robots of one bus on which frames take no time."""
 
     def __init__(
-        self, units: Sequence[Unit], schedule: Schedule, substeps: int, begin: Begin
+        self, units: Sequence[Unit], schedule: Schedule, substeps: int, begin: Begin, tap: Tap
     ) -> None:
         self.units = units
+        self._tap = tap
         self._schedule = schedule
         self._substeps = substeps
         self._begin = begin
@@ -47,6 +49,7 @@ class IdealBus:
     def steps(self) -> Steps[Frame]:
         """The ticks from the first of the countdown to the closing one."""
         schedule, begin, substeps = self._schedule, self._begin, self._substeps
+        tap = self._tap
         period_s, period_ns, last = schedule.period_s, schedule.period_ns, schedule.ticks
         units = self.units
         (unit,) = units if len(units) == 1 else (None,)
@@ -57,9 +60,13 @@ class IdealBus:
                 frames = unit.frames_due(bus_ns)
             else:
                 frames = sorted(frame for u in units for frame in u.frames_due(bus_ns))
+            tap(bus_ns, frames, FROM_DRIVE)
             answers = yield Ask(bus_ns, frames)
+            tap(bus_ns, answers, 0)
             while replies := self._hear(answers, bus_ns):
+                tap(bus_ns, replies, FROM_DRIVE)
                 answers = yield Ask(bus_ns, replies)
+                tap(bus_ns, answers, 0)
             if 0 <= tick < last:
                 t_s = tick * period_ns * 1e-9
                 for u in units:

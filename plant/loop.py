@@ -23,7 +23,7 @@ from bridge.can_bus.hub import Hub
 from bridge.link import Publisher
 from bridge.messages import PoseFix, Progress
 from bridge.process import Stop
-from bridge.telemetry import RowBuffer
+from bridge.telemetry import RowBuffer, Tap
 from configs.brief import PlantBrief
 from configs.errors import InfrastructureError, PeerLostError
 from plant.buses import Ask, IdealBus
@@ -144,6 +144,7 @@ class LockstepLoop:
         poses: Sequence[Publisher],
         rows: Sequence[RowBuffer],
         report: Callable[[Progress], None],
+        taps: Mapping[str, Tap],
     ) -> None:
         self._schedule = schedule = brief.schedule
         self._period_ns, self._ticks = schedule.period_ns, schedule.ticks
@@ -160,7 +161,7 @@ class LockstepLoop:
         def begin(group: Sequence[Unit]) -> Callable[[int], None]:
             return partial(self._begin, [(unit, ends[unit]) for unit in group])
 
-        buses = emulations(brief, units, begin)
+        buses = emulations(brief, units, begin, taps)
         self._lanes = {name: _lane(name, bus, first) for name, bus in buses.items()}
         self._slowest = first
         self._at_slowest = len(self._lanes)

@@ -10,32 +10,21 @@ cyclically, as always.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from bridge.can_bus.ends import DriveEnd
-from bridge.frame import Frame
+from bridge.can_bus.hub import Hub
 from bridge.link import Publisher
 from bridge.messages import PoseFix, Progress
 from bridge.process import Stop
-from bridge.telemetry import RowBuffer
+from bridge.telemetry import RowBuffer, Tap
 from configs.brief import PlantBrief
+from plant.live import WireLive, live_buses
 from plant.loop import REPORT_EVERY_NS, Counters
 from plant.unit import Unit
 
 FAREWELL_S = 0.5
 """How long the plant stays for controllers that act after its last tick."""
-
-
-class _Lane:
-    """One robot, and the bus time up to which its body has moved."""
-
-    __slots__ = ("pose", "rows", "t_ns", "unit")
-
-    def __init__(self, unit: Unit, pose: Publisher, rows: RowBuffer) -> None:
-        self.unit = unit
-        self.pose = pose
-        self.rows = rows
-        self.t_ns = 0
 
 
 class RealtimeLoop:
@@ -45,21 +34,23 @@ class RealtimeLoop:
         self,
         brief: PlantBrief,
         units: Sequence[Unit],
-        hub: DriveEnd,
+        end: DriveEnd,
+        hub: Hub,
         poses: Sequence[Publisher],
         rows: Sequence[RowBuffer],
         report: Callable[[Progress], None],
+        taps: Mapping[str, Tap],
         record_others: Callable[[int], None] = lambda _: None,
     ) -> None:
         self._schedule = brief.schedule
         self._record_others = record_others
         self._zero_ns = brief.schedule.bus_time_ns(0)
-        self._hub = hub
+        self._end = end
         self._report = report
-        self._lanes = {
-            unit.brief.bus: _Lane(unit, pose, buffer)
-            for unit, pose, buffer in zip(units, poses, rows, strict=True)
-        }
+        self._buses = live_buses(brief, units, end, hub, taps)
+        self._wires = [bus for bus in self._buses.values() if isinstance(bus, WireLive)]
+        self._poses = dict(zip(units, poses, strict=True))
+        self._rows = dict(zip(units, rows, strict=True))
         self._tick = -brief.schedule.countdown_ticks
         self._epoch_ns = 0
         self._next_report_ns = 0
@@ -91,49 +82,40 @@ class RealtimeLoop:
                 self._report(self.progress())
         self._tick = min(self._tick, schedule.ticks)
         deadline = time.monotonic() + FAREWELL_S
-        while self._hub.clients() and time.monotonic() < deadline and not stop.requested:
+        while self._end.clients() and time.monotonic() < deadline and not stop.requested:
             self._serve(0.01, power_up_ns)
         self.counters.wall_ns = max(time.monotonic_ns() - epoch_ns, 0)
-        for bus in self._lanes:
-            crossed = self._hub.counters(bus)
+        for bus in self._buses:
+            crossed = self._end.counters(bus)
             self.counters.frames[bus] = crossed.from_drives + crossed.from_clients
 
     def _serve(self, wait_s: float, power_up_ns: int) -> None:
-        self._hub.serve(wait_s)
-        for bus in self._hub.heard():
-            self._answer(bus, time.monotonic_ns() - power_up_ns)
-
-    def _answer(self, bus: str, now_ns: int) -> None:
-        lane = self._lanes[bus]
-        self._move(lane, now_ns)
-        replies: list[Frame] = []
-        for frame in self._hub.take(bus):
-            replies += lane.unit.hear(frame, now_ns)
-        replies += lane.unit.feedback(now_ns)
-        if replies:
-            self._hub.deliver(bus, now_ns, replies)
+        """Serve the buses until something came or is due, at most `wait_s`."""
+        for wire in self._wires:
+            next_ns = wire.next_ns()
+            if next_ns is not None:
+                left_ns = next_ns + power_up_ns - time.monotonic_ns()
+                wait_s = min(wait_s, max(left_ns, 0) * 1e-9)
+        self._end.serve(wait_s)
+        for bus in self._end.heard():
+            self._buses[bus].hear(time.monotonic_ns() - power_up_ns)
+        for wire in self._wires:
+            wire.advance(time.monotonic_ns() - power_up_ns)
 
     def _keep_tick(self, power_up_ns: int) -> None:
-        """What a tick brings, robot by robot; who sends torques meanwhile doesn't wait for all."""
+        """What a tick brings, bus by bus; who sends torques meanwhile doesn't wait for all."""
         schedule, tick = self._schedule, self._tick
         bus_ns, t_ns = schedule.bus_time_ns(tick), tick * schedule.period_ns
         if 0 <= tick < schedule.ticks:
             self._record_others(tick)
-        for bus, lane in self._lanes.items():
-            unit = lane.unit
-            self._move(lane, bus_ns)
-            if 0 <= tick < schedule.ticks:
-                lane.rows.add(tick, unit.row(t_ns * 1e-9))
-            if frames := unit.frames_due(bus_ns):
-                self._hub.deliver(bus, bus_ns, frames)
+        for bus in self._buses.values():
+            bus.tick(bus_ns)
+            for unit in bus.units:
+                if 0 <= tick < schedule.ticks:
+                    self._rows[unit].add(tick, unit.row(t_ns * 1e-9))
+            bus.speak(bus_ns)
             if schedule.localises(tick):
-                state = unit.state
-                lane.pose.put(PoseFix(tick, t_ns, state.x, state.y, state.theta).encode())
+                for unit in bus.units:
+                    x, y, theta, *_ = unit.state
+                    self._poses[unit].put(PoseFix(tick, t_ns, x, y, theta).encode())
             self._serve(0.0, power_up_ns)
-
-    def _move(self, lane: _Lane, to_ns: int) -> None:
-        """A body on to a bus time; before tick 0 it is held, and time doesn't go back."""
-        from_ns = max(lane.t_ns, self._zero_ns)
-        if to_ns > from_ns:
-            lane.unit.advance((from_ns - self._zero_ns) * 1e-9, (to_ns - from_ns) * 1e-9, 1)
-        lane.t_ns = max(lane.t_ns, to_ns)

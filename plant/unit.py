@@ -103,6 +103,19 @@ class Unit:
             state = rk4(self._body, state, right, left, t_s + n * step, step)
         self.state = state
 
+    def move(self, to_ns: int, zero_ns: int, step_ns: int) -> None:
+        """Move on to a bus time, in steps of at most `step_ns`, and tell the drives where that is.
+
+        Before `zero_ns` the body is held; time doesn't go back.
+        """
+        from_ns = max(self.moved_ns, zero_ns)
+        if to_ns > from_ns:
+            span_ns = to_ns - from_ns
+            self.advance((from_ns - zero_ns) * 1e-9, span_ns * 1e-9, -(-span_ns // step_ns))
+        if to_ns > self.moved_ns:
+            self.moved_ns = to_ns
+            self.feed()
+
     def row(self, t_s: float) -> tuple[float, ...]:
         """The signals of `bridge.telemetry.PLANT_SIGNALS` at this instant."""
         x, y, theta, v, omega, _, _ = self.state

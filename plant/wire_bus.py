@@ -24,6 +24,7 @@ from bridge.can_bus.traffic import Key, Passed, Said
 from bridge.can_bus.wire import Wire
 from bridge.drives import DriveNode
 from bridge.frame import ERR, Frame
+from bridge.telemetry import FROM_DRIVE, Tap
 from configs.brief import Schedule, WireModel
 from plant.buses import Ask, Begin, Steps
 from plant.unit import Unit
@@ -55,8 +56,10 @@ class WireBus:
         model: WireModel,
         step_ns: int,
         begin: Begin,
+        tap: Tap,
         random: Random,
     ) -> None:
+        self._tap = tap
         self.units = units
         self.wire = Wire(model.bitrate_bit_s)
         self._model = model
@@ -96,7 +99,7 @@ class WireBus:
             start_ns = schedule.bus_time_ns(tick)
             end_ns = start_ns + schedule.period_ns
             for unit in self.units:
-                self._move(unit, start_ns)
+                unit.move(start_ns, self._zero_ns, self._step_ns)
             self._begin(tick)
             waiting = [unit.brief.robot for unit in self.units]
             self._step(start_ns)
@@ -131,6 +134,21 @@ class WireBus:
     def room(self, robot: str) -> int:
         """How many frames its controller's transmit queue takes now."""
         return self._model.txqueuelen - self.wire.queued(self._hosts[robot])
+
+    # --- real time -------------------------------------------------------------------------------
+
+    def advance(self, now_ns: int) -> Ask:
+        """All that happened through this instant, or the last one if that is later; asks nobody."""
+        self._run(max(now_ns, self._now_ns) + 1)
+        for unit in self.units:
+            unit.move(self._now_ns, self._zero_ns, self._step_ns)
+        return self._ask("")
+
+    def next_ns(self) -> int:
+        """When the next thing happens."""
+        return self._next_ns()
+
+    # --- both ------------------------------------------------------------------------------------
 
     def _ask(self, robot: str) -> Ask:
         passed, self._passed = self._passed, []
@@ -181,12 +199,12 @@ class WireBus:
                 self._passed.append(Passed(at_ns, Frame(ERR | 0x80, bytes(8))))
         while self._mail and self._mail[0][0] <= at_ns:
             _, _, drive, frame = heappop(self._mail)
-            self._move(drive.unit, at_ns)
+            drive.unit.move(at_ns, self._zero_ns, self._step_ns)
             self._submit(drive, drive.drive.hear(frame, at_ns))
             drive.due_ns = drive.drive.next_due_ns
         for drive in self._drives:
             if drive.due_ns <= at_ns:
-                self._move(drive.unit, at_ns)
+                drive.unit.move(at_ns, self._zero_ns, self._step_ns)
                 self._submit(drive, drive.drive.due(at_ns))
                 drive.due_ns = drive.drive.next_due_ns
 
@@ -194,6 +212,7 @@ class WireBus:
         end_ns, sender, frame = event.end_ns, event.sender, event.frame
         key = self._key_of.get(sender)
         self._passed.append(Passed(end_ns, frame, key))
+        self._tap(end_ns, (frame,), FROM_DRIVE if key is None else 0)
         drive = self._of_node.get(sender)
         if drive is not None:
             if drive.backlog:
@@ -229,14 +248,3 @@ class WireBus:
         self._hosts[key] = node
         self._key_of[node] = key
         return node
-
-    def _move(self, unit: Unit, to_ns: int) -> None:
-        """A body on to a bus time; before tick 0 it is held."""
-        from_ns = max(unit.moved_ns, self._zero_ns)
-        if to_ns > from_ns:
-            span_ns = to_ns - from_ns
-            substeps = -(-span_ns // self._step_ns)
-            unit.advance((from_ns - self._zero_ns) * 1e-9, span_ns * 1e-9, substeps)
-        if to_ns > unit.moved_ns:
-            unit.moved_ns = to_ns
-            unit.feed()

@@ -225,6 +225,11 @@ class Hub:
         if select.select([self._epoll], [], [], max(timeout_s, 0.0))[0]:
             self._handle(0.0)
 
+    @property
+    def names(self) -> frozenset[str]:
+        """All buses."""
+        return frozenset(self._buses)
+
     def clients(self) -> int:
         """How many clients all buses have."""
         return sum(len(bus.clients) for bus in self._buses.values())

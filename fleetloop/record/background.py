@@ -5,30 +5,37 @@ background is raised by the next `add`, or by `close`.
 """
 
 import threading
+from collections.abc import Callable
+from functools import partial
 from queue import Queue
 from types import TracebackType
 from typing import Self
 
-from fleetloop.record.writer import RecordWriter, Source
+from fleetloop.record.run_record import RunRecord
+from fleetloop.record.writer import Source
 
 _MAX_BLOCKS = 256
-_Block = tuple[str, Source, int, bytes]
 
 
 class BackgroundWriter:
-    """Feeds a `RecordWriter` from a thread of its own; a context manager that waits for it."""
+    """Feeds a `RunRecord` from a thread of its own; a context manager that waits for it."""
 
-    def __init__(self, writer: RecordWriter) -> None:
-        self._writer = writer
-        self._blocks: Queue[_Block | None] = Queue(_MAX_BLOCKS)
+    def __init__(self, record: RunRecord) -> None:
+        self._record = record
+        self._blocks: Queue[Callable[[], None] | None] = Queue(_MAX_BLOCKS)
         self._failure: Exception | None = None
         self._thread = threading.Thread(target=self._write, daemon=True)
         self._thread.start()
 
     def add(self, robot: str, source: Source, first_tick: int, rows: bytes) -> None:
-        """As `RecordWriter.add`; what that raised earlier is raised here."""
+        """As `RunRecord.add`; what failed earlier is raised here."""
         self._raise()
-        self._blocks.put((robot, source, first_tick, rows))
+        self._blocks.put(partial(self._record.add, robot, source, first_tick, rows))
+
+    def traffic(self, bus: str, frames: bytes) -> None:
+        """As `RunRecord.traffic`; what failed earlier is raised here."""
+        self._raise()
+        self._blocks.put(partial(self._record.traffic, bus, frames))
 
     def close(self) -> None:
         """Wait until everything is written."""
@@ -43,11 +50,11 @@ class BackgroundWriter:
 
     def _write(self) -> None:
         failed = False
-        while (block := self._blocks.get()) is not None:
+        while (write := self._blocks.get()) is not None:
             if failed:
                 continue
             try:
-                self._writer.add(*block)
+                write()
             except Exception as error:  # raised in the thread that fills
                 self._failure = error
                 failed = True

@@ -12,7 +12,14 @@ pytestmark = pytest.mark.system
 CYCLE = 'graph={edges=["r1 -> r2", "r2 -> r1"], leader=["r2"]}'
 
 
-@pytest.mark.parametrize("overrides", [(), ("--set", CYCLE)], ids=["two_robots", "cycle"])
+WIRE = 'bus.timing="wire"'
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [(), ("--set", CYCLE), ("--set", WIRE, "--set", "clock.control_period_s=0.001")],
+    ids=["two_robots", "cycle", "wire"],
+)
 def test_processes_and_one_process_leave_the_same_record_bit_for_bit(
     overrides: tuple[str, ...], tmp_path: Path, capsys
 ) -> None:
@@ -22,7 +29,8 @@ def test_processes_and_one_process_leave_the_same_record_bit_for_bit(
     assert completed(c, "two_robots", *overrides)[0] == 0
     assert print_comparison(a, b, as_json=False) == 0
     assert print_comparison(a, c, as_json=False) == 0
-    assert "identical: 2000 ticks of 2 robots" in capsys.readouterr().out
+    ticks = 4000 if WIRE in overrides else 2000
+    assert f"identical: {ticks} ticks of 2 robots" in capsys.readouterr().out
     assert (a / "record.mcap").read_bytes() == (b / "record.mcap").read_bytes()
 
 

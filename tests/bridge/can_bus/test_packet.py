@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.can_bus import packet as wire
+from bridge.can_bus.traffic import Stamped
 from bridge.frame import Frame
 
 frames = st.builds(Frame, st.integers(0, 2**32 - 1), st.binary(max_size=8))
@@ -18,6 +19,23 @@ def test_frames_survive_a_packet_in_order(flags: int, stamp: int, sent: list[Fra
     assert packet is not None
     assert (packet.kind, packet.flags, packet.stamp_ns) == (wire.FRAMES, flags, stamp)
     assert list(packet.frames) == sent
+
+
+@given(
+    st.integers(0, 7),
+    st.integers(0, 2**62),
+    st.lists(st.tuples(st.integers(0, 2**32 - 1), frames), max_size=20),
+    st.integers(0, 2**32 - 1),
+)
+def test_frames_that_ended_at_different_times_keep_their_times(
+    flags: int, stamp: int, sent: list[tuple[int, Frame]], room: int
+) -> None:
+    stamped = [Stamped(stamp - before, frame) for before, frame in sent]
+    packet = wire.decode(wire.encode_stamped(flags, stamp, stamped, room))
+    assert packet is not None
+    assert (packet.stamp_ns, packet.room) == (stamp, room)
+    assert list(packet.frames) == [frame for _, frame in sent]
+    assert list(packet.before_ns) == [before for before, _ in sent]
 
 
 @given(st.sampled_from([wire.HELLO, wire.WELCOME, wire.REFUSED, wire.BYE]), st.text(max_size=50))

@@ -7,7 +7,8 @@ import pytest
 from bridge.telemetry import AGENT_ROW, PLANT_ROW
 from configs.errors import InfrastructureError
 from fleetloop.record.background import BackgroundWriter
-from fleetloop.record.writer import RecordWriter, Source
+from fleetloop.record.run_record import RunRecord
+from fleetloop.record.writer import Source
 
 BLOCKS: list[tuple[Source, int, bytes]] = [
     (source, first, bytes(row.size * 100))
@@ -16,8 +17,8 @@ BLOCKS: list[tuple[Source, int, bytes]] = [
 ]
 
 
-def writer(path: Path) -> RecordWriter:
-    return RecordWriter(path, ("r1",), "schema = 1\n", 1_000_000)
+def writer(path: Path) -> RunRecord:
+    return RunRecord(path, ("r1",), "schema = 1\n", 1_000_000)
 
 
 def test_the_file_is_the_same_as_without_it(tmp_path: Path) -> None:

@@ -1,0 +1,76 @@
+"""Everything that a run records: signals in `record.mcap`, each bus in `can/`."""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from configs.errors import InfrastructureError
+from fleetloop.record.can_log import CanLogWriter
+from fleetloop.record.writer import RecordWriter, Source
+
+CAN_FOLDER = "can"
+
+
+class RunRecord:
+    """Writes one run; a context manager that completes all files.
+
+    Args:
+        path: of the record; recordings of the buses go to the folder `can` beside it.
+        buses: names of the buses that are recorded.
+        formats: "blf" and "log": Vector's format and candump's.
+
+    Raises:
+        InfrastructureError: a file can't be written; so do `add` and `traffic`.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        robots: Sequence[str],
+        scenario_toml: str,
+        period_ns: int,
+        *,
+        buses: Sequence[str] = (),
+        formats: Sequence[str] = (),
+    ) -> None:
+        self._rows = RecordWriter(path, robots, scenario_toml, period_ns)
+        self._logs: dict[str, CanLogWriter] = {}
+        if formats and buses:
+            folder = path.parent / CAN_FOLDER
+            try:
+                folder.mkdir(exist_ok=True)
+            except OSError as error:
+                raise InfrastructureError(f"can't make {folder}: {error.strerror}") from error
+            for number, bus in enumerate(buses, 1):
+                blf = folder / f"{bus}.blf" if "blf" in formats else None
+                log = folder / f"{bus}.log" if "log" in formats else None
+                self._logs[bus] = CanLogWriter(blf, log, channel=number, name=bus)
+
+    def add(self, robot: str, source: Source, first_tick: int, rows: bytes) -> None:
+        """Add rows of consecutive ticks, as `RecordWriter.add`."""
+        self._rows.add(robot, source, first_tick, rows)
+
+    def traffic(self, bus: str, frames: bytes) -> None:
+        """Add frames that crossed a bus, in the records of `bridge.telemetry.FRAME_ROW`."""
+        self._logs[bus].write(frames)
+
+    def flush(self) -> None:
+        """Put the buses' frames so far into their files."""
+        for log in self._logs.values():
+            log.flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        with ExitStack() as logs:
+            for log in self._logs.values():
+                logs.callback(log.close)
+            self._rows.__exit__(kind, value, traceback)

@@ -1,0 +1,190 @@
+"""A bus with bit timing in lockstep: when frames end, when they act, who is asked when."""
+
+from collections.abc import Callable
+
+import pytest
+
+from bridge.can_bus.node import NodeState
+from bridge.can_bus.queues import Endless
+from bridge.can_bus.traffic import Said
+from bridge.drives.odrive import frames as f
+from bridge.drives.odrive.frames import AxisState, Command, identifier
+from bridge.frame import Frame
+from bridge.telemetry import no_tap
+from configs.brief import NetworkLink, PlantBrief
+from configs.briefing import plant_brief
+from configs.loading import load
+from plant.buses import Ask, Steps
+from plant.emulation import wire_bus
+from plant.unit import unit_of
+from plant.wire_bus import WireBus
+
+US, MS = 1000, 1_000_000
+
+
+def torques(right: float, left: float) -> list[Frame]:
+    return [
+        Frame(identifier(node, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(torque))
+        for node, torque in ((0, right), (1, left))
+    ]
+
+
+ARM = torques(0.0, 0.0) + [
+    Frame(identifier(node, Command.SET_AXIS_STATE), f.ONE_U32.pack(AxisState.CLOSED_LOOP_CONTROL))
+    for node in (0, 1)
+]
+
+
+def brief(*overrides: str) -> PlantBrief:
+    scenario = load(
+        "two_robots",
+        ('bus.timing="wire"', "clock.control_period_s=0.001", "clock.countdown_s=0.25", *overrides),
+    )
+    return plant_brief(scenario, network=NetworkLink("t", "", "", ""))
+
+
+class Driven:
+    """A bus of one robot whose controller says what a function of the tick gives."""
+
+    def __init__(self, answer: Callable[[int], list[Frame]], *overrides: str) -> None:
+        plant = brief(*overrides)
+        self.schedule = plant.schedule
+        self.began: list[int] = []
+        unit = unit_of(plant.robots[0])
+        self.unit = unit
+        self.bus: WireBus = wire_bus(plant, "r1", [unit], self.began.append, no_tap)
+        self._steps: Steps[Said] = self.bus.steps()
+        self._answer = answer
+        self.tick_number = -plant.schedule.countdown_ticks
+
+    def tick(self) -> list[Ask]:
+        """One tick: the questions of it."""
+        asks: list[Ask] = []
+        ask = next(self._steps)
+        while ask is not None:
+            asks.append(ask)
+            said = self._answer(self.tick_number) if len(asks) == 1 else []
+            ask = self._steps.send([Said("r1", frame) for frame in said])
+        self.tick_number += 1
+        return asks
+
+    def ticks(self, count: int) -> list[Ask]:
+        return [ask for _ in range(count) for ask in self.tick()]
+
+
+def test_the_controller_is_asked_when_the_last_frame_of_its_drives_has_ended() -> None:
+    driven = Driven(lambda _: [])
+    driven.tick()
+    start_ns = driven.schedule.bus_time_ns(driven.tick_number)
+    (ask,) = driven.tick()
+    assert [passed.frame.can_id for passed in ask.passed] == [0x009, 0x029]
+    first, second = (passed.end_ns for passed in ask.passed)
+    # Two frames of 8 bytes at 1 Mbit/s: 108 to 132 bits each, and three between them.
+    assert start_ns + 105 * US < first < start_ns + 132 * US
+    assert first + 105 * US < second < first + 135 * US
+    assert ask.stamp_ns == second
+    assert ask.asked == "r1"
+
+
+def test_a_torque_acts_within_the_tick_when_its_frame_has_ended() -> None:
+    driven = Driven(lambda tick: ARM if tick < 0 else torques(0.1, 0.1), "robot.r1.v_m_s=0.0")
+    driven.ticks(250)
+    assert driven.unit.state.v == 0.0  # held during the countdown
+    driven.tick()  # tick 0: torques of this tick arrive after about 0.4 ms
+    mbar, r, share = driven.unit._body.mbar_1, 0.04, 0.001 - 0.00041
+    assert driven.unit.moved_ns < driven.schedule.bus_time_ns(1)
+    driven.bus.advance(driven.schedule.bus_time_ns(1))
+    expected = r / 2 * 0.2 / mbar * share
+    assert driven.unit.state.v == pytest.approx(expected, rel=0.1)
+
+
+def test_firmware_acts_after_its_latency_and_in_order() -> None:
+    driven = Driven(
+        lambda tick: ARM if tick < 0 else torques(0.1 * tick, 0.0)[:1] + torques(0.3, 0.0)[:1],
+        'drive.preset="realistic"',
+        "drive.command_latency_s=[0.0002, 0.0002]",
+        "drive.torque_constant_N_m_A=0.05",
+    )
+    driven.ticks(250)
+    (ask,) = driven.tick()
+    right, _ = driven.unit.drives
+    assert right.input_torque == pytest.approx(0.3)  # the later of two
+    ended = ask.stamp_ns + 2 * 90 * US + 200 * US
+    assert right.fed_ns == pytest.approx(ended, abs=15 * US)
+
+
+def test_who_says_more_than_the_transmit_queue_holds_is_refused_and_told() -> None:
+    flood = [Frame(0x700, bytes(8))] * 40
+    driven = Driven(lambda tick: flood if tick == -250 else [])
+    driven.tick()
+    assert driven.bus.refused == 30
+    freed = [count for ask in driven.ticks(5) for _, count in ask.freed]
+    assert sum(freed) == 40
+
+
+def test_a_starved_bus_tells_the_controller_that_the_tick_has_passed() -> None:
+    driven = Driven(lambda _: [])
+    driven.ticks(3)
+    driven.bus.wire.attach("babbler", queue=Endless(Frame(0x000, bytes(8))))
+    asks = driven.ticks(3)
+    ends = [driven.schedule.bus_time_ns(driven.tick_number - n) - 1 for n in (2, 1, 0)]
+    empty = [ask.stamp_ns for ask in asks if not ask.passed]
+    assert empty == ends
+
+
+def test_drives_that_hear_nothing_through_a_babbler_trip_their_watchdog() -> None:
+    driven = Driven(
+        lambda tick: ARM if tick == -250 else torques(0.1, 0.1), "drive.watchdog_s=0.05"
+    )
+    driven.ticks(20)
+    right, _ = driven.unit.drives
+    assert right.torque_demand(0.0) == pytest.approx(0.1)
+    driven.bus.wire.attach("babbler", queue=Endless(Frame(0x000, bytes(8))))
+    driven.ticks(60)
+    assert right.torque_demand(0.0) == 0.0
+
+
+def test_a_client_that_departs_leaves_the_wire() -> None:
+    driven = Driven(lambda _: [])
+    driven.tick()
+    driven.bus.take([Said(7, Frame(0x700, b""))] * 3)
+    driven.bus.depart(7)
+    asks = driven.ticks(2)
+    # The frame that was on the wire is completed, the others have gone.
+    assert sum(p.frame.can_id == 0x700 for ask in asks for p in ask.passed) <= 1
+
+
+def test_the_load_of_a_robot_at_1_khz_is_forty_percent() -> None:
+    driven = Driven(
+        lambda tick: ARM if tick < 0 else torques(0.05 + tick * 1e-6, 0.05), "duration_s=4"
+    )
+    driven.ticks(250)
+    busy, now = driven.bus.wire.busy_ns, driven.bus.wire.now_ns
+    driven.ticks(1000)
+    load = (driven.bus.wire.busy_ns - busy) / (driven.bus.wire.now_ns - now)
+    assert load == pytest.approx(0.40, abs=0.02)
+
+
+def test_error_frames_reach_the_clients_and_the_frame_is_sent_again() -> None:
+    from bridge.can_bus.disturbances import Disturbance, Kind
+    from bridge.frame import ERR
+
+    driven = Driven(lambda _: [])
+    driven.tick()
+    driven.bus.wire.disturb(Disturbance(Kind.CORRUPT, can_id=0x009))
+    (ask,) = driven.tick()
+    kinds = [passed.frame.can_id for passed in ask.passed]
+    assert any(can_id & ERR for can_id in kinds)
+    assert [can_id for can_id in kinds if not can_id & ERR] == [0x009, 0x029]
+
+
+def test_a_drive_that_goes_bus_off_falls_silent_and_the_controller_hears_the_other() -> None:
+    from bridge.can_bus.disturbances import Disturbance, Kind
+
+    driven = Driven(lambda _: [])
+    driven.tick()
+    driven.bus.wire.disturb(Disturbance(Kind.CORRUPT, node="r1 right", count=32))
+    driven.ticks(20)
+    (ask, *_) = driven.tick()
+    assert [passed.frame.can_id for passed in ask.passed] == [0x029]
+    assert driven.bus._drives[0].node.state is NodeState.BUS_OFF
