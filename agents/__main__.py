@@ -5,7 +5,7 @@ a process of its own, on the robot.
 """
 
 from collections.abc import Callable, Iterable
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import asdict
 from functools import partial
 from typing import NamedTuple
@@ -13,12 +13,14 @@ from typing import NamedTuple
 import can
 
 from agents.agent import Agent
+from agents.guard import Phase
 from agents.loop import Counters, LockstepLoop, give
 from agents.realtime import Counters as Clock
 from agents.realtime import RealtimeLoop
 from bridge import keys
 from bridge.access import LAUNCHER
 from bridge.barrier import Hellos, await_hellos
+from bridge.can_bus.convert import to_message
 from bridge.can_bus.opening import open_bus
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import Report, Rows
@@ -111,7 +113,7 @@ class _Wired(NamedTuple):
         counters: Counters | Clock,
         refused: Iterable[str] = (),
     ) -> str:
-        """Run the loop's body; then hand on the last rows and say the last word.
+        """Run the loop's body; stop the wheels, hand on the last rows and say the last word.
 
         Returns why the body stopped early, "" if it did not.
         """
@@ -125,12 +127,14 @@ class _Wired(NamedTuple):
             failure = str(error)
             raise
         finally:
+            self.stop_wheels()
             early = stop.reason
             self.rows.finish()
             values: dict[str, int | float | str] = {
                 **asdict(counters),
                 **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
-                "stopped": self.agent.stopped_because,
+                "stopped": self.agent.guard.stopped_because,
+                "notices": "\n".join(self.agent.guard.notices()),
                 "refused": ", ".join(refused),
                 "failure": failure,
                 "cpu_ns": cpu_ns() - began_ns,
@@ -138,6 +142,16 @@ class _Wired(NamedTuple):
             self.report.put(Report(values).encode())
             stop.await_release()
         return early
+
+    def stop_wheels(self) -> None:
+        """Whatever ended the loop before its time: what disarms the drives, if it can be sent."""
+        if self.agent.phase is Phase.DONE:
+            return
+        for can_id, data in self.agent.leave():
+            with suppress(can.CanError, OSError):
+                self.bus.send(to_message(can_id, data))
+        with suppress(can.CanError, OSError):
+            self.bus.recv(0.0)  # what was gathered goes out
 
 
 def _lockstep(wired: _Wired, stop: Stop) -> str:

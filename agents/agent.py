@@ -1,45 +1,45 @@
 """One robot's controller, one period at a time: sense, decide, act, share.
 
-    phase      on                                          to        torque
-    ARMING     both drives in closed loop without error    READY     0
-    READY      tick 0                                      DRIVING   0
-    ARMING     tick 0                                      error     -
-    DRIVING    a drive drops out or falls silent           STOPPED   the law's
-    DRIVING    the closing tick                            DONE      the law's
-    STOPPED    the closing tick                            DONE      0, drives disarmed
-    DONE       -                                           -         -
+    phase      on                                                 to         what is sent
+    ARMING     both drives in closed loop without error           READY      arming frames, torque 0
+    ARMING     tick 0                                             error      -
+    READY      a fault before tick 0                              ARMING     torque 0, idle
+    READY      tick 0                                             DRIVING    torque 0
+    DRIVING    a fault                                            STOPPED    the law's, limited
+    STOPPED    no obstacle for `rearm_after`, and rearm allowed   REARMING   torque 0; idle
+    REARMING   both drives in closed loop without error           DRIVING    arming frames, torque 0
+    REARMING   an obstacle, or `rearm_limit`                      STOPPED    torque 0, idle
+    any        the closing tick, or told to stop                  DONE       torque 0, idle (estop)
 
-A stopped robot goes on sharing its path variable, so that its neighbours aren't cut off. An agent
-knows only what arrived as a CAN frame or as a message; it never reads a clock.
+A fault is a drive that drops out or falls silent, two senders of a drive's telemetry, a bus that
+can't be sent on, a pose that is too old, sensors that disagree, or a torque that isn't finite. It
+takes the torque from both wheels in the same tick: the frames that report a change of phase out of
+DRIVING are already torque 0. An obstacle is a fault that is still there, less what a host may clear
+by itself; an error that appears before tick 0 and is a person's to clear isn't cleared again. After
+arming again the first set-point is 0, the limiter starts from 0 and the law from its first tick.
+
+A stopped robot goes on sharing its path variable, so that its neighbours aren't cut off. A dry run
+goes through the same phases without a frame. An agent knows only what arrived as a CAN frame or as
+a message; it never reads a clock.
 """
 
 from collections.abc import Sequence
-from enum import Enum, auto
+from math import hypot, inf
 
 from agents.coordination import CoordinationState, Coordinator
-from agents.laws import LAWS, LawOutput, LawState, Sense
+from agents.guard import WHOLE, Guard, Passed, Phase
+from agents.laws import LAWS, LawState, Sense
+from agents.limits import EncoderCheck, held_still
 from agents.localisation import Localiser
 from agents.neighbours import Neighbours
 from agents.paths import robot_path
-from bridge.drives import DRIVES
 from bridge.frame import Frame
 from bridge.messages import LeaderSpeed, PathState, PoseFix
 from bridge.telemetry import RowBuffer
 from configs.brief import AgentBrief
-from configs.errors import InfrastructureError
 
 POSE_HISTORY_TICKS = 64
 """In real time, a fix may be this old: the odometry since is known."""
-
-
-class Phase(Enum):
-    """What a controller is about."""
-
-    ARMING = auto()
-    READY = auto()
-    DRIVING = auto()
-    STOPPED = auto()
-    DONE = auto()
 
 
 class Agent:
@@ -47,12 +47,12 @@ class Agent:
 
     def __init__(self, brief: AgentBrief, rows: RowBuffer) -> None:
         self.brief = brief
-        self.phase = Phase.ARMING
-        self.stopped_because = ""
         self._rows = rows
         self._schedule = brief.schedule
         self._h = brief.schedule.period_s
-        self._drives = DRIVES[brief.drives.protocol].client(brief.drives)
+        self.guard = self._guard = Guard(brief)
+        """Phase, faults, and what gets through to the drives."""
+        self._drives = self._guard.drives
         self._path = robot_path(brief.path, brief.offset)
         self._law = LAWS[brief.law](brief.gains, brief.wheels, self._h)
         self._law_state: LawState | None = None
@@ -73,10 +73,18 @@ class Agent:
         self._states: dict[int, dict[str, PathState]] = {}  # by tick, until due
         self._unheard = set(brief.hears)
         self._at_once = brief.schedule.realtime
+        self._encoders = EncoderCheck(brief.host.encoder_mismatch_limit_rad, self._h)
+        fused = brief.localisation == "fused"
+        self._pose_mismatch_m = brief.host.pose_mismatch_limit_m if fused else inf
         self.late_s = self.round_trip_s = 0.0
         """What the loop measured of the clock at this tick, for the record."""
         self.hear = self._drives.hear
         """Take one frame from the bus: identifier, data, bus time [ns] at which it came."""
+
+    @property
+    def phase(self) -> Phase:
+        """What the controller is about."""
+        return self._guard.phase
 
     # --- what arrives ------------------------------------------------------------------------
 
@@ -134,23 +142,24 @@ class Agent:
         """
         motion = self._drives.motion()
         if motion is None:
-            return self._arm(tick)
+            return self._guard.arm(tick)
         sense = self._localiser.wheels(*motion)
+        if self._encoders.active:
+            self._guard.note_doubt("encoders", self._encoders(motion))
         if tick <= 0:
             if self._start_fix is not None:
                 start = self._start_fix
                 sense = self._localiser.fix(start.x_m, start.y_m, start.theta_rad)
             if tick < 0:
-                return self._arm(tick)
+                return self._guard.arm(tick)
         if self._at_once:
             sense = self._take_newest(tick, sense)
         elif self._schedule.owes(tick):
             sense = self._take_due(tick, sense)
         if tick >= self._schedule.ticks:
-            self.phase = Phase.DONE
-            return self._drives.disarm()
-        if self.phase is not Phase.DRIVING:
-            self._begin(tick)
+            return self._guard.leave()
+        if not self._guard.begun:
+            self._guard.begin(tick)
         return self._control(tick, sense)
 
     def _take_due(self, tick: int, sense: Sense) -> Sense:
@@ -160,7 +169,7 @@ class Agent:
         fix = self._fixes.pop(tick - self._pose_delay, None)
         if fix is None:
             return sense
-        return self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad, self._pose_delay)
+        return self._fix(tick, fix, self._pose_delay, sense)
 
     def _take_newest(self, tick: int, sense: Sense) -> Sense:
         """In real time: use the newest fix, as old as it is, unless it is too old to place."""
@@ -171,25 +180,19 @@ class Agent:
         ago = max(tick - fix.tick, 0)
         if ago > POSE_HISTORY_TICKS:
             return sense
-        return self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad, ago)
+        return self._fix(tick, fix, ago, sense)
 
-    def _arm(self, tick: int) -> Sequence[Frame]:
-        bus_ns = self._schedule.bus_time_ns(tick)
-        if self._drives.armed:
-            self.phase = Phase.READY
-            return self._drives.torque(0.0, 0.0)
-        return self._drives.arm(bus_ns)
-
-    def _begin(self, tick: int) -> None:
-        if self.phase is Phase.STOPPED:
-            return
-        if self.phase is not Phase.READY or not self._drives.armed:
-            fault = self._drives.fault(self._schedule.bus_time_ns(tick))
-            raise InfrastructureError(
-                f"{self.brief.robot}: drives not armed when control had to start:"
-                f" {fault or 'no closed loop reported yet; a longer clock.countdown_s helps'}"
+    def _fix(self, tick: int, fix: PoseFix, ago: int, carried: Sense) -> Sense:
+        """Use a fix of some ticks ago; `carried` is where the ones before have been carried on."""
+        self._guard.note_pose(tick - ago)
+        sense = self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad, ago)
+        if self._pose_mismatch_m < inf:
+            apart_m = hypot(sense.x - carried.x, sense.y - carried.y)
+            far = apart_m > self._pose_mismatch_m
+            self._guard.note_doubt(
+                "pose", f"pose and odometry are {apart_m:.2g} m apart" if far else None
             )
-        self.phase = Phase.DRIVING
+        return sense
 
     def _control(self, tick: int, sense: Sense) -> Sequence[Frame]:
         """Steps 1 to 11 of the law at one tick."""
@@ -198,7 +201,14 @@ class Agent:
         s_dot = mu + v_hat
         reference = self._path(s)
         out = self._law(self._law_state, sense, reference, s_dot)
-        frames = self._act(tick, out)
+        frames = self._guard.act(tick, out.tau_right, out.tau_left)
+        passed = self._guard.passed
+        if passed is WHOLE:
+            self._law_state = out.state
+        elif passed is Passed.LIMITED:
+            self._law_state = held_still(self._law_state, out.state)
+        elif passed is Passed.ANEW:
+            self._law_state = None
         n, sum_s, sum_v = self._neighbours.sums(t_ns)
         v_r = self._leader.at(t_ns) if self._leader is not None else 0.0
         self._coordination = self._coordinator.advance(coordination, n, sum_s, sum_v, v_r)
@@ -223,18 +233,6 @@ class Agent:
         )
         return frames
 
-    def _act(self, tick: int, out: LawOutput) -> Sequence[Frame]:
-        """Torques while the drives are well; once one isn't, both wheels are stopped for good."""
-        if self.phase is Phase.DRIVING:
-            fault = self._drives.fault(self._schedule.bus_time_ns(tick))
-            if fault is None:
-                self._law_state = out.state
-                return self._drives.torque(out.tau_right, out.tau_left)
-            self.phase = Phase.STOPPED
-            self.stopped_because = f"tick {tick}: {fault}"
-        return self._drives.disarm()
-
     def leave(self) -> Sequence[Frame]:
         """Disarm for good: told to stop before the closing tick."""
-        self.phase = Phase.DONE
-        return self._drives.disarm()
+        return self._guard.leave()

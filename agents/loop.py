@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import can
 
-from agents.agent import Agent, Phase
+from agents.agent import Agent
 from agents.bus_clock import BusClock
+from agents.guard import Phase
 from bridge.barrier import Hellos
 from bridge.can_bus.convert import can_id_of, to_message
 from bridge.frame import Frame

@@ -7,23 +7,29 @@
 Controllers have different phases, so that they don't all wake at one instant. The controller never
 waits for feedback: a *miss* is a tick whose torques had no feedback when the next tick was due. A
 tick that could not be kept is computed late, without sending, so that the path variable keeps time.
+What an interface's errors do is in `agents.bus_health`.
 """
 
 import time
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import nan
 
 import can
 
-from agents.agent import Agent, Phase
+from agents.agent import Agent
+from agents.bus_health import BusHealth
+from agents.guard import Phase
 from agents.loop import give
 from bridge.barrier import Hellos
 from bridge.can_bus.convert import can_id_of, to_message
 from bridge.clock import monotonic_of
+from bridge.frame import ERR, Frame
 from bridge.link import Link, Publisher
 from bridge.messages import Go
 from bridge.process import Stop
-from configs.errors import InfrastructureError, PeerLostError
+from configs.errors import InfrastructureError
 
 
 @dataclass(slots=True)
@@ -33,6 +39,9 @@ class Counters:
     ticks: int = 0
     misses: int = 0  # no feedback of its torques before the next tick was due
     skipped: int = 0  # computed after the next tick was due, and not sent
+    unsent: int = 0  # ticks whose frames found the transmit queue full
+    bus_errors: int = 0  # other errors of the bus that were borne
+    error_frames: int = 0  # that the bus's controller told of
     undecodable: int = 0
 
 
@@ -49,6 +58,7 @@ class RealtimeLoop:
         self._link = link
         self._path = path
         self._hellos = hellos
+        self._health = BusHealth(agent.brief.robot, agent.brief.host.bus_error_limit_ns)
         self._power_up_ns = 0
         self._sent_ns = 0  # when torques were sent that have no feedback yet; 0: there are none
         self.counters = Counters()
@@ -77,8 +87,9 @@ class RealtimeLoop:
         """Run from the countdown to the closing tick, or until told to stop.
 
         Raises:
-            InfrastructureError: the drives were not armed when control had to start.
-            PeerLostError: the bus closed.
+            InfrastructureError: the drives were not armed when control had to start, or the bus
+                failed for too long.
+            PeerLostError: our own bus closed.
         """
         schedule, agent = self._schedule, self._agent
         period_ns, phase_ns = schedule.period_ns, agent.brief.phase_ns
@@ -99,13 +110,34 @@ class RealtimeLoop:
             if overdue:
                 self.counters.skipped += 1
             else:
-                for can_id, data in frames:
-                    self._bus.send(to_message(can_id, data))
-                self._sent_ns = time.monotonic_ns()
+                self._send(frames, tick)
             self.counters.ticks += tick >= 0
             tick += 1
             if schedule.shares(tick):
                 self._path.put(agent.share(tick).encode())
+        with suppress(can.CanError, OSError):
+            self._bus.recv(0.0)  # what was gathered goes out
+
+    def _send(self, frames: Sequence[Frame], tick: int) -> None:
+        send, health = self._bus.send, self._health
+        try:
+            for can_id, data in frames:
+                send(to_message(can_id, data))
+        except (can.CanError, OSError) as error:
+            self._bear(error)
+            self._agent.guard.note_unsent(tick)
+        else:
+            self._sent_ns = time.monotonic_ns()
+            if health.since_ns is not None:
+                health.sent()
+                self._agent.guard.bus_fault = None
+
+    def _bear(self, error: Exception) -> None:
+        """Count an error of the bus, stop the wheels if it lasts, raise if it is the end."""
+        health, now_ns = self._health, time.monotonic_ns()
+        health.failed(error, now_ns)
+        self._agent.guard.bus_fault = health.fault(now_ns)
+        self.counters.unsent, self.counters.bus_errors = health.unsent, health.errors
 
     def _read_until(self, due_ns: int) -> None:
         """Take frames from the bus until the due time."""
@@ -117,16 +149,21 @@ class RealtimeLoop:
                 return
             try:
                 message = self._bus.recv(max(left_ns, 0) * 1e-9)
-            except can.CanOperationError as error:
-                raise PeerLostError(
-                    f"{self._robot}: lost its bus after {self.counters.ticks} ticks: {error}"
-                ) from error
+            except (can.CanError, OSError) as error:
+                self._bear(error)
+                # An interface that is down may say so at once, again and again.
+                time.sleep(max(due_ns - time.monotonic_ns(), 0) * 1e-9)
+                return
             polled = message is None
             if message is None:
                 continue
             came_ns = time.monotonic_ns()
             bus_ns = came_ns - self._power_up_ns
-            agent.hear(can_id_of(message), message.data, bus_ns)
+            can_id = can_id_of(message)
+            if can_id & ERR:
+                self.counters.error_frames += 1
+                continue
+            agent.hear(can_id, message.data, bus_ns)
             if self._sent_ns and agent.heard_since(self._sent_ns - self._power_up_ns):
                 agent.round_trip_s = (came_ns - self._sent_ns) * 1e-9
                 self._sent_ns = 0

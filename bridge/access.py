@@ -101,15 +101,17 @@ def plan(
     hears: Mapping[str, Sequence[str]],
     leader: Sequence[str],
     *,
+    buses: Sequence[str] = (),
     witnessed: Collection[str] = (),
     guests: Mapping[str, str] | None = None,
     certified: bool = False,
 ) -> AccessPlan:
     """The rights of a run from its graph: `hears[i]` are the robots that i hears, `leader` h_i.
 
-    Somebody else says the poses of the robots in `witnessed`: they aren't emulated. `guests` are
-    the passwords of identities on other machines (all others are given random ones), who must show
-    a certificate with their identity as its common name if `certified`.
+    What crosses the `buses` is recorded. Somebody else says the poses of the robots in `witnessed`:
+    they aren't emulated. `guests` are the passwords of identities on other machines (all others are
+    given random ones), who must show a certificate with their identity as its common name if
+    `certified`.
     """
     rights: dict[str, Rights] = {}
     launcher = (keys.live(run, LAUNCHER),)
@@ -125,7 +127,7 @@ def plan(
             watches=launcher,
         )
     truths = [keys.truth(run, robot) for robot in robots]
-    truths += [keys.traffic(run, robot) for robot in robots]
+    truths += [keys.traffic(run, bus) for bus in buses]
     poses = [keys.pose(run, robot) for robot in robots if robot not in witnessed]
     witnesses = [keys.pose(run, robot) for robot in robots if robot in witnessed]
     rights[PLANT] = Rights(

@@ -11,9 +11,12 @@ radians, wheel order is (right, left), times are integer nanoseconds.
 """
 
 from dataclasses import dataclass, field
+from math import inf
 
 Settings = tuple[tuple[str, str | int | float | bool], ...]
 """Keyword arguments as sorted pairs, so that a brief stays hashable and immutable."""
+OURS = "fleetloop"
+"""The python-can interface whose buses the plant's process holds itself."""
 
 
 # --- reference paths: Γ_0(s) of equation (1) ------------------------------------------------------
@@ -214,6 +217,15 @@ class Schedule:
 
 
 @dataclass(frozen=True, slots=True)
+class Mounting:
+    """How the drives sit on the wheels: wheel angle = sign × shaft angle / gear ratio."""
+
+    right_sign: int = 1  # -1: positive torque at the shaft turns the wheel backwards
+    left_sign: int = 1
+    gear_ratio: float = 1.0  # motor revolutions per wheel revolution
+
+
+@dataclass(frozen=True, slots=True)
 class DriveLink:
     """How a controller reaches the two drives of its robot."""
 
@@ -221,8 +233,30 @@ class DriveLink:
     right_node: int
     left_node: int
     encoder_period_ns: int
-    velocity_limit_rev_s: float
+    velocity_limit_rev_s: float  # of the motor shaft
     current_limit_A: float
+    heartbeat_period_ns: int = 100_000_000
+    encoder_age_limit_ns: int = 50_000_000  # older: the drive has dropped out
+    heartbeat_age_limit_ns: int = 500_000_000  # older: the drive has dropped out
+    mounting: Mounting = Mounting()
+
+
+@dataclass(frozen=True, slots=True)
+class HostLimits:
+    """What a controller allows itself, whatever the law asks; at the wheels."""
+
+    pose_age_limit_ns: int  # 0: none
+    torque_limit_N_m: float = inf
+    torque_slew_limit_N_m_s: float = inf
+    encoder_mismatch_limit_rad: float = inf
+    pose_mismatch_limit_m: float = inf
+    dry_run: bool = False  # everything but torque
+    estop_on_exit: bool = False  # else idle
+    rearm: bool = False
+    rearm_after_ns: int = 500_000_000  # all must have been well for this long
+    rearm_attempts: int = 3
+    rearm_limit_ns: int = 1_000_000_000  # longest wait for closed loop
+    bus_error_limit_ns: int = 0  # 0: an error of the bus ends the controller
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,6 +312,7 @@ class AgentBrief:
     localisation: str  # "fused" | "external" | "odometry"
     schedule: Schedule
     drives: DriveLink
+    host: HostLimits
     phase_ns: int  # in real time, this much after a tick's time the controller acts
     bus: Settings  # keyword arguments of can.Bus, verbatim
     network: NetworkLink
@@ -414,6 +449,7 @@ class RobotBrief:
     pose: Pose
     v_m_s: float
     omega_rad_s: float
+    mounting: Mounting = Mounting()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,10 @@
 """Scenario → briefs: what each process of a run is told at its start."""
 
+from math import inf
+
 from configs import sections
 from configs.brief import (
+    OURS,
     AgentBrief,
     Body,
     CirclePath,
@@ -14,9 +17,11 @@ from configs.brief import (
     FigureEightPath,
     FormationOffset,
     Gains,
+    HostLimits,
     LeaderBrief,
     LinePath,
     MotorModel,
+    Mounting,
     NetworkLink,
     PlantBrief,
     Pose,
@@ -36,6 +41,10 @@ from configs.brief import (
 from configs.scenario import Scenario
 from configs.splines import Ends, chord_lengths, quintic_spline
 
+ENCODER_AGE_LIMIT_S = 0.05
+"""Machines that are no real-time machines stand still for 10 ms now and then; drives' watchdogs
+allow 100 ms."""
+POSE_AGE_LIMIT_S = 0.5
 UNLIMITED = 1e6
 """A limit that nothing reaches: [A], [rev/s]."""
 SERIAL_NUMBER = 0x3858_0000_0000
@@ -97,18 +106,59 @@ def agent_brief(
         hears_leader=name in graph.leader,
         localisation=scenario.localisation.source,
         schedule=ticks,
-        drives=DriveLink(
-            protocol=drive.protocol,
-            right_node=scenario.drive.right_node,
-            left_node=scenario.drive.left_node,
-            encoder_period_ns=drive.encoder_period_ns,
-            velocity_limit_rev_s=drive.velocity_limit_rev_s,
-            current_limit_A=drive.current_limit_A,
-        ),
+        drives=_drive_link(scenario, robot, drive),
+        host=_host_limits(scenario, ours=dict(bus).get("interface", OURS) == OURS),
         phase_ns=round(scenario.names.index(name) * ticks.period_ns / len(scenario.names)),
         bus=bus,
         network=network,
     )
+
+
+def _drive_link(scenario: Scenario, robot: sections.Robot, drive: DriveModel) -> DriveLink:
+    host = scenario.host
+    encoder_age_s = host.encoder_age_limit_s
+    if encoder_age_s is None:
+        encoder_age_s = max(ENCODER_AGE_LIMIT_S, 10 * scenario.clock.control_period_s)
+    return DriveLink(
+        protocol=drive.protocol,
+        right_node=scenario.nodes_of(robot.name)[0],
+        left_node=scenario.nodes_of(robot.name)[1],
+        encoder_period_ns=drive.encoder_period_ns,
+        velocity_limit_rev_s=drive.velocity_limit_rev_s,
+        current_limit_A=drive.current_limit_A,
+        heartbeat_period_ns=drive.heartbeat_period_ns,
+        encoder_age_limit_ns=round(encoder_age_s * 1e9),
+        heartbeat_age_limit_ns=round(host.heartbeat_age_limit_s * 1e9),
+        mounting=Mounting(**scenario.mounting_of(robot).model_dump()),
+    )
+
+
+def _host_limits(scenario: Scenario, *, ours: bool) -> HostLimits:
+    host, clock = scenario.host, scenario.clock
+    pose_age_s = host.pose_age_limit_s
+    if pose_age_s is None:
+        delay_s = scenario.localisation.delay_s or clock.control_period_s
+        pose_age_s = max(POSE_AGE_LIMIT_S, delay_s + 5 * clock.localisation_period_s)
+    fixes = scenario.localisation.source != "odometry"
+    return HostLimits(
+        pose_age_limit_ns=round(pose_age_s * 1e9) if fixes else 0,
+        torque_limit_N_m=_or_none(host.torque_limit_N_m),
+        torque_slew_limit_N_m_s=_or_none(host.torque_slew_limit_N_m_s),
+        encoder_mismatch_limit_rad=_or_none(host.encoder_mismatch_limit_rad),
+        pose_mismatch_limit_m=_or_none(host.pose_mismatch_limit_m),
+        dry_run=host.dry_run,
+        estop_on_exit=host.on_exit == "estop",
+        rearm=host.rearm,
+        rearm_after_ns=round(host.rearm_after_s * 1e9),
+        rearm_attempts=host.rearm_attempts,
+        rearm_limit_ns=round(host.rearm_limit_s * 1e9),
+        # Our own bus fails when the plant is gone, and doesn't come back.
+        bus_error_limit_ns=0 if ours else round(host.bus_error_limit_s * 1e9),
+    )
+
+
+def _or_none(limit: float | None) -> float:
+    return inf if limit is None else limit
 
 
 def plant_brief(
@@ -197,16 +247,17 @@ def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief
     disturbance = robot.disturbance or scenario.disturbance
     return RobotBrief(
         robot=robot.name,
-        bus=robot.name,
+        bus=scenario.bus_of(robot.name),
         body=Body(**scenario.body_of(robot).model_dump()),
         disturbance=Disturbance(disturbance.amplitude_N_m, disturbance.rate_rad_s, float(number)),
         drive=_drive_model(scenario, number),
         powertrain=_powertrain_model(scenario, number),
-        right_node=scenario.drive.right_node,
-        left_node=scenario.drive.left_node,
+        right_node=scenario.nodes_of(robot.name)[0],
+        left_node=scenario.nodes_of(robot.name)[1],
         pose=Pose(robot.pose.x_m, robot.pose.y_m, robot.pose.theta_rad),
         v_m_s=robot.v_m_s,
         omega_rad_s=robot.omega_rad_s,
+        mounting=Mounting(**scenario.mounting_of(robot).model_dump()),
     )
 
 

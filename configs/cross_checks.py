@@ -7,6 +7,9 @@ from typing import NamedTuple
 from configs.scenario import ETSRO, Scenario
 from configs.topology import parse_edge
 
+MAX_NODE = 62
+"""63 is the address of drives that have none."""
+
 
 class Problem(NamedTuple):
     """One thing wrong with a scenario."""
@@ -18,7 +21,8 @@ class Problem(NamedTuple):
 
 def cross_problems(scenario: Scenario) -> list[Problem]:
     """All problems that no section can see alone."""
-    problems = [*_names(scenario), *_periods(scenario), *_drives(scenario), *_expects(scenario)]
+    problems = [*_names(scenario), *_periods(scenario), *_drives(scenario)]
+    problems += [*_host(scenario), *_expects(scenario)]
     edges = list(_edges(scenario))
     if not problems and not edges:
         edges = list(_graph(scenario))
@@ -93,6 +97,19 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
     drive = scenario.drive
     if drive.right_node == drive.left_node:
         yield Problem("drive.left_node", drive.left_node, "must differ from drive.right_node")
+        return
+    taken: dict[tuple[str, int], str] = {}
+    for name in scenario.names:
+        bus = scenario.bus_of(name)
+        for side, node in zip(("right", "left"), scenario.nodes_of(name), strict=True):
+            key = f"robot.{name}.{side}_node"
+            if node > MAX_NODE:
+                right = f"bus {bus} has no node left for it: 0 to {MAX_NODE}"
+                yield Problem(key, node, right)
+            elif (owner := taken.setdefault((bus, node), f"{name}'s {side} drive")) and (
+                owner != f"{name}'s {side} drive"
+            ):
+                yield Problem(key, node, f"on bus {bus} it is {owner} already; choose another")
     least_s, most_s = drive.command_latency_s
     if least_s > most_s:
         yield Problem("drive.command_latency_s", [least_s, most_s], "least before most")
@@ -110,6 +127,30 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
             f"must be below half of encoder.pll_rate_hz = {encoder.pll_rate_hz:g}, as drives want"
             " it: twice the bandwidth times the loop period is a gain below 1",
         )
+
+
+def _host(scenario: Scenario) -> Iterator[Problem]:
+    host, clock, heartbeat_s = scenario.host, scenario.clock, scenario.drive.heartbeat_period_s
+    delay_s = scenario.localisation.delay_s or clock.control_period_s
+    least = {
+        "heartbeat_age_limit_s": (2 * heartbeat_s, "two of drive.heartbeat_period_s"),
+        "encoder_age_limit_s": (2 * clock.control_period_s, "two of clock.control_period_s"),
+        "pose_age_limit_s": (
+            delay_s + 2 * clock.localisation_period_s,
+            "the delay and two of clock.localisation_period_s",
+        ),
+    }
+    if host.rearm:
+        least["rearm_after_s"] = 2 * heartbeat_s, "two of drive.heartbeat_period_s"
+        least["rearm_limit_s"] = 3 * heartbeat_s, "three of drive.heartbeat_period_s"
+        if scenario.localisation.source == "odometry":
+            right = "odometry alone doesn't know where a robot is after a fault: false, or fixes"
+            yield Problem("host.rearm", True, right)
+    for key, (limit, what) in least.items():
+        value = getattr(host, key)
+        if value is not None and value < limit:
+            right = f"{what}, {limit:g} s, or more, or a healthy robot stops or never arms"
+            yield Problem(f"host.{key}", value, right)
 
 
 def _expects(scenario: Scenario) -> Iterator[Problem]:

@@ -15,15 +15,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from configs.brief import Settings, TlsFiles
+from configs.brief import OURS, Settings, TlsFiles
 from configs.complaints import MISSING, complaints, line
 from configs.cross_checks import Problem
 from configs.errors import ScenarioError
 from configs.scenario import Scenario
 from configs.sections import Name, Section
 
-OURS = "fleetloop"
-"""The interface whose buses the plant's process holds itself."""
 PLANT, RECORDER = "plant", "recorder"
 Endpoint = Annotated[str, Field(pattern=r"^(tcp|tls)/.+:\d+$")]
 

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from configs.host import Host
 from configs.powertrain import Encoder, Motor, Supply
 from configs.sections import (
     Body,
@@ -23,6 +24,7 @@ from configs.sections import (
     GraphSection,
     Leader,
     Localisation,
+    Mounting,
     Name,
     Network,
     PathShape,
@@ -56,6 +58,8 @@ class Scenario(Section):
     motor: Motor = Motor()
     encoder: Encoder = Encoder()
     supply: Supply = Supply()
+    mounting: Mounting = Mounting()
+    host: Host = Host()
     disturbance: Disturbance = Disturbance()
     network: Network = Network()
     robot_types: dict[Name, Body] = Field(default_factory=dict)
@@ -66,6 +70,28 @@ class Scenario(Section):
     def names(self) -> tuple[str, ...]:
         """The robots, in the order of the file."""
         return tuple(robot.name for robot in self.robot)
+
+    @property
+    def buses(self) -> tuple[str, ...]:
+        """All buses, in the order of their first robots."""
+        return tuple(dict.fromkeys(self.bus_of(robot) for robot in self.names))
+
+    def bus_of(self, name: str) -> str:
+        """The bus of a robot."""
+        robot = next(robot for robot in self.robot if robot.name == name)
+        return robot.bus or robot.name
+
+    def nodes_of(self, name: str) -> tuple[int, int]:
+        """(right, left) node of a robot's drives: on a shared bus each robot has the next two."""
+        robot = next(robot for robot in self.robot if robot.name == name)
+        bus = self.bus_of(name)
+        number = [other for other in self.names if self.bus_of(other) == bus].index(name)
+        right, left = robot.right_node, robot.left_node
+        step = 2 * number
+        return (
+            self.drive.right_node + step if right is None else right,
+            self.drive.left_node + step if left is None else left,
+        )
 
     @property
     def topology(self) -> Graph:
@@ -82,6 +108,11 @@ class Scenario(Section):
         """The law and gains of a robot: the fleet's, with what the robot says differently."""
         changes = robot.control.model_dump(exclude_none=True)
         return Control(**{**self.control.model_dump(), **changes})
+
+    def mounting_of(self, robot: Robot) -> Mounting:
+        """How a robot's drives are mounted: the fleet's, with what the robot says differently."""
+        changes = robot.mounting.model_dump(exclude_none=True)
+        return Mounting(**{**self.mounting.model_dump(), **changes})
 
     def _edges(self) -> Sequence[tuple[str, str]]:
         graph = self.graph

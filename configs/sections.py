@@ -12,6 +12,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=32)]
+Node = Annotated[int, Field(ge=0, le=62)]
 Point = Annotated[tuple[Finite, Finite], Field(strict=False)]
 Eight = Annotated[
     tuple[Finite, Finite, Finite, Finite, Finite, Finite, Finite, Finite], Field(strict=False)
@@ -139,6 +140,17 @@ class Body(Section):
     )
 
 
+class Mounting(Section):
+    """How the drives sit on the wheels: positive torque at a shaft turns its wheel `sign` forward.
+
+    The drives' own values (limits, encoder) are the motor shaft's; all others are the wheels'.
+    """
+
+    right_sign: Literal[1, -1] = 1
+    left_sign: Literal[1, -1] = Field(1, description="-1: a drive mounted as a mirror image")
+    gear_ratio: Positive = Field(1.0, description="motor revolutions per wheel revolution")
+
+
 class Disturbance(Section):
     """Δ(t) = amplitude [sin(rate t + i), cos(rate t + i)] on the wheels of robot number i."""
 
@@ -206,9 +218,13 @@ if TYPE_CHECKING:
 
     class ControlChanges(Section):
         """Keys of `Control`, none required."""
+
+    class MountingChanges(Section):
+        """Keys of `Mounting`, none required."""
 else:
     BodyChanges = _changes("BodyChanges", Body)
     ControlChanges = _changes("ControlChanges", Control)
+    MountingChanges = _changes("MountingChanges", Mounting)
 
 
 class Robot(Section):
@@ -225,7 +241,13 @@ class Robot(Section):
     control: ControlChanges = Field(
         ControlChanges(), description="gains that differ from [control]"
     )
+    mounting: MountingChanges = Field(MountingChanges(), description="what differs from [mounting]")
     disturbance: Disturbance | None = None
+    bus: Name | None = Field(None, description="robots may share one; of its own if not given")
+    right_node: Node | None = Field(
+        None, description="[drive] right_node, + 2 per robot on its bus"
+    )
+    left_node: Node | None = Field(None, description="[drive] left_node, + 2 per robot on its bus")
 
 
 class GraphSection(Section):
@@ -257,7 +279,7 @@ class Leader(Section):
 
 
 class Bus(Section):
-    """The buses, one per robot."""
+    """The buses, one per robot unless robots name the same."""
 
     interface: Literal["fleetloop"] = "fleetloop"
     bitrate_bit_s: Annotated[int, Field(ge=10_000, le=1_000_000)] = 1_000_000
@@ -293,8 +315,8 @@ class Drive(Section):
         description="ideal: torque as commanded; limited: with the limits below; realistic: these,"
         " and [motor], [encoder], [supply]",
     )
-    right_node: Annotated[int, Field(ge=0, le=62)] = 0
-    left_node: Annotated[int, Field(ge=0, le=62)] = 1
+    right_node: Node = 0
+    left_node: Node = 1
     heartbeat_period_s: Positive = 0.1
     torques_period_s: NotNegative = Field(0.0, description="0: only on request")
     watchdog_s: NotNegative = Field(0.1, description="0: off, as drives are delivered")

@@ -176,10 +176,16 @@ class InProcessRun:
     def stopped_robots(self) -> dict[str, str]:
         """Robots that stopped themselves, and why."""
         return {
-            agent.brief.robot: agent.stopped_because
+            agent.brief.robot: agent.guard.stopped_because
             for agent in self._agents
-            if agent.stopped_because
+            if agent.guard.stopped_because
         }
+
+    @property
+    def notices(self) -> dict[str, list[str]]:
+        """What happened between robots and their drives, in words."""
+        notices = {agent.brief.robot: agent.guard.notices() for agent in self._agents}
+        return {robot: said for robot, said in notices.items() if said}
 
     def run(self, stop: Stop) -> None:
         """Run from the first tick of the countdown to the closing tick, or until told to stop."""

@@ -71,6 +71,7 @@ def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.
         scenario.names,
         graph.hears,
         graph.leader,
+        buses=scenario.buses,
         witnessed=[robot for robot in scenario.names if not deployment.emulates(robot)],
         guests=guests(scenario, deployment),
         certified=network is not None and network.tls is not None,

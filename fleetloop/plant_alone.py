@@ -85,7 +85,9 @@ def run_plant(source: str, options: Options) -> int:
         folder = places.create_run_folder(f"{scenario.name}-{os.getpid()}")
         try:
             attached = {bus for bus, _ in brief.attached}
-            ours = [robot.bus for robot in brief.robots if robot.bus not in attached]
+            ours = [
+                bus for bus in dict.fromkeys(r.bus for r in brief.robots) if bus not in attached
+            ]
             queue = brief.wire.txqueuelen if brief.wire else 0
             hub = Hub(places.listen(folder, ours), stop.wake_fd, queue=queue)
             end: DriveEnd = hub
@@ -104,7 +106,7 @@ def _join(scenario: Scenario, deployment: Deployment) -> int:
     network = placing.network_link(scenario, deployment, PLANT)
     brief = placing.robots_of_plant(plant_brief(scenario, network=network), deployment)
     attached = {bus for bus, _ in brief.attached}
-    ours = [robot.bus for robot in brief.robots if robot.bus not in attached]
+    ours = [bus for bus in dict.fromkeys(r.bus for r in brief.robots) if bus not in attached]
     note(f"plant: waiting for run {network.run!r} at {network.endpoint}")
     with stop_on_signals() as stop:
         folder = places.create_run_folder(f"{network.run}-plant")

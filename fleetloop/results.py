@@ -107,9 +107,11 @@ def spread_line(summary: Summary) -> str:
 
 
 def trouble_lines(summary: Summary) -> Iterator[str]:
-    """Robots that stopped themselves, and buses that failed at times."""
+    """Robots that stopped themselves, what led to it, and buses that failed at times."""
     for robot, reason in summary["stopped_robots"].items():
         yield f"STOPPED {robot}: {reason}"
+    for robot, notices in summary["notices"].items():
+        yield from (f"{robot}: {notice}" for notice in notices)
     for bus, trouble in summary["bus_troubles"].items():
         yield f"BUS {bus}: {trouble}"
 

@@ -131,7 +131,7 @@ def _in_process(
             scenario.names,
             to_toml(scenario),
             period_ns,
-            buses=scenario.names,
+            buses=scenario.buses,
             formats=scenario.bus.record,
         ) as file,
         BackgroundWriter(file) as writer,
@@ -153,6 +153,7 @@ def _in_process(
         startup_s=startup_s,
         frames_per_bus=run.frames,
         stopped_robots=run.stopped_robots,
+        notices=run.notices,
     )
 
 
@@ -200,6 +201,8 @@ def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
             }
         if stopped := report.values.get("stopped"):
             stats.stopped_robots[process.removeprefix("agent/")] = str(stopped)
+        if notices := report.values.get("notices"):
+            stats.notices[process.removeprefix("agent/")] = str(notices).split("\n")
     return stats
 
 

@@ -42,20 +42,22 @@ def spawn(orders: Orders, links: Links, folder: Path, children: list[Child]) -> 
     scenario, deployment = orders.scenario, orders.deployment
     realtime = schedule(scenario).realtime
     here = deployment.runs_here
-    ours = [r for r in scenario.names if deployment.is_ours(r) and here(PLANT)]
+    robots = [r for r in scenario.names if deployment.is_ours(r) and here(PLANT)]
+    ours = list(dict.fromkeys(scenario.bus_of(robot) for robot in robots))
     listeners = places.listen(folder, ours)
     try:
         with Nursery(batch=not realtime) as nursery:
             if here(PLANT):
                 plant = replace(
                     _plant(orders, links, folder),
-                    listeners=tuple((robot, FIRST_FD + n) for n, robot in enumerate(ours)),
+                    listeners=tuple((bus, FIRST_FD + n) for n, bus in enumerate(ours)),
                 )
-                fds = [listeners[robot].fileno() for robot in ours]
+                fds = [listeners[bus].fileno() for bus in ours]
                 children.append(Child(nursery, PLANT, "plant", plant, fds))
             for robot in scenario.names:
                 if here(role := agent_role(robot)):
-                    socket = str(places.socket_path(folder, robot)) if robot in ours else ""
+                    bus = scenario.bus_of(robot)
+                    socket = str(places.socket_path(folder, bus)) if robot in robots else ""
                     agent = _agent(orders, links, robot, socket, realtime=realtime)
                     children.append(Child(nursery, role, "agents", agent))
             recorder = _recorder(orders, links)
@@ -89,16 +91,22 @@ def _agent(orders: Orders, links: Links, robot: str, socket: str, *, realtime: b
 
 
 def _recorder(orders: Orders, links: Links) -> RecorderBrief:
-    scenario = orders.scenario
-    ticks = schedule(scenario, orders.speed)
-    emulated = tuple(robot for robot in scenario.names if orders.deployment.emulates(robot))
+    ticks = schedule(orders.scenario, orders.speed)
     return RecorderBrief(
         str(orders.record),
-        scenario.names,
-        emulated if scenario.bus.record else (),
-        scenario.bus.record,
-        to_toml(scenario),
+        orders.scenario.names,
+        _recorded(orders),
+        orders.scenario.bus.record,
+        to_toml(orders.scenario),
         ticks.period_ns,
         ticks.start_deadline_s,
         links[access.RECORDER],
     )
+
+
+def _recorded(orders: Orders) -> tuple[str, ...]:
+    """The buses whose traffic the plant tells the recorder."""
+    scenario, emulates = orders.scenario, orders.deployment.emulates
+    if not scenario.bus.record:
+        return ()
+    return tuple(dict.fromkeys(scenario.bus_of(r) for r in scenario.names if emulates(r)))

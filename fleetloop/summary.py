@@ -39,6 +39,7 @@ class RunStats:
     frames_per_bus: dict[str, int] = field(default_factory=dict)
     waits_s: dict[str, dict[str, float]] = field(default_factory=dict)
     stopped_robots: dict[str, str] = field(default_factory=dict)
+    notices: dict[str, list[str]] = field(default_factory=dict)
     bus_troubles: dict[str, str] = field(default_factory=dict)
     cpu_s: dict[str, float] = field(default_factory=dict)
     realtime: dict[str, dict[str, int]] = field(default_factory=dict)
@@ -89,6 +90,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         "s_spread": _spread_of(controllers) if ticks else None,
         "expectations": expectations,
         "stopped_robots": stats.stopped_robots,
+        "notices": stats.notices,
         "overruns": stats.overruns,
         "frames_per_bus": stats.frames_per_bus,
         "bus_troubles": stats.bus_troubles,

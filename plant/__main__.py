@@ -6,6 +6,7 @@ inherited file descriptors.
 
 import socket
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
@@ -215,7 +216,7 @@ def _put_rows(publisher: Publisher, first: int, count: int, rows: bytes, final: 
 def _await_controllers(brief: PlantBrief, hub: Hub, hellos: Hellos, stop: Stop) -> None:
     """Say hello until every bus has its controller; bounded by the start deadline."""
     rounds = int(brief.schedule.start_deadline_s / 0.02)
-    buses = [robot.bus for robot in brief.robots]
+    buses = Counter(robot.bus for robot in brief.robots)
     for _ in range(rounds):
         hellos.say()
         missing = hub.await_paced(buses, 0.02)

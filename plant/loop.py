@@ -290,7 +290,8 @@ class LockstepLoop:
         for bus, lane in self._lanes.items():
             when = f"tick {lane.tick} (t = {lane.tick * self._schedule.period_ns * 1e-9:.3f} s)"
             robot = lane.asked or " or ".join(lane.robots)
-            if bus in left and not lane.done:
+            # Each controller leaves when it has answered the closing tick.
+            if bus in left and lane.tick < self._ticks:
                 raise PeerLostError(f"{when}: the controller of {robot} left its bus")
             if lane.asked_ns and now_ns - lane.asked_ns > limit_ns:
                 raise InfrastructureError(

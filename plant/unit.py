@@ -3,6 +3,9 @@
     bus frames ─► drive ─torque demand─► motor ─torque─► body ─wheel angle, speed─► encoder ─► drive
 
 A unit is told the time and never asks for it. A step of the integration holds the torques.
+Drives, motors and encoders are at the motor shaft, the body and what is recorded at the wheel:
+
+    wheel torque = gear × shaft torque,  shaft angle = gear × wheel angle,  gear = sign × gear ratio
 
     Unit        ideal motors and encoders: what a drive asks for acts at once, what it hears is true
     RealUnit    motors, supply and encoders of `plant.powertrain`
@@ -30,6 +33,8 @@ class Unit:
         "_body",
         "_demand_left",
         "_demand_right",
+        "_gear_left",
+        "_gear_right",
         "_left",
         "_right",
         "_torque_left",
@@ -49,6 +54,9 @@ class Unit:
         self.drives: tuple[DriveNode, DriveNode] = (self._right, self._left)
         self.moved_ns = 0
         """Bus time up to which the body has moved, for who moves it from event to event."""
+        mounting = brief.mounting
+        self._gear_right = mounting.right_sign * mounting.gear_ratio
+        self._gear_left = mounting.left_sign * mounting.gear_ratio
         self._answered_ns = 0
         self._demand_right = self._demand_left = 0.0
         self._torque_right = self._torque_left = 0.0
@@ -61,8 +69,9 @@ class Unit:
         """Tell both drives what their encoders see."""
         state = self.state
         right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
-        self._right.feed(state.right_angle * PER_RADIAN, right_speed * PER_RADIAN)
-        self._left.feed(state.left_angle * PER_RADIAN, left_speed * PER_RADIAN)
+        right, left = PER_RADIAN * self._gear_right, PER_RADIAN * self._gear_left
+        self._right.feed(state.right_angle * right, right_speed * right)
+        self._left.feed(state.left_angle * left, left_speed * left)
 
     def feedback(self, now_ns: int) -> Sequence[Frame]:
         """Both encoder frames, once both drives have taken a set-point since the last ones."""
@@ -93,8 +102,10 @@ class Unit:
     def advance(self, t_s: float, period_s: float, substeps: int) -> None:
         """Integrate one control period from scenario time `t_s`, torques held."""
         state = self.state
-        right = self._torque_right = self._demand_right = self._right.torque_demand(period_s)
-        left = self._torque_left = self._demand_left = self._left.torque_demand(period_s)
+        right = self._right.torque_demand(period_s) * self._gear_right
+        left = self._left.torque_demand(period_s) * self._gear_left
+        self._torque_right = self._demand_right = right
+        self._torque_left = self._demand_left = left
         if substeps == 1:
             self.state = rk4(self._body, state, right, left, t_s, period_s)
             return
@@ -126,8 +137,8 @@ class Unit:
             theta,
             v,
             omega,
-            self._right.input_torque,
-            self._left.input_torque,
+            self._right.input_torque * self._gear_right,
+            self._left.input_torque * self._gear_left,
             self._demand_right,
             self._demand_left,
             self._torque_right,
@@ -142,8 +153,12 @@ class RealUnit(Unit):
 
     def __init__(self, brief: RobotBrief, model: PowertrainModel) -> None:
         super().__init__(brief)
-        self._train = powertrain(model, min(self._body.mbar_1, self._body.mbar_2))
+        self._train = powertrain(model, self._shaft_inertia(brief.mounting.gear_ratio))
         self._felt_s = 0.0
+
+    def _shaft_inertia(self, gear_ratio: float) -> float:
+        """What a motor turns at least, seen at its shaft [kg·m²]."""
+        return min(self._body.mbar_1, self._body.mbar_2) / gear_ratio**2
 
     def feed(self) -> None:
         """The encoders have told their drives already, at every step."""
@@ -153,16 +168,18 @@ class RealUnit(Unit):
         step = period_s / substeps
         state, body, train = self.state, self._body, self._train
         right, left = self._right, self._left
+        gear_r, gear_l = self._gear_right, self._gear_left
         demands = torques = (0.0, 0.0)
         for n in range(substeps):
             demands = right.torque_demand(step), left.torque_demand(step)
-            speeds = body.wheel_speeds(state.v, state.omega)
-            torques = train.step(demands, speeds, step)
+            right_speed, left_speed = body.wheel_speeds(state.v, state.omega)
+            shafts = train.step(demands, (right_speed * gear_r, left_speed * gear_l), step)
+            torques = shafts[0] * gear_r, shafts[1] * gear_l
             state = rk4(body, state, *torques, t_s + n * step, step)
-            right.feed(*train.right_encoder.step(state.right_angle, step))
-            left.feed(*train.left_encoder.step(state.left_angle, step))
+            right.feed(*train.right_encoder.step(state.right_angle * gear_r, step))
+            left.feed(*train.left_encoder.step(state.left_angle * gear_l, step))
         self.state = state
-        self._demand_right, self._demand_left = demands
+        self._demand_right, self._demand_left = demands[0] * gear_r, demands[1] * gear_l
         self._torque_right, self._torque_left = torques
         self._felt_s += period_s
         if self._felt_s >= FEEL_EVERY_S:

@@ -222,7 +222,10 @@ class WireBus:
             return
         if key is not None:
             self._freed.append((key, 1))
-        for target in self._drives:
+        can_id = frame.can_id
+        # A set-point concerns nobody but the drive at its address.
+        concerned = [d for d in self._drives if d.drive.setpoint_id == can_id] or self._drives
+        for target in concerned:
             if target.node in event.heard_by:
                 soonest_ns, latest_ns = target.unit.brief.drive.command_latency_ns
                 latency_ns = soonest_ns

@@ -21,7 +21,7 @@ import select
 import socket
 import time
 from collections import deque
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from bridge.can_bus import packet as wire
 from bridge.can_bus.traffic import Key, Passed, Said, Stamped
@@ -70,7 +70,7 @@ class _Client:
         self.name = ""
         self.key: Key = 0
         self.gone = 0  # frames that left its transmit queue
-        self.pending: list[Stamped] = []  # for a paced client, until it is asked
+        self.pending: list[Stamped] = []  # what a paced client hears with its next question
         self.joined = self.paced = self.gathered = self.own = self.owes = False
         self.backlog: deque[bytes] = deque()
 
@@ -141,7 +141,7 @@ class Hub:
         together = wire.encode_frames(0, stamp_ns, frames)
         if len(clients) == 1:
             (client,) = clients
-            if client.owes is False and client.paced and not client.backlog:
+            if client.paced and not (client.owes or client.backlog or client.pending):
                 client.owes = True
                 bus.owing += 1
                 self._send(client, together)
@@ -152,7 +152,7 @@ class Hub:
                 if client.paced and not client.owes:
                     client.owes = True
                     bus.owing += 1
-                self._send(client, together)
+                self._send(client, self._with_pending(client, stamp_ns, frames) or together)
             else:
                 # One frame a packet: a readable descriptor must mean one more frame.
                 for frame in frames:
@@ -246,10 +246,10 @@ class Hub:
             bus.taken = []
         return taken
 
-    def await_paced(self, names: Collection[str], timeout_s: float) -> tuple[str, ...]:
-        """Wait until each of these buses has a paced client; return those that have none."""
+    def await_paced(self, wanted: Mapping[str, int], timeout_s: float) -> tuple[str, ...]:
+        """Wait until each bus has this many paced clients; return the buses that have not."""
         deadline = time.monotonic() + timeout_s
-        while missing := tuple(name for name in names if not self._has_paced(name)):
+        while missing := tuple(name for name, n in wanted.items() if self._paced(name) < n):
             left_s = deadline - time.monotonic()
             if left_s <= 0:
                 return missing
@@ -355,10 +355,22 @@ class Hub:
         for frame in frames:
             data = wire.encode_frames(0, bus.stamp_ns, (frame,))
             for client in tuple(bus.clients):
-                if client is not sender:
+                if client.paced and client is not sender:
+                    client.pending.append(Stamped(bus.stamp_ns, frame))
+                elif client is not sender:
                     self._send(client, data)
             if sender.own:
                 self._send(sender, wire.encode_frames(wire.OWN, bus.stamp_ns, (frame,)))
+
+    def _with_pending(
+        self, client: _Client, stamp_ns: int, frames: Sequence[Frame]
+    ) -> bytes | None:
+        """A packet of these frames after those that came meanwhile; None if none came."""
+        if not client.pending:
+            return None
+        heard = [*client.pending, *(Stamped(stamp_ns, frame) for frame in frames)]
+        client.pending = []
+        return wire.encode_stamped(0, stamp_ns, heard, 0)
 
     def _accept(self, bus: _Bus) -> None:
         try:
@@ -444,5 +456,5 @@ class Hub:
         self._readers[fd] = reader
         self._epoll.register(fd, _READ)
 
-    def _has_paced(self, name: str) -> bool:
-        return any(client.paced for client in self._buses[name].clients)
+    def _paced(self, name: str) -> int:
+        return sum(client.paced for client in self._buses[name].clients)

@@ -30,6 +30,10 @@ class DriveClient(Protocol):
     armed: bool
     sent: tuple[float, float]
 
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What somebody else did to the drives: for the report."""
+
     def hear(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         """Take any frame from the bus."""
 
@@ -42,14 +46,26 @@ class DriveClient(Protocol):
     def arm(self, now_ns: int) -> Sequence[Frame]:
         """What to send next on the way to `armed`; call once per period."""
 
+    def missing(self, now_ns: int) -> str:
+        """What of each drive keeps the robot from being armed, "" if nothing does."""
+
+    def obstacle(self, now_ns: int) -> str | None:
+        """Why arming must not even be tried now, None if it may."""
+
+    def refusal(self) -> str | None:
+        """What a person has to mend before the drives may be armed again, None if nothing."""
+
     def fault(self, now_ns: int) -> str | None:
         """Why the wheels can't be driven now, None if they can."""
 
-    def torque(self, right_Nm: float, left_Nm: float) -> tuple[Frame, Frame]:
+    def torque(self, right_Nm: float, left_Nm: float) -> Sequence[Frame]:
         """Set-points for both wheels [N·m]; `sent` then says what the bus carries of them."""
 
+    def rest(self, now_ns: int) -> Sequence[Frame]:
+        """Torque 0 for both wheels, and whatever keeps them disarmed; call once per period."""
+
     def disarm(self) -> Sequence[Frame]:
-        """Torque 0 and idle for both wheels."""
+        """Torque 0 and idle for both wheels; the way to `armed` begins anew."""
 
     def estop(self) -> Sequence[Frame]:
         """Emergency stop for both wheels."""

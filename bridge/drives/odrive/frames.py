@@ -185,3 +185,11 @@ def error_names(errors: AxisError) -> str:
     known = [bit.name for bit in AxisError if bit in errors and bit.name]
     rest = int(errors) & ~sum(AxisError)
     return " | ".join(known + ([hex(rest)] if rest else [])) or "no error"
+
+
+def name_of(kind: type[IntEnum], value: int) -> str:
+    """The name of a value, or the value if it has none, for people."""
+    try:
+        return kind(value).name
+    except ValueError:
+        return str(value)

@@ -262,7 +262,7 @@ def paced(runtime_folder) -> Iterator[Hub]:
 
     thread = threading.Thread(target=answer)
     thread.start()
-    assert hub.await_paced(("r1",), 10.0) == ()
+    assert hub.await_paced({"r1": 1}, 10.0) == ()
     yield hub
     hub.close("the test is over")
     thread.join()

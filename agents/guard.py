@@ -1,0 +1,229 @@
+"""Stands between the law and the drives: phases, faults, limits. The table is in `agents.agent`.
+
+What the law asks for gets through whole, limited, or not at all; after arming again the law begins
+anew. Torque is sent in one place, while the phase is DRIVING and nothing is wrong in that tick.
+"""
+
+from collections.abc import Sequence
+from enum import Enum, auto
+from math import isfinite
+from typing import NamedTuple
+
+from agents.limits import TorqueLimiter
+from agents.rearming import Rearming
+from bridge.drives import DRIVES, DriveClient
+from bridge.drives.dry_run import DryRun
+from bridge.frame import Frame
+from configs.brief import AgentBrief
+from configs.errors import InfrastructureError
+
+MAX_EVENTS = 64
+
+
+class Phase(Enum):
+    """What a controller is about."""
+
+    ARMING = auto()
+    READY = auto()
+    DRIVING = auto()
+    STOPPED = auto()
+    REARMING = auto()
+    DONE = auto()
+
+
+class Passed(Enum):
+    """What became of the law's torques."""
+
+    WHOLE = auto()
+    LIMITED = auto()  # what the law would learn from this tick is the limit
+    NOTHING = auto()
+    ANEW = auto()  # nothing, and the law begins again with the next tick
+
+
+WHOLE = Passed.WHOLE
+_DRIVING = Phase.DRIVING
+
+
+class Event(NamedTuple):
+    """A change of phase that wasn't the plan."""
+
+    tick: int
+    phase: Phase
+    reason: str
+
+    def __str__(self) -> str:
+        """For people."""
+        return f"tick {self.tick}: {self.phase.name}{': ' if self.reason else ''}{self.reason}"
+
+
+class Guard:
+    """Keeps one robot's drives. Told everything, asks nothing."""
+
+    def __init__(self, brief: AgentBrief) -> None:
+        host, schedule = brief.host, brief.schedule
+        client = DRIVES[brief.drives.protocol].client(brief.drives)
+        self.drives: DriveClient = DryRun(client) if host.dry_run else client
+        self.phase = Phase.ARMING
+        self.begun = False
+        """Whether tick 0 has come."""
+        self.passed = Passed.NOTHING
+        """What became of the torques of this tick."""
+        self.stopped_because = ""
+        """Why the robot stands still now, "" if it doesn't."""
+        self.events: list[Event] = []
+        self.bus_fault: str | None = None
+        """Why nothing can be sent; whoever sends says so."""
+        self._brief = brief
+        self._bus_time_ns = schedule.bus_time_ns
+        self._limiter = TorqueLimiter(
+            host.torque_limit_N_m, host.torque_slew_limit_N_m_s, schedule.period_s
+        )
+        self._pose_age_ticks = -(-host.pose_age_limit_ns // schedule.period_ns)
+        self._pose_until = self._pose_age_ticks if host.pose_age_limit_ns else schedule.ticks
+        """The last tick that the newest fix is good for."""
+        self._doubts: dict[str, str] = {}  # by sensor: why it isn't to be believed
+        self._rearming = Rearming(host)
+        self._refusal: str | None = None  # came while READY, and is a person's to clear
+
+    # --- what is noticed elsewhere ---------------------------------------------------------------
+
+    def note_pose(self, tick: int) -> None:
+        """The localisation system said where the robot was at this tick."""
+        if self._pose_age_ticks:
+            self._pose_until = tick + self._pose_age_ticks
+
+    def note_doubt(self, sensor: str, reason: str | None) -> None:
+        """Why a sensor isn't to be believed now, None if it is."""
+        if reason is not None:
+            self._doubts[sensor] = reason
+        elif self._doubts:
+            self._doubts.pop(sensor, None)
+
+    def note_unsent(self, tick: int) -> None:
+        """The frames of this tick did not get onto the bus: arming has lost a step."""
+        if not self.begun:
+            self.phase = Phase.ARMING
+            self.drives.disarm()
+        elif self.phase is Phase.REARMING:
+            self._stop(tick, "could not arm again: a frame of it was not sent")
+
+    # --- before tick 0 ---------------------------------------------------------------------------
+
+    def arm(self, tick: int) -> Sequence[Frame]:
+        """On the way to closed loop, or waiting in it.
+
+        Raises:
+            InfrastructureError: the drives were not heard when control had to start.
+        """
+        if tick >= 0:
+            self.begin(tick)
+        drives, now_ns = self.drives, self._bus_time_ns(tick)
+        if self._refusal is not None:
+            return drives.rest(now_ns)
+        if not drives.armed:
+            return drives.arm(now_ns)
+        if drives.fault(now_ns) is None:
+            self.phase = Phase.READY
+            return drives.torque(0.0, 0.0)
+        self.phase = Phase.ARMING
+        self._refusal = drives.refusal()
+        return drives.disarm()
+
+    def begin(self, tick: int) -> None:
+        """Tick 0 has come.
+
+        Raises:
+            InfrastructureError: the drives were not armed when control had to start.
+        """
+        now_ns, drives = self._bus_time_ns(tick), self.drives
+        reason = self._refusal or self.bus_fault or drives.fault(now_ns)
+        if reason is None and self.phase is not Phase.READY:
+            reason = drives.missing(now_ns) or "armed in the last tick only"
+            reason += "; a longer clock.countdown_s helps"
+        if reason is not None:
+            raise InfrastructureError(
+                f"{self._brief.robot}: drives not armed when control had to start: {reason}"
+            )
+        self.begun = True
+        self.phase = _DRIVING
+
+    # --- from tick 0 on --------------------------------------------------------------------------
+
+    def act(self, tick: int, right: float, left: float) -> Sequence[Frame]:
+        """The frames of a tick at which the law asks for these torques [N·m]; see `passed`."""
+        drives, now_ns = self.drives, self._bus_time_ns(tick)
+        self.passed = Passed.NOTHING
+        if self.phase is not _DRIVING:
+            return self._come_back(tick, now_ns)
+        fault = drives.fault(now_ns)
+        if fault is None and (tick > self._pose_until or self._doubts or self.bus_fault):
+            fault = self._own_fault(tick)
+        if fault is None and not isfinite(right + left):
+            fault = "the law asks for a torque that is not finite"
+        if fault is not None:
+            return self._stop(tick, fault)
+        self.passed = WHOLE
+        if self._limiter.active:
+            limited = self._limiter(right, left)
+            if limited != (right, left):
+                self.passed = Passed.LIMITED
+            right, left = limited
+        return drives.torque(right, left)
+
+    def leave(self) -> Sequence[Frame]:
+        """Disarm for good; latched at the drives if the scenario wants that."""
+        self.phase = Phase.DONE
+        frames = self.drives.disarm()
+        if self._brief.host.estop_on_exit:
+            return [*frames, *self.drives.estop()]
+        return frames
+
+    def notices(self) -> list[str]:
+        """What a report should say beside the numbers, in words."""
+        dry = ["dry run: nothing was sent to the drives"] if self._brief.host.dry_run else []
+        return [*dry, *map(str, self.events), *self.drives.notices]
+
+    def _own_fault(self, tick: int) -> str | None:
+        """What is wrong beside the drives, None if nothing is."""
+        if self.bus_fault:
+            return self.bus_fault
+        if tick > self._pose_until:
+            age = tick - self._pose_until + self._pose_age_ticks
+            age_s = age * self._brief.schedule.period_s
+            return f"no pose from the localisation system for {age_s:.2f} s"
+        return next(iter(self._doubts.values()), None)
+
+    def _stop(self, tick: int, reason: str) -> Sequence[Frame]:
+        """Take the torque from both wheels."""
+        self.stopped_because = f"tick {tick}: {reason}"
+        self._change(tick, Phase.STOPPED, reason)
+        return self.drives.disarm()
+
+    def _come_back(self, tick: int, now_ns: int) -> Sequence[Frame]:
+        """Wait until nothing stands in the way; then the whole way of arming, to torque 0."""
+        drives, rearming = self.drives, self._rearming
+        if self.phase is Phase.STOPPED:
+            if rearming.hopeless or not rearming.may_begin(self._obstacle(tick, now_ns), now_ns):
+                return drives.rest(now_ns)
+            self._change(tick, Phase.REARMING, "")
+            return drives.disarm()
+        obstacle = self._obstacle(tick, now_ns)
+        if obstacle is None and not drives.armed and rearming.late(now_ns):
+            obstacle = f"could not arm again: {drives.missing(now_ns)}"
+        if obstacle is not None:
+            return self._stop(tick, obstacle)
+        if not drives.armed:
+            return drives.arm(now_ns)
+        self._limiter.reset()
+        self.passed = Passed.ANEW
+        self.stopped_because = ""
+        self._change(tick, _DRIVING, "armed again")
+        return drives.torque(0.0, 0.0)
+
+    def _obstacle(self, tick: int, now_ns: int) -> str | None:
+        return self.drives.obstacle(now_ns) or self._own_fault(tick)
+
+    def _change(self, tick: int, phase: Phase, reason: str) -> None:
+        self.phase = phase
+        if len(self.events) < MAX_EVENTS:
+            self.events.append(Event(tick, phase, reason))

@@ -1,0 +1,80 @@
+"""What a controller lets through of its law's torques, and of what it is told of the motion.
+
+    |τ| ≤ τ_max,   |τ_k − τ_{k−1}| ≤ τ'_max h                    at each wheel           (1)
+    ε ← ε exp(−h/T) + (φ_k − φ_{k−1}) − h (ν_k + ν_{k−1})/2      encoder mismatch [rad]  (2)
+
+φ, ν angle [rad] and speed [rad/s] of a wheel   h control period [s]   T = `FORGET_S`
+
+(2) is near 0 for an encoder that is well: a jump of the angle, or a flipped sign, shows in it at
+once, a frozen angle or a wrong speed within T. Where the limit of (1) acts, the estimates of the
+law must hold still, as they do at the law's own limit: what they would learn is the limit.
+"""
+
+from math import exp, inf
+
+from agents.laws import LawState
+
+FORGET_S = 0.2
+
+
+class TorqueLimiter:
+    """Equation (1) for both wheels. Infinite limits let everything through unchanged."""
+
+    __slots__ = ("_last", "_limit", "_step", "active")
+
+    def __init__(self, limit_N_m: float, slew_N_m_s: float, period_s: float) -> None:
+        self._limit = limit_N_m
+        self._step = slew_N_m_s * period_s
+        self._last = (0.0, 0.0)
+        self.active = limit_N_m < inf or slew_N_m_s < inf
+        """Whether there is any limit at all."""
+
+    def __call__(self, right: float, left: float) -> tuple[float, float]:
+        """The torques that may be sent [N·m]."""
+        before_right, before_left = self._last
+        self._last = self._one(right, before_right), self._one(left, before_left)
+        return self._last
+
+    def reset(self) -> None:
+        """The wheels are without torque."""
+        self._last = (0.0, 0.0)
+
+    def _one(self, torque: float, before: float) -> float:
+        limit, step = self._limit, self._step
+        torque = min(max(torque, before - step), before + step)
+        return min(max(torque, -limit), limit)
+
+
+def held_still(before: LawState | None, after: LawState) -> LawState:
+    """The next state of a law whose torque was limited: filters go on, estimates don't."""
+    if before is None:
+        return after
+    return after._replace(theta_1=before.theta_1, theta_2=before.theta_2, kappa=before.kappa)
+
+
+class EncoderCheck:
+    """Equation (2) for both wheels."""
+
+    __slots__ = ("_keep", "_last", "_left", "_limit", "_period_s", "_right", "active")
+
+    def __init__(self, limit_rad: float, period_s: float) -> None:
+        self._limit = limit_rad
+        self._period_s = period_s
+        self._keep = exp(-period_s / FORGET_S)
+        self._last: tuple[float, float, float, float] | None = None
+        self._right = self._left = 0.0
+        self.active = limit_rad < inf
+        """Whether there is a limit."""
+
+    def __call__(self, motion: tuple[float, float, float, float]) -> str | None:
+        """Why the encoders aren't to be believed, None if they are; once per period."""
+        last, self._last = self._last, motion
+        if last is None:
+            return None
+        half = 0.5 * self._period_s
+        self._right = self._keep * self._right + motion[0] - last[0] - half * (motion[2] + last[2])
+        self._left = self._keep * self._left + motion[1] - last[1] - half * (motion[3] + last[3])
+        for name, mismatch in (("right", self._right), ("left", self._left)):
+            if abs(mismatch) > self._limit:
+                return f"{name} encoder: angle and speed disagree by {abs(mismatch):.2g} rad"
+        return None

@@ -1,0 +1,66 @@
+"""A client that only listens: everything but torque, for a robot whose wheels must not turn.
+
+It hears and judges the drives like the client that it wraps, says `armed` once nothing is wrong
+with them, and answers every order with no frame at all, so somebody else may go on driving the
+robot meanwhile. `sent` is what would have been sent.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from bridge.frame import Frame
+
+if TYPE_CHECKING:
+    from bridge.drives import DriveClient
+
+_NOTHING: tuple[Frame, ...] = ()
+
+
+class DryRun:
+    """The controller's end of two drives, without a voice."""
+
+    def __init__(self, client: "DriveClient") -> None:
+        self._client = client
+        self.armed = False
+        self.sent = (0.0, 0.0)
+        self.hear: Callable[[int, bytes | bytearray, int], None] = client.hear
+        self.heard_since: Callable[[int], bool] = client.heard_since
+        self.motion: Callable[[], tuple[float, float, float, float] | None] = client.motion
+        self.obstacle: Callable[[int], str | None] = client.obstacle
+        self.refusal: Callable[[], str | None] = client.refusal
+        self.fault: Callable[[int], str | None] = client.fault
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What somebody else did to the drives."""
+        return self._client.notices
+
+    def arm(self, now_ns: int) -> Sequence[Frame]:
+        """Armed once nothing is wrong with the drives."""
+        self.armed = self._client.fault(now_ns) is None
+        return _NOTHING
+
+    def missing(self, now_ns: int) -> str:
+        """What is wrong with the drives."""
+        return self._client.fault(now_ns) or ""
+
+    def torque(self, right_Nm: float, left_Nm: float) -> Sequence[Frame]:
+        """What would have been sent."""
+        self._client.torque(right_Nm, left_Nm)
+        self.sent = self._client.sent
+        return _NOTHING
+
+    def rest(self, now_ns: int) -> Sequence[Frame]:  # noqa: ARG002
+        """Nothing to send."""
+        self.sent = (0.0, 0.0)
+        return _NOTHING
+
+    def disarm(self) -> Sequence[Frame]:
+        """Nothing to send."""
+        self.armed = False
+        self.sent = (0.0, 0.0)
+        return _NOTHING
+
+    def estop(self) -> Sequence[Frame]:
+        """Nothing to send: whoever drives the robot goes on."""
+        return self.disarm()

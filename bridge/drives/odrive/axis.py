@@ -1,0 +1,165 @@
+"""What a host knows of one ODrive axis, from its frames alone.
+
+    angle, speed    of the wheel, from the newest encoder frame whose numbers are finite
+    trouble         why its wheel must not be driven: errors, an e-stop seen on its way to it, two
+                    senders of its telemetry
+    heard_ns        bus time of its newest heartbeat, stamp_ns of its newest encoder frame
+
+Answers to somebody else's requests are told from a second sender by counting the requests.
+"""
+
+from math import pi
+
+from bridge.drives.odrive import frames as f
+from bridge.drives.odrive.cadence import LIMIT, Cadence
+from bridge.drives.odrive.frames import AxisError, AxisState, Command, ProcedureResult
+from bridge.frame import Frame
+from configs.brief import DriveLink
+
+NEVER = -(1 << 62)
+PASSING = AxisError.WATCHDOG_TIMER_EXPIRED | AxisError.INITIALIZING
+"""Errors that say no more than that drive and host had lost each other: a host may clear them by
+itself. All others, an e-stop above all, are a person's to clear."""
+
+
+class Axis:
+    """One drive and the wheel that it turns."""
+
+    __slots__ = (
+        "_doubled",
+        "_encoder_cadence",
+        "_heartbeat_cadence",
+        "_heartbeats",
+        "angle_rad",
+        "closed_loop",
+        "commanded",
+        "encoder_frames",
+        "errors",
+        "heard_ns",
+        "name",
+        "node",
+        "radians",
+        "result",
+        "speed_rad_s",
+        "stamp_ns",
+        "state",
+        "to_shaft",
+        "to_wheel",
+        "trouble",
+    )
+
+    def __init__(self, name: str, node: int, sign: int, link: DriveLink) -> None:
+        ratio = link.mounting.gear_ratio
+        self.name = f"{name} drive (node {node})"
+        self.node = node
+        self.radians = 2.0 * pi * sign / ratio
+        """Wheel angle per shaft revolution."""
+        self.to_shaft = sign / ratio
+        self.to_wheel = sign * ratio
+        """Torque at the wheel per torque at the shaft."""
+        self.angle_rad = self.speed_rad_s = 0.0
+        self.stamp_ns = NEVER
+        self.heard_ns: int | None = None
+        self.state = int(AxisState.UNDEFINED)
+        self.result = 0
+        self.closed_loop = False
+        self.errors = AxisError(0)
+        self.trouble = ""
+        self.commanded = 0
+        """Set-points and modes that somebody else sent to it."""
+        self.encoder_frames = 0
+        """Less those that somebody asked for."""
+        self._heartbeats = 0
+        self._doubled = ""
+        self._encoder_cadence = Cadence(link.encoder_period_ns)
+        self._heartbeat_cadence = Cadence(link.heartbeat_period_ns)
+
+    def frame(self, command: Command, data: bytes) -> Frame:
+        """A frame for this drive."""
+        return Frame(f.identifier(self.node, command), data)
+
+    # --- what is heard ---------------------------------------------------------------------------
+
+    def hear_heartbeat(self, data: bytes | bytearray, now_ns: int) -> bool:
+        """Take a heartbeat; False if it is a request for one, or none at all."""
+        if len(data) != f.HEARTBEAT.size:
+            self._heartbeats -= not data
+            return False
+        heartbeat = f.decode_heartbeat(data)
+        self._heartbeats += 1
+        self.heard_ns = now_ns
+        self.errors = heartbeat.errors
+        self.state, self.result = heartbeat.state, heartbeat.result
+        self.closed_loop = heartbeat.state == AxisState.CLOSED_LOOP_CONTROL
+        self._look_for_a_second_sender(now_ns)
+        self._note_trouble()
+        return True
+
+    def hear_request(self, command: Command) -> None:
+        """Somebody asked for a frame out of its turn: it is no sign of a second sender."""
+        if command is Command.HEARTBEAT:
+            self._heartbeats -= 1
+        else:
+            self.encoder_frames -= 1
+
+    def hear_estop(self) -> None:
+        """Somebody stopped it: known before its next heartbeat says so."""
+        self.errors |= AxisError.ESTOP_REQUESTED
+        self.closed_loop = False
+        self._note_trouble()
+
+    def _look_for_a_second_sender(self, now_ns: int) -> None:
+        encoder = self._encoder_cadence.judge(self.encoder_frames, now_ns)
+        heartbeat = self._heartbeat_cadence.judge(self._heartbeats, now_ns)
+        if encoder is None and heartbeat is None:
+            return
+        doubled = [
+            f"{ratio:.1f} times the {what} of one sender"
+            for what, ratio in (("encoder frames", encoder), ("heartbeats", heartbeat))
+            if ratio is not None and ratio > LIMIT
+        ]
+        self._doubled = " and ".join(doubled)
+
+    def _note_trouble(self) -> None:
+        if self.errors:
+            self.trouble = f" dropped out: {f.error_names(self.errors)}"
+        elif self._doubled:
+            self.trouble = (
+                f": {self._doubled}: a second drive with its node id, or a drive that is configured"
+                " to send faster"
+            )
+        else:
+            self.trouble = ""
+
+    # --- what follows ----------------------------------------------------------------------------
+
+    def ready_since(self, since_ns: int) -> bool:
+        """Whether it said after `since_ns` that it is in closed loop, and nothing is wrong."""
+        heard_ns = self.heard_ns
+        return (
+            heard_ns is not None and heard_ns > since_ns and self.closed_loop and not self.trouble
+        )
+
+    def absence(self, now_ns: int, link: DriveLink) -> str:
+        """Why it isn't there, "" if it is."""
+        if self.heard_ns is None:
+            return f"{self.name}: no heartbeat heard yet"
+        if now_ns - self.heard_ns > link.heartbeat_age_limit_ns:
+            return f"{self.name}: no heartbeat for {(now_ns - self.heard_ns) * 1e-9:.1f} s"
+        if self.stamp_ns == NEVER:
+            return f"{self.name}: no encoder frame heard yet"
+        if now_ns - self.stamp_ns > link.encoder_age_limit_ns:
+            return f"{self.name}: no encoder frames any more"
+        return ""
+
+    def obstacle(self) -> str:
+        """What a person has to mend before it may be armed, "" if there is nothing."""
+        if self.trouble and not (self.errors and not self.errors & ~PASSING):
+            return f"{self.name}{self.trouble}"
+        return ""
+
+    def why_not_closed(self) -> str:
+        """What it said of itself instead of closed loop."""
+        state = f.name_of(AxisState, self.state)
+        result = f.name_of(ProcedureResult, self.result)
+        return f"{self.name}: no closed loop reported yet; it is {state}, last result {result}"

@@ -1,0 +1,237 @@
+"""What errors of a CAN interface do in real time: the table in `agents.bus_health`."""
+
+import errno
+from collections import deque
+from dataclasses import replace
+from types import SimpleNamespace
+
+import can
+import pytest
+from robot_bench import ZERO, Bench, set_points
+
+import agents.realtime
+from agents.bus_health import TOLERATED_NS, BusHealth
+from agents.guard import Phase
+from agents.realtime import RealtimeLoop
+from bridge.barrier import Hellos
+from bridge.can_bus.convert import to_frame, to_message
+from bridge.frame import ERR, Frame
+from bridge.messages import PoseFix
+from bridge.process import Stop
+from configs.errors import InfrastructureError, PeerLostError
+
+S = 1_000_000_000
+DOWN = can.CanOperationError("Failed to transmit: [Errno 100] Network is down", errno.ENETDOWN)
+FULL = can.CanOperationError("Failed to transmit: [Errno 105] No buffer space", errno.ENOBUFS)
+REARM = ("host.rearm=true", "clock.mode='realtime'", "clock.countdown_s=0.3")
+
+
+def test_our_own_bus_is_gone_with_its_first_error_but_a_full_queue() -> None:
+    health = BusHealth("r1", 0)
+    health.failed(FULL, 0)
+    with pytest.raises(PeerLostError, match="r1: lost its bus"):
+        health.failed(DOWN, 1)
+
+
+def test_errors_of_another_interface_are_borne_up_to_the_limit() -> None:
+    health = BusHealth("r1", 5 * S)
+    for now_ns in range(0, 5 * S + 1, S // 10):
+        health.failed(DOWN, now_ns)
+    with pytest.raises(InfrastructureError, match=r"r1: gave up its bus after 5\.1 s of errors"):
+        health.failed(OSError(errno.ENODEV, "No such device"), 5 * S + S // 10)
+
+
+def test_one_success_begins_the_count_anew() -> None:
+    health = BusHealth("r1", 5 * S)
+    health.failed(DOWN, 0)
+    health.sent()
+    assert health.fault(10 * S) is None
+    health.failed(DOWN, 10 * S)
+    assert health.fault(10 * S) is None
+    assert health.fault(10 * S + TOLERATED_NS) == f"bus error: {DOWN}"
+
+
+def test_a_full_queue_is_a_fault_when_it_lasts_and_never_the_end() -> None:
+    health = BusHealth("r1", 5 * S)
+    for now_ns in range(0, 60 * S, S):
+        health.failed(FULL, now_ns)
+    assert health.unsent == 60
+    assert health.errors == 0
+    assert "No buffer space" in health.fault(60 * S)
+
+
+class Clock(SimpleNamespace):
+    """A monotonic clock that moves when somebody waits."""
+
+    now_ns = 10 * S
+
+    def monotonic_ns(self) -> int:
+        self.now_ns += 1000
+        return self.now_ns
+
+    def monotonic(self) -> float:
+        return self.now_ns * 1e-9
+
+    def sleep(self, seconds: float) -> None:
+        self.now_ns += round(seconds * 1e9)
+
+
+class Wire(can.BusABC):
+    """A hardware interface with the two drives of a bench on it, that can be taken down."""
+
+    def __init__(self, bench: Bench, clock: Clock, power_up_ns: int) -> None:
+        super().__init__(channel="can0")
+        self.bench, self.clock, self.power_up_ns = bench, clock, power_up_ns
+        self.error: Exception | None = None
+        self.told = False  # SocketCAN says once on reception that its interface went down
+        self.inbox: deque[Frame] = deque()
+        self.log: list[tuple[int, Frame]] = []
+        self.plan: dict[int, Exception | None] = {}  # by bus time
+
+    @property
+    def bus_ns(self) -> int:
+        return self.clock.now_ns - self.power_up_ns
+
+    def _live(self) -> None:
+        for at_ns in [at_ns for at_ns in self.plan if at_ns <= self.bus_ns]:
+            self.error, self.told = self.plan.pop(at_ns), False
+        for axis in self.bench.axes:
+            frames = axis.due(self.bus_ns)
+            if self.error is None:
+                self.inbox.extend(frames)
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:  # noqa: ARG002
+        self._live()
+        if self.error is not None:
+            raise self.error
+        frame = to_frame(msg)
+        self.log.append((self.bus_ns, frame))
+        for axis in self.bench.axes:
+            axis.hear(frame, self.bus_ns)
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        self._live()
+        if not self.inbox and timeout:
+            self.clock.now_ns += min(round(timeout * 1e9), 200_000)
+            self._live()
+        if self.error is not None and not self.told and self.error is not FULL:
+            self.told = True
+            raise self.error
+        return to_message(*self.inbox.popleft()) if self.inbox else None
+
+
+class PoseLink:
+    """A network on which the localisation system speaks every 10 ms, and nobody else."""
+
+    def __init__(self, bench: Bench, clock: Clock, epoch_ns: int) -> None:
+        self.bench, self.clock, self.epoch_ns = bench, clock, epoch_ns
+
+    def receive(self, _timeout_s: float) -> None:
+        period_ns = self.bench.schedule.period_ns
+        tick = (self.clock.now_ns - self.epoch_ns) // period_ns
+        if self.bench.schedule.localises(tick) and self.bench.pose is not None:
+            self.bench.agent.take_pose(PoseFix(tick, tick * period_ns, *self.bench.pose))
+
+
+class Rig:
+    """A controller's loop in real time on a wire, by a clock of its own."""
+
+    def __init__(self, monkeypatch, *overrides: str, duration_s: float = 3.0, ours=False) -> None:
+        self.clock = Clock()
+        monkeypatch.setattr(agents.realtime, "time", self.clock)
+        self.bench = Bench("r1", *overrides, f"duration_s={duration_s}")
+        if not ours:
+            host = self.bench.agent.brief.host
+            host = replace(host, bus_error_limit_ns=2 * S)
+            self.bench = Bench("r1", *overrides, f"duration_s={duration_s}", host=host)
+        schedule = self.bench.schedule
+        epoch_ns = self.clock.now_ns + schedule.countdown_ticks * schedule.period_ns
+        self.wire = Wire(self.bench, self.clock, epoch_ns - schedule.bus_time_ns(0))
+        self.link = PoseLink(self.bench, self.clock, epoch_ns)
+        path = SimpleNamespace(put=lambda _: None)
+        self.loop = RealtimeLoop(self.bench.agent, self.wire, self.link, path, Hellos())
+        self.epoch_ns = epoch_ns
+
+    def run(self) -> None:
+        try:
+            self.loop.run(self.epoch_ns, Stop())
+        finally:
+            self.wire.shutdown()
+
+    @property
+    def events(self) -> list[str]:
+        return [str(event) for event in self.bench.agent.guard.events]
+
+
+def test_an_interface_taken_down_and_up_is_survived_and_driven_on_after_arming(monkeypatch) -> None:
+    rig = Rig(monkeypatch, *REARM)
+    down_ns, up_ns = 13 * S // 10, 19 * S // 10
+    rig.wire.plan = {down_ns: DOWN, up_ns: None}
+    rig.run()
+    phases = [event.phase for event in rig.bench.agent.guard.events]
+    assert phases == [Phase.STOPPED, Phase.REARMING, Phase.DRIVING], rig.events
+    assert rig.loop.counters.bus_errors > 100
+    assert rig.bench.agent.guard.stopped_because == ""
+    after = [frame for at_ns, frame in rig.wire.log if at_ns >= up_ns]
+    driven = [n for n, frame in enumerate(after) if set_points([frame]) not in ([], [ZERO])]
+    clearing = [n for n, frame in enumerate(after) if frame.can_id == 0x018]
+    assert clearing
+    assert driven
+    assert clearing[0] < driven[0]
+    assert set_points(after[:2]) == [ZERO, ZERO]
+
+
+def test_a_bus_that_stays_down_ends_the_controller_with_the_reason(monkeypatch) -> None:
+    rig = Rig(monkeypatch, *REARM, duration_s=6.0)
+    rig.wire.plan = {S: DOWN}
+    with pytest.raises(InfrastructureError, match=r"r1: gave up its bus after 2\.0 s.*is down"):
+        rig.run()
+    assert rig.bench.phase is Phase.STOPPED
+
+
+def test_our_own_bus_that_fails_ends_the_controller_at_once(monkeypatch) -> None:
+    rig = Rig(monkeypatch, *REARM, ours=True)
+    rig.wire.plan = {S: DOWN}
+    with pytest.raises(PeerLostError):
+        rig.run()
+    assert rig.wire.bus_ns < S + S // 50
+
+
+def test_a_full_transmit_queue_stops_the_robot_and_it_comes_back(monkeypatch) -> None:
+    rig = Rig(monkeypatch, *REARM)
+    rig.wire.plan = {S: FULL, 15 * S // 10: None}
+    rig.run()
+    phases = [event.phase for event in rig.bench.agent.guard.events]
+    assert phases == [Phase.STOPPED, Phase.REARMING, Phase.DRIVING], rig.events
+    assert rig.loop.counters.unsent > 10
+
+
+def test_an_error_for_one_moment_stops_nothing(monkeypatch) -> None:
+    rig = Rig(monkeypatch, *REARM)
+    rig.wire.plan = {S: FULL, S + 5_000_000: None}
+    rig.run()
+    assert rig.events == []
+    assert 1 <= rig.loop.counters.unsent <= 4
+
+
+def test_an_interface_that_comes_up_during_the_countdown_is_armed(monkeypatch) -> None:
+    rig = Rig(monkeypatch, "clock.mode='realtime'", "clock.countdown_s=1.0", duration_s=0.5)
+    rig.wire.plan = {0: DOWN, S // 2: None}
+    rig.run()
+    assert rig.events == []
+
+
+def test_drives_that_never_speak_end_it_at_tick_0(monkeypatch) -> None:
+    rig = Rig(monkeypatch, "clock.mode='realtime'", "clock.countdown_s=0.5")
+    rig.bench.axes.clear()
+    with pytest.raises(InfrastructureError, match="no heartbeat heard yet"):
+        rig.run()
+    assert rig.wire.bus_ns < S
+
+
+def test_error_frames_are_counted_and_are_no_drives(monkeypatch) -> None:
+    rig = Rig(monkeypatch, *REARM, duration_s=0.2)
+    rig.wire.inbox.extend([Frame(ERR | 0x004, bytes(8)), Frame(ERR | 0x002, bytes(8))])
+    rig.run()
+    assert rig.loop.counters.error_frames == 2
+    assert rig.events == []
