@@ -24,7 +24,7 @@ from bridge.can_bus import places
 from bridge.can_bus.ends import DriveEnd
 from bridge.can_bus.hub import Hub
 from bridge.process import Stop, go_realtime, name_process, settled_memory
-from bridge.telemetry import PLANT_ROW, RowBuffer
+from bridge.telemetry import PLANT_ROW, PLANT_SIGNALS, RowBuffer
 from configs.brief import NetworkLink, PlantBrief, Settings
 from configs.briefing import plant_brief
 from configs.deployment import PLANT, Deployment, load_deployment
@@ -42,6 +42,7 @@ from plant.unit import Unit, unit_of
 FOREVER_TICKS = 1 << 53
 GO_AHEAD_NS = 1_000_000
 INTERRUPTED = 130
+_ROW_NAMES = [signal.name for signal in PLANT_SIGNALS]
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,14 +212,14 @@ def _serve_stdin(units: Sequence[Unit], loop: RealtimeLoop, stop: Stop) -> None:
 def _poses(units: Sequence[Unit], loop: RealtimeLoop) -> dict[str, Any]:
     robots = {}
     for unit in units:
-        state, row = unit.state, unit.row(0.0)
+        state, row = unit.state, dict(zip(_ROW_NAMES, unit.row(0.0), strict=True))
         robots[unit.brief.robot] = {
             "x_m": state.x,
             "y_m": state.y,
             "theta_rad": state.theta,
             "v_m_s": state.v,
             "omega_rad_s": state.omega,
-            "torque_right_N_m": row[-2],
-            "torque_left_N_m": row[-1],
+            "torque_right_N_m": row["motor_right_Nm"],
+            "torque_left_N_m": row["motor_left_Nm"],
         }
     return {"t_s": loop.progress().t_ns * 1e-9, "robots": robots}

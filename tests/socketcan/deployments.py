@@ -6,6 +6,9 @@ from pathlib import Path
 SLOW_GUEST = (
     # One emulated processor stands still for a tenth of a second now and then.
     *("--set", "drive.watchdog_s=1.0"),
+    *("--set", "host.encoder_age_limit_s=0.5"),
+    *("--set", "host.heartbeat_age_limit_s=1.0"),
+    *("--set", "host.pose_age_limit_s=1.0"),
     *("--set", "clock.countdown_s=1.0"),
     *("--set", "clock.tick_deadline_s=10.0"),
     *("--set", "clock.share_period_s=0.05"),

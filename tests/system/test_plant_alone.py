@@ -99,12 +99,12 @@ def messages(bus: can.BusABC, seconds: float) -> list[can.Message]:
 
 
 def test_it_is_ready_within_a_second() -> None:
-    took = []
-    for _ in range(3):
+    took: list[float] = []
+    while len(took) < 5 and not any(seconds < 1.0 for seconds in took):  # others use the machine
         began = time.monotonic()
         with EmulatedPlant("two_robots"):
             took.append(time.monotonic() - began)
-    assert min(took) < 1.0
+    assert min(took) < 1.0, took
 
 
 def test_only_the_named_robots_have_a_bus(fleetloop_plant) -> None:
