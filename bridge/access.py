@@ -15,6 +15,10 @@ each process is bound to its identity by a random password that it alone is give
                 puts   their poses
                 hears  @clock/go
 
+    a guest            a client of buses on another machine
+                puts   its lines up, its token; which buses it may open is the relay's to say
+                hears  its lines down
+
 Plant and controllers may watch the launcher's token: on other machines, its end is how they learn
 that the run is over. Who comes from another machine has a password that was agreed on before, or a
 certificate whose common name is the identity; then the password is no secret and proves nothing.
@@ -104,6 +108,7 @@ def plan(
     buses: Sequence[str] = (),
     witnessed: Collection[str] = (),
     guests: Mapping[str, str] | None = None,
+    bus_guests: Collection[str] = (),
     certified: bool = False,
 ) -> AccessPlan:
     """The rights of a run from its graph: `hears[i]` are the robots that i hears, `leader` h_i.
@@ -145,6 +150,12 @@ def plan(
         hears=(*truths, *(keys.telemetry(run, robot) for robot in robots)),
         token=keys.live(run, RECORDER),
     )
+    for user in bus_guests:
+        rights[user] = Rights(
+            puts=(keys.guest_lines("up", user),),
+            hears=(keys.guest_lines("down", user),),
+            token=keys.guest_lines("alive", user),
+        )
     known = dict(guests or {})
     passwords = {user: known.get(user) or secrets.token_urlsafe(24) for user in rights}
     return AccessPlan(rights, passwords, frozenset(known if certified else ()))

@@ -10,6 +10,7 @@
     fleetloop/<run>/@clock/go                from the launcher to plant and controllers
     fleetloop/<run>/@progress/<process>      how far a process is, to the launcher
     fleetloop/<run>/@report/<process>        a process's last word, to the launcher
+    fleetloop/@guest/<user>/<line>/<bus>/..  a client of a bus on another machine: up, down, alive
 
 A process is `launcher`, `plant`, `recorder` or `agent/<robot>`. Chunks that begin with @ are
 verbatim: no wildcard of data subscriptions matches them.
@@ -75,6 +76,22 @@ def progress(run: str, process: str) -> str:
 def report(run: str, process: str) -> str:
     """Where a process says its last word."""
     return f"{_run(run)}/@report/{_process(process)}"
+
+
+def guest_line(user: str, line: str, bus: str) -> str:
+    """Where a guest talks to a bus; its keys end in up, down and alive."""
+    return f"fleetloop/@guest/{_chunk(user)}/{_chunk(line)}/{_chunk(bus)}"
+
+
+def guest_lines(end: str, user: str = "*") -> str:
+    """All lines of all guests, or of one."""
+    return f"fleetloop/@guest/{user}/*/*/{end}"
+
+
+def guest_of(place: str) -> tuple[str, str]:
+    """The user and the bus of a guest's line."""
+    parts = place.split("/")
+    return parts[2], parts[4]
 
 
 def process_of(key: str) -> str:

@@ -60,6 +60,11 @@ class Stop:
             self.requested = True
             os.eventfd_write(self.wake_fd, 1)
 
+    def requested_soon(self) -> bool:
+        """Whether it is asked for, or will be at once: who lost a peer may stop for its cause."""
+        select.select([self.wake_fd], [], [], _SAME_CAUSE_S)
+        return self.requested
+
     def release(self) -> None:
         """The launcher has heard the last word, or will never hear it."""
         os.eventfd_write(self.release_fd, 1)
@@ -128,7 +133,7 @@ def serve(kind: type[_Brief], body: Callable[[_Brief, Stop], str | None], *, nam
     except FleetloopError as error:
         peer_lost = isinstance(error, PeerLostError)
         if peer_lost:
-            select.select([stop.wake_fd], [], [], _SAME_CAUSE_S)
+            stop.requested_soon()
         if stop.reason != LAUNCHER_GONE:
             _say(Status(str(error), error.exit_code, type(error).__name__), name)
             return error.exit_code

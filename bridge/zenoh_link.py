@@ -75,6 +75,22 @@ class ZenohLink:
             )
         )
 
+    def each(self, key: str, act: Callable[[bytes], None]) -> None:
+        """Call `act`, on the network's thread, with what others put on `key`."""
+        self.each_keyed(key, lambda _, payload: act(payload))
+
+    def each_keyed(self, key_expr: str, act: Callable[[str, bytes], None]) -> None:
+        """Call `act`, on the network's thread, with key and payload of what others put."""
+
+        def take(sample: zenoh.Sample) -> None:
+            act(str(sample.key_expr), sample.payload.to_bytes())
+
+        self._declared.append(
+            self._session.declare_subscriber(
+                key_expr, Callback(take, indirect=False), allowed_origin=zenoh.Locality.REMOTE
+            )
+        )
+
     def declare_live(self, key: str) -> None:
         """Hold a liveliness token on `key`."""
         self._tokens[key] = self._session.liveliness().declare_token(key)
@@ -85,10 +101,14 @@ class ZenohLink:
 
     def on_gone(self, key: str, act: Callable[[], None]) -> None:
         """Call `act`, on the network's thread, when the token on `key` goes, or the way to it."""
+        self.each_gone(key, lambda _: act())
+
+    def each_gone(self, key: str, act: Callable[[str], None]) -> None:
+        """Call `act`, on the network's thread, with the key of every token that goes."""
 
         def take(sample: zenoh.Sample) -> None:
             if sample.kind == zenoh.SampleKind.DELETE:
-                act()
+                act(str(sample.key_expr))
 
         self._declared.append(
             self._session.liveliness().declare_subscriber(

@@ -80,6 +80,11 @@ class NetworkSection(Section):
         description="lines identity:password, all of them at the router, its own on a robot",
     )
     tls: TlsSection | None = Field(None, description="certificates instead of passwords")
+    guests: dict[Name, Annotated[tuple[str, ...], Field(strict=False)]] = Field(
+        default_factory=dict,
+        description="who may open which buses with can.Bus(endpoint=...) from another machine;"
+        ' "*" for all',
+    )
 
 
 class Deployment(Section):
@@ -225,6 +230,14 @@ def _problems(deployment: Deployment, scenario: Scenario) -> list[Problem]:
     if deployment.roles is not None and deployment.elsewhere(scenario) and not realtime:
         right = 'roles elsewhere need clock.mode = "realtime"; add --clock realtime'
         problems.append(Problem("roles", list(deployment.roles), right))
+    for user, buses in (deployment.network.guests if deployment.network else {}).items():
+        problems += [
+            Problem(f"network.guests.{user}", bus, f"no such bus: {', '.join(scenario.buses)} or *")
+            for bus in buses
+            if bus not in (*scenario.buses, "*")
+        ]
+        if user in roles or user.startswith("agent-") or user in ("plant", "recorder", "launcher"):
+            problems.append(Problem(f"network.guests.{user}", user, "is a role's name"))
     places: dict[tuple[object, object], str] = {}
     for robot, section in deployment.robot.items():
         key = f"robot.{robot}"

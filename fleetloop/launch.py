@@ -20,6 +20,7 @@ from pathlib import Path
 
 from bridge import access, keys
 from bridge.can_bus import places
+from bridge.can_bus.relay import Relay
 from bridge.clock import wall_of
 from bridge.link import Arrival, Link
 from bridge.messages import Go, LeaderSpeed, Progress, Report
@@ -138,7 +139,13 @@ class ProcessRun:
                     for user, password in plan.passwords.items()
                 }
                 spawn(self._orders, links, folder, self._children)
-                yield link
+                granted = placing.bus_guests(self._deployment)
+                with (
+                    Relay(link, folder, scenario.buses, granted)
+                    if granted
+                    else contextlib.nullcontext()
+                ):
+                    yield link
         finally:
             places.remove_run_folder(folder)
 

@@ -47,6 +47,11 @@ def outside(deployment: Deployment) -> Outside | None:
     return Outside(network.listen or network.endpoint, tls_files(network))
 
 
+def bus_guests(deployment: Deployment) -> Mapping[str, tuple[str, ...]]:
+    """Who may open which buses from other machines."""
+    return {} if deployment.network is None else deployment.network.guests
+
+
 def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
     """Passwords of those who come from elsewhere, by identity.
 
@@ -56,6 +61,7 @@ def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
     identities = [access.user_of(role) for role in deployment.elsewhere(scenario)]
     if any(not deployment.emulates(robot) for robot in scenario.names):
         identities.append(access.LOCALISATION)
+    identities += bus_guests(deployment)
     return passwords(deployment.network, tuple(identities))
 
 
@@ -74,6 +80,7 @@ def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.
         buses=scenario.buses,
         witnessed=[robot for robot in scenario.names if not deployment.emulates(robot)],
         guests=guests(scenario, deployment),
+        bus_guests=tuple(bus_guests(deployment)),
         certified=network is not None and network.tls is not None,
     )
 

@@ -26,7 +26,7 @@ from bridge.profile import Sampler
 from bridge.telemetry import PLANT_ROW, FrameBuffer, RowBuffer
 from bridge.zenoh_link import open_client
 from configs.brief import PlantBrief, Settings
-from configs.errors import FleetloopError, InfrastructureError
+from configs.errors import FleetloopError, InfrastructureError, PeerLostError
 from plant.loop import Counters, LockstepLoop, bus_frames
 from plant.realtime import RealtimeLoop
 from plant.unit import unit_of
@@ -132,7 +132,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
     began_ns = cpu_ns()
     try:
         with sampler if brief.schedule.profile else nullcontext():
-            body(stop)
+            _body(body, stop)
         end.close(stop.reason or "end of the run")
     except FleetloopError as error:
         end.close(str(error))
@@ -157,6 +157,15 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
         report.put(Report(values).encode())
         stop.await_release()
     return counters
+
+
+def _body(body: Callable[[Stop], None], stop: Stop) -> None:
+    """Run the loop; that controllers left first when all were to stop is no failure."""
+    try:
+        body(stop)
+    except PeerLostError:
+        if not stop.requested_soon():
+            raise
 
 
 def _await_go(brief: PlantBrief, link: Link, hellos: Hellos, stop: Stop) -> None:

@@ -1,6 +1,7 @@
 """The python-can interface `fleetloop`: an emulated bus that any python-can program opens by name.
 
     can.Bus(interface="fleetloop", channel="r1")
+    can.Bus(interface="fleetloop", channel="r1", endpoint="tls/host:7447", user="bench", ...)
 
 Works between processes, without kernel module or root; lossless and in order for who reads; no echo
 of own frames unless asked; classic CAN only. `Message.timestamp` is bus time: seconds since the bus
@@ -13,9 +14,7 @@ with nothing left to read says: that was all until now.
 """
 
 import errno
-import select
 import socket
-import struct
 import time
 from collections import deque
 from typing import Any
@@ -26,11 +25,12 @@ from can.typechecking import AutoDetectedConfig, CanFilters
 from bridge.can_bus import packet as wire
 from bridge.can_bus import places
 from bridge.can_bus.convert import to_frame, to_message
+from bridge.can_bus.lines import Line, UnixLine
 from bridge.frame import Frame
+from configs.brief import TlsFiles
+from configs.errors import ScenarioError
 
-FINE_S = 0.05
-"""Waits below this are kept to the microsecond; the kernel's own bound counts in its ticks."""
-_TIMEVAL = struct.Struct("ll")
+_REMOTE = frozenset({"endpoint", "user", "password", "ca", "certificate", "private_key"})
 _new = tuple.__new__  # of a frame, past its constructor: this is the hot path
 _IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ignore_config"})
 
@@ -51,6 +51,9 @@ class FleetloopBus(can.BusABC):
         receive_own_messages: frames sent come back, with `is_rx` False.
         connect_timeout: how long to wait for the bus to answer [s].
         fd: must be False; the bus is classic CAN.
+        endpoint: from another machine, where the run's router is, for example tls/host:7447.
+        user, password: who is known there; with TLS the user is the certificate's common name.
+        ca, certificate, private_key: files of mutual TLS, in PEM.
 
     Raises:
         can.CanInitializationError: no such bus, or it refused; the text names what there is.
@@ -68,10 +71,16 @@ class FleetloopBus(can.BusABC):
         fd: bool = False,
         **kwargs: Any,
     ) -> None:
-        if unknown := sorted(kwargs.keys() - _IGNORED):
+        remote = {key: str(kwargs.pop(key)) for key in _REMOTE if kwargs.get(key) is not None}
+        if unknown := sorted(kwargs.keys() - _IGNORED - _REMOTE):
             raise TypeError(f"the fleetloop interface has no option {', '.join(unknown)}")
         if fd:
             raise can.CanInitializationError(f"bus {channel!r} is classic CAN: fd must be False")
+        if remote and not {"endpoint", "user"} <= remote.keys():
+            raise can.CanInitializationError(
+                f"bus {channel!r}: from another machine give endpoint and user, with a password or"
+                f" with ca, certificate and private_key; given: {', '.join(sorted(remote))}"
+            )
         self._paced = bool(paced)
         self._gathered = gathered or self._paced
         self._name = paced if isinstance(paced, str) else socket.gethostname()
@@ -82,37 +91,58 @@ class FleetloopBus(can.BusABC):
         self._closed_because: str | None = None
         self._queue = 0  # frames that may wait at this node; 0: frames take no time
         self._said = self._gone = 0  # frames sent, and how many of them have left the queue
-        self._timeout: float | None = None
         self.channel = str(channel)
-        self._socket = self._connect(receive_own_messages, connect_timeout)
-        self._send_now = self._socket.send
+        self._line = self._connect(receive_own_messages, connect_timeout, remote)
+        self._send_now, self._next = self._line.send, self._line.receive
         self.channel_info = f"fleetloop bus {self.channel}"
         self._can_protocol = can.CanProtocol.CAN_20
         super().__init__(channel=self.channel, can_filters=can_filters)
 
-    def _connect(self, own: bool, timeout_s: float) -> socket.socket:
-        sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    def _open_line(self, hello: bytes, timeout_s: float, remote: dict[str, str]) -> Line:
+        if not remote:
+            return UnixLine(places.find(self.channel), hello, timeout_s)
+        # Zenoh costs nobody anything who doesn't need it.
+        from bridge.can_bus.remote import RemoteLine
+
+        tls = None
+        if "ca" in remote:
+            tls = TlsFiles(
+                remote["ca"], remote.get("certificate", ""), remote.get("private_key", "")
+            )
+        return RemoteLine(
+            remote["endpoint"],
+            self.channel,
+            hello,
+            timeout_s,
+            user=remote["user"],
+            password=remote.get("password", ""),
+            tls=tls,
+        )
+
+    def _connect(self, own: bool, timeout_s: float, remote: dict[str, str]) -> Line:
+        flags = wire.PACED if self._paced else wire.GATHERED if self._gathered else 0
+        flags |= wire.OWN if own else 0
+        hello = wire.encode_text(wire.HELLO, self._name, flags=flags, count=wire.VERSION)
+        line = None
         try:
-            path = places.find(self.channel)
-            sock.settimeout(timeout_s)
-            sock.connect(str(path))
-            flags = wire.PACED if self._paced else wire.GATHERED if self._gathered else 0
-            flags |= wire.OWN if own else 0
-            hello = wire.encode_text(wire.HELLO, self._name, flags=flags, count=wire.VERSION)
-            sock.send(hello)
-            answer = wire.decode(sock.recv(wire.MAX_BYTES))
-        except (OSError, places.NoSuchBusError) as error:
-            sock.close()
-            reason = "no answer in time" if isinstance(error, TimeoutError) else str(error)
+            line = self._open_line(hello, timeout_s, remote)
+            said = line.receive(timeout_s)
+        except (OSError, places.NoSuchBusError, ScenarioError) as error:
+            if line is not None:
+                line.close()
+            late = isinstance(error, TimeoutError) and not remote
+            reason = "no answer in time" if late else str(error)
             raise can.CanInitializationError(f"bus {self.channel!r}: {reason}") from error
+        answer = wire.decode(said) if said else None
         if answer is None or answer.kind != wire.WELCOME:
-            sock.close()
+            line.close()
+            if said is None:
+                raise can.CanInitializationError(f"bus {self.channel!r}: no answer in time")
             reason = answer.text if answer is not None else "it closed without a word"
             raise can.CanInitializationError(f"bus {self.channel!r} refused: {reason}")
         self._stamp_ns = answer.stamp_ns
         self._queue = answer.room
-        sock.settimeout(None)
-        return sock
+        return line
 
     # --- python-can's contract -------------------------------------------------------------------
 
@@ -163,7 +193,7 @@ class FleetloopBus(can.BusABC):
             return
         data = wire.encode_frames(0, self._stamp_ns, (frame,))
         try:
-            self._send_now(data, socket.MSG_DONTWAIT)
+            self._send_now(data)
         except BlockingIOError:
             self._send_late(data, timeout)
         except OSError as error:
@@ -171,14 +201,14 @@ class FleetloopBus(can.BusABC):
 
     def fileno(self) -> int:
         """The descriptor that becomes readable with the next frame."""
-        return self._socket.fileno()
+        return self._line.fileno()
 
     def shutdown(self) -> None:
         """Leave the bus; what was sent before is delivered. Idempotent."""
-        if self._socket.fileno() >= 0:
+        if self._line.fileno() >= 0:
             if self._outbox:
                 self._flush(wire.DONE)
-            self._socket.close()
+            self._line.close()
         super().shutdown()
 
     @staticmethod
@@ -192,8 +222,7 @@ class FleetloopBus(can.BusABC):
 
     def _receive(self, wait_s: float | None) -> bool:
         """Take one packet; False if none came in time."""
-        polling = wait_s is not None and wait_s <= 0.0
-        if self._owes and not polling:
+        if self._owes and not (wait_s is not None and wait_s <= 0.0):
             self._owes = False
             self._flush(wire.DONE)
         elif self._outbox:
@@ -201,18 +230,11 @@ class FleetloopBus(can.BusABC):
         if self._closed_because is not None:
             raise BusClosedError(f"bus {self.channel!r} closed: {self._closed_because}")
         try:
-            if wait_s is not None and wait_s < FINE_S:
-                if not polling:
-                    select.select([self._socket], [], [], wait_s)
-                data = self._socket.recv(wire.MAX_BYTES, socket.MSG_DONTWAIT)
-            else:
-                if wait_s != self._timeout:
-                    self._limit(wait_s)
-                data = self._socket.recv(wire.MAX_BYTES)
-        except BlockingIOError:
-            return False
+            data = self._next(wait_s)
         except OSError as error:
             raise can.CanOperationError(f"bus {self.channel!r} is gone: {error}") from error
+        if data is None:
+            return False
         self._take(data)
         return True
 
@@ -258,20 +280,11 @@ class FleetloopBus(can.BusABC):
             # The reason, if there is one, is still to be read.
             return
 
-    def _limit(self, wait_s: float | None) -> None:
-        """Let the kernel bound a receive: one system call instead of two."""
-        seconds = 0 if wait_s is None else max(wait_s, 1e-6)
-        timeval = _TIMEVAL.pack(int(seconds), int(seconds % 1 * 1e6))
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
-        self._timeout = wait_s
-
     def _send_late(self, data: bytes, timeout: float | None) -> None:
-        poller = select.poll()
-        poller.register(self._socket, select.POLLOUT)
-        if timeout and poller.poll(timeout * 1e3):
+        if timeout and self._line.await_room(timeout):
             try:
-                self._send_now(data, socket.MSG_DONTWAIT)
+                self._send_now(data)
             except OSError as error:
                 raise can.CanOperationError(f"bus {self.channel!r}: {error}") from error
             return
-        raise can.CanOperationError(f"bus {self.channel!r}: transmit buffer full")
+        raise can.CanOperationError(f"bus {self.channel!r}: transmit buffer full", errno.ENOBUFS)

@@ -1,0 +1,98 @@
+"""How a client of an emulated bus reaches its hub: packets both ways, whole and in order.
+
+`UnixLine` is a Unix socket on the bus's own machine; `remote.RemoteLine` reaches the same hub over
+Zenoh.
+"""
+
+import select
+import socket
+import struct
+from pathlib import Path
+from typing import Protocol
+
+from bridge.can_bus import packet as wire
+
+FINE_S = 0.05
+"""Waits below this are kept to the microsecond; the kernel's own bound counts in its ticks."""
+_TIMEVAL = struct.Struct("ll")
+
+
+class Line(Protocol):
+    """One client's connection to a hub."""
+
+    def send(self, packet: bytes) -> None:
+        """Send at once. Raises `BlockingIOError` without room, `OSError` when it is broken."""
+
+    def await_room(self, timeout_s: float) -> bool:
+        """Wait until there is room to send; whether there is."""
+
+    def receive(self, wait_s: float | None) -> bytes | None:
+        """The next packet; None if none came within `wait_s` (None: for ever); empty at the end."""
+
+    def fileno(self) -> int:
+        """A descriptor that is readable when a packet is there; −1 once it is closed."""
+
+    def close(self) -> None:
+        """Leave; what was sent arrives. Idempotent."""
+
+
+class UnixLine:
+    """A line over a Unix socket that keeps packets."""
+
+    __slots__ = ("_bound_s", "_recv", "_send", "_socket")
+
+    def __init__(self, path: Path, hello: bytes, timeout_s: float) -> None:
+        """Connect and say hello.
+
+        Raises:
+            OSError: nobody listens there, or not in time.
+        """
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._bound_s: float | None = None
+        self._recv, self._send = self._socket.recv, self._socket.send
+        try:
+            self._socket.settimeout(timeout_s)
+            self._socket.connect(str(path))
+            self._send(hello)
+        except OSError:
+            self._socket.close()
+            raise
+        self._socket.settimeout(None)
+
+    def send(self, packet: bytes) -> None:
+        """Send at once."""
+        self._send(packet, socket.MSG_DONTWAIT)
+
+    def await_room(self, timeout_s: float) -> bool:
+        """Wait until there is room to send."""
+        poller = select.poll()
+        poller.register(self._socket, select.POLLOUT)
+        return bool(poller.poll(timeout_s * 1e3))
+
+    def receive(self, wait_s: float | None) -> bytes | None:
+        """The next packet."""
+        try:
+            if wait_s is None or wait_s >= FINE_S:
+                if wait_s != self._bound_s:
+                    self._limit(wait_s)
+                return self._recv(wire.MAX_BYTES)
+            if wait_s > 0.0:
+                select.select([self._socket], [], [], wait_s)
+            return self._recv(wire.MAX_BYTES, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return None
+
+    def fileno(self) -> int:
+        """The socket's descriptor."""
+        return self._socket.fileno()
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+    def _limit(self, wait_s: float | None) -> None:
+        """Let the kernel bound a receive: one system call instead of two."""
+        seconds = 0 if wait_s is None else max(wait_s, 1e-6)
+        timeval = _TIMEVAL.pack(int(seconds), int(seconds % 1 * 1e6))
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
+        self._bound_s = wait_s
