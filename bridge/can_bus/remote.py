@@ -74,8 +74,8 @@ class RemoteLine:
             self._broken = f"{BACKLOG} packets wait to be read"
             packet = b""
         if self._readable >= 0:
+            os.eventfd_write(self._readable, 1)  # first: every packet that is got is counted
             self._packets.put(packet)
-            os.eventfd_write(self._readable, 1)
 
     def send(self, packet: bytes) -> None:
         """Send at once; waits only while the network is full."""
