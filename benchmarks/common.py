@@ -8,9 +8,11 @@ import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+T = TypeVar("T", float, dict[str, float])
 
 
 def arguments(text: str) -> argparse.Namespace:
@@ -18,7 +20,9 @@ def arguments(text: str) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=text, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--quick", action="store_true", help="one short round, for a first look")
+    parser.add_argument(
+        "--quick", action="store_true", help="one short round, for a first look: no ranges"
+    )
     return parser.parse_args()
 
 
@@ -61,19 +65,35 @@ def fleet(folder: str, n: int, seconds: float, **clock: object) -> str:
     return str(path)
 
 
-def interleaved(rounds: int, cases: dict[str, Callable[[], float]]) -> dict[str, list[float]]:
+def interleaved(rounds: int, cases: Mapping[str, Callable[[], T]]) -> dict[str, list[T]]:
     """Every case once per round, in turn: what disturbs the machine disturbs all of them."""
-    results: dict[str, list[float]] = {name: [] for name in cases}
+    results: dict[str, list[T]] = {name: [] for name in cases}
     for number in range(rounds):
         for name, measure in cases.items():
             results[name].append(measure())
-            sys.stderr.write(f"round {number + 1}: {name}: {results[name][-1]:,.1f}\n")
+            sys.stderr.write(
+                f"round {number + 1} of {rounds}: {name}: {_shown(results[name][-1])}\n"
+            )
     return results
 
 
-def ratio(a: Sequence[float], b: Sequence[float]) -> float:
-    """Median of the ratios within the same round."""
-    return statistics.median(x / y for x, y in zip(a, b, strict=True))
+def _shown(value: float | dict[str, float]) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {part:,.2f}" for name, part in value.items())
+    return f"{value:,.1f}"
+
+
+def ratios(a: Sequence[float], b: Sequence[float]) -> list[float]:
+    """Of a to b, each within one round."""
+    return [x / y for x, y in zip(a, b, strict=True)]
+
+
+def median_and_range(values: Sequence[float], form: str = ",.0f") -> str:
+    """The median, and in brackets the least and the most of several rounds."""
+    middle = f"{statistics.median(values):{form}}"
+    if len(values) == 1:
+        return middle
+    return f"{middle} ({min(values):{form}} to {max(values):{form}})"
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

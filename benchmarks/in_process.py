@@ -1,14 +1,15 @@
 """The in-process reference: robot-ticks per second, everything but network and bus.
 
-Each robot-tick is the law, both drives' codecs, the physics and the record of all signals. Not
-measured: start-up.
+Each robot-tick is the law, both drives' codecs, the physics and the record of all signals. Medians,
+ranges, and ratios to one robot within the same round.
+
+Not measured: start-up, the processes and the network of a real run, other simulators.
 """
 
-import statistics
 import tempfile
 from functools import partial
 
-from common import arguments, fleet, interleaved, machine, run, table
+from common import arguments, fleet, interleaved, machine, median_and_range, ratios, run, table
 
 
 def robot_ticks(scenario: str, n: int) -> float:
@@ -28,10 +29,10 @@ def main() -> None:
         }
         results = interleaved(rounds, cases)
     rows = [
-        (n, f"{statistics.median(values):,.0f}", f"{min(values):,.0f} to {max(values):,.0f}")
+        (n, median_and_range(values), median_and_range(ratios(values, results["1"]), ".2f"))
         for n, values in results.items()
     ]
-    table(("robots", "robot-ticks per s", "range"), rows)
+    table(("robots", "robot-ticks per s", "× those of one robot"), rows)
 
 
 if __name__ == "__main__":

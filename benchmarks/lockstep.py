@@ -4,15 +4,36 @@ A round of the peers: one plant sends 4 doubles to each of N controllers, each s
 else happens in them. A tick of Fleetloop does that over python-can, and the law, the physics, two
 emulated drives per robot, Zenoh with access control, and a record of every signal.
 
-Not measured: other peers' richer features, networks, more than one machine.
+Every case runs once per round, in turn. Medians, ranges, and Fleetloop's ratio to each within the
+same round; to the best of the peers too, whichever that is in a round.
+
+Peers that are installed take part (`uv sync` removes them again; mosaik 3.7 needs Python 3.12):
+
+    uv pip install 'helics==3.6.1' 'mosaik<=3.7.1' 'dora-rs==1.1.0' 'dora-rs-cli==1.1.0'
+
+Not measured: start-up, peers' richer features, peers in other languages than Python or pinned to
+one core, networks, more than one machine.
 """
 
-import statistics
+import tempfile
 from functools import partial
 
-from barrier import rounds_per_second
-from common import arguments, fleet, interleaved, machine, ratio, run, table, ticks_per_second
-from peers import available_peers
+import barrier
+from common import (
+    arguments,
+    fleet,
+    interleaved,
+    machine,
+    median_and_range,
+    ratios,
+    run,
+    table,
+    ticks_per_second,
+)
+from peers import Peers, available_peers
+
+OURS = "Fleetloop"
+SIZES = (4, 16)
 
 
 def fleetloop(scenario: str, seconds: float) -> float:
@@ -20,37 +41,35 @@ def fleetloop(scenario: str, seconds: float) -> float:
     return ticks_per_second(run(scenario, "--duration", str(seconds)))
 
 
+def measured(n: int, rounds: int, seconds: float, peers: Peers) -> dict[str, list[float]]:
+    """Rounds or ticks per second with N controllers, by case."""
+    with tempfile.TemporaryDirectory() as folder:
+        scenario = "paper" if n == 4 else fleet(folder, n, 30.0)
+        cases = {
+            "raw barrier, one core": partial(barrier.rounds_per_second, n, seconds, pinned=True),
+            "raw barrier, free": partial(barrier.rounds_per_second, n, seconds, pinned=False),
+            OURS: partial(fleetloop, scenario, 5 * seconds if n == 4 else seconds),
+        }
+        cases |= {name: partial(measure, n, seconds) for name, measure in peers.items()}
+        return interleaved(rounds, cases)
+
+
 def main() -> None:
     """Measure and print."""
-    import tempfile
-
     options = arguments(__doc__)
     rounds, seconds = (1, 1.0) if options.quick else (5, 2.0)
     print(machine())
+    peers = available_peers()
     rows = []
-    with tempfile.TemporaryDirectory() as folder:
-        for n in (4, 16):
-            scenario = "paper" if n == 4 else fleet(folder, n, 30.0)
-            cases = {
-                "raw barrier, one core": partial(rounds_per_second, n, seconds, pinned=True),
-                "raw barrier, free": partial(rounds_per_second, n, seconds, pinned=False),
-                "Fleetloop": partial(fleetloop, scenario, 5 * seconds if n == 4 else seconds),
-            }
-            cases |= {
-                name: partial(measure, n, seconds) for name, measure in available_peers().items()
-            }
-            results = interleaved(rounds, cases)
-            for name, values in results.items():
-                rows.append(
-                    (
-                        f"{n}",
-                        name,
-                        f"{statistics.median(values):,.0f}",
-                        f"{min(values):,.0f} to {max(values):,.0f}",
-                        f"{ratio(results['Fleetloop'], values):.2f}",
-                    )
-                )
-    table(("robots", "", "rounds or ticks per s", "range", "Fleetloop is × this"), rows)
+    for n in SIZES:
+        results = measured(n, rounds, seconds, peers)
+        if peers:
+            best = [max(values) for values in zip(*(results[name] for name in peers), strict=True)]
+            results[f"the best of {', '.join(peers)}"] = best
+        for name, values in results.items():
+            factor = median_and_range(ratios(results[OURS], values), ".2f")
+            rows.append((f"{n}", name, median_and_range(values), factor))
+    table(("robots", "", "rounds or ticks per s", "Fleetloop is × this"), rows)
 
 
 if __name__ == "__main__":
