@@ -83,9 +83,9 @@ def guest_line(user: str, line: str, bus: str) -> str:
     return f"fleetloop/@guest/{_chunk(user)}/{_chunk(line)}/{_chunk(bus)}"
 
 
-def guest_lines(end: str, user: str = "*") -> str:
-    """All lines of all guests, or of one."""
-    return f"fleetloop/@guest/{user}/*/*/{end}"
+def guest_lines(end: str, user: str) -> str:
+    """All lines of a guest."""
+    return f"fleetloop/@guest/{_chunk(user)}/*/*/{end}"
 
 
 def guest_of(place: str) -> tuple[str, str]:

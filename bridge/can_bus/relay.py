@@ -58,8 +58,10 @@ class Relay:
         self._sockets: dict[str, socket.socket] = {}
         self._readers: list[threading.Thread] = []
         self._thread = threading.Thread(target=self._serve, daemon=True)
-        link.each_keyed(keys.guest_lines("up"), self._hear)
-        link.each_gone(keys.guest_lines("alive"), self._lose)
+        for user in granted:
+            # One by one: guests must be told that somebody hears them, and may see no wider key.
+            link.each_keyed(keys.guest_lines("up", user), self._hear)
+            link.each_gone(keys.guest_lines("alive", user), self._lose)
         self._thread.start()
 
     def close(self) -> None:
