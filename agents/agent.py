@@ -201,8 +201,9 @@ class Agent:
         s_dot = mu + v_hat
         reference = self._path(s)
         out = self._law(self._law_state, sense, reference, s_dot)
-        frames = self._guard.act(tick, out.tau_right, out.tau_left)
-        passed = self._guard.passed
+        guard = self._guard
+        frames = guard.act(tick, out[0], out[1])
+        passed = guard.passed
         if passed is WHOLE:
             self._law_state = out.state
         elif passed is Passed.LIMITED:
@@ -212,25 +213,10 @@ class Agent:
         n, sum_s, sum_v = self._neighbours.sums(t_ns)
         v_r = self._leader.at(t_ns) if self._leader is not None else 0.0
         self._coordination = self._coordinator.advance(coordination, n, sum_s, sum_v, v_r)
-        self._rows.add(
-            tick,
-            (
-                t_ns * 1e-9,
-                *sense,
-                s,
-                s_dot,
-                mu,
-                v_hat,
-                float(n),
-                reference.x,
-                reference.y,
-                reference.theta,
-                *out.signals,
-                *self._drives.sent,
-                self.late_s,
-                self.round_trip_s,
-            ),
-        )
+        x_d, y_d, theta_d, _, _ = reference
+        used = (t_ns * 1e-9, *sense, s, s_dot, mu, v_hat, n, x_d, y_d, theta_d)
+        measured = (*self._drives.sent, self.late_s, self.round_trip_s)
+        self._rows.add(tick, (*used, *out[3], *measured))
         return frames
 
     def leave(self) -> Sequence[Frame]:

@@ -130,6 +130,7 @@ class RowBuffer:
 
 FRAME_ROW = struct.Struct("<qIBB2x8s")
 """A frame that crossed a bus: end in bus time [ns], SocketCAN's identifier, length, flags, data."""
+_TWO_FRAMES = struct.Struct("<qIBB2x8sqIBB2x8s")
 FROM_DRIVE = 1
 """Flag of a frame that a drive sent."""
 BLOCK_FRAMES = 1024
@@ -145,16 +146,27 @@ def no_tap(end_ns: int, frames: Sequence[Frame], flags: int) -> None:
 class FrameBuffer:
     """Gathers the frames of one bus and hands them on as blocks: (first, count, frames, final)."""
 
-    __slots__ = ("_block", "_count", "_first", "_hand_on")
+    __slots__ = ("_block", "_count", "_first", "_hand_on", "_pack_two")
 
     def __init__(self, hand_on: Callable[[int, int, bytes, bool], None]) -> None:
         self._hand_on = hand_on
+        self._pack_two = _TWO_FRAMES.pack_into
         self._block = bytearray(BLOCK_FRAMES * FRAME_ROW.size)
         self._first = 0
         self._count = 0
 
     def add(self, end_ns: int, frames: Sequence[Frame], flags: int) -> None:
         """Add frames that ended at one bus time."""
+        count = self._count
+        if len(frames) == 2 and count < BLOCK_FRAMES - 2:
+            (id_1, data_1), (id_2, data_2) = frames
+            n_1, n_2 = len(data_1), len(data_2)
+            at = count * FRAME_ROW.size
+            self._pack_two(
+                self._block, at, end_ns, id_1, n_1, flags, data_1, end_ns, id_2, n_2, flags, data_2
+            )
+            self._count = count + 2
+            return
         for can_id, data in frames:
             at = self._count * FRAME_ROW.size
             FRAME_ROW.pack_into(self._block, at, end_ns, can_id, len(data), flags, data)

@@ -58,20 +58,30 @@ class _Lane:
 class _IdealLane(_Lane):
     """A bus on which frames take no time."""
 
-    __slots__ = ("_steps",)
+    __slots__ = ("_minds", "_steps")
 
     def __init__(self, name: str, bus: IdealBus, minds: Mapping[str, _Mind]) -> None:
         super().__init__(name, bus.units, minds)
         self._steps = bus.steps()
+        self._minds = [(mind.agent, mind.clock) for mind in self.minds.values()]
 
     def tick(self) -> None:
         steps = self._steps
         ask = next(steps)
         while ask is not None:
-            frames = [(ask.stamp_ns, frame) for frame in ask.frames]
+            stamp_ns, frames, *_ = ask
             answers: list[Frame] = []
-            for mind in self.minds.values():
-                answers += _think(mind, frames)
+            for agent, clock in self._minds:
+                hear = agent.hear
+                tick = None
+                for can_id, data in frames:
+                    hear(can_id, data, stamp_ns)
+                    if tick is None:
+                        tick = clock.due(stamp_ns)
+                        if tick is not None:
+                            answers += agent.step(tick)
+                if not frames:
+                    answers += agent.step(clock.passed())
             self.frames += len(frames) + len(answers)
             ask = steps.send(answers)
 

@@ -28,6 +28,7 @@ class Ask(NamedTuple):
     freed: Sequence[tuple[Key, int]] = ()  # frames that left the transmit queues of clients
 
 
+_new = tuple.__new__  # of a question, past its constructor: this is the hot path
 _Answer = TypeVar("_Answer")
 Steps = Generator[Ask | None, Sequence[_Answer], None]
 Begin = Callable[[int], None]
@@ -61,12 +62,14 @@ class IdealBus:
             else:
                 frames = sorted(frame for u in units for frame in u.frames_due(bus_ns))
             tap(bus_ns, frames, FROM_DRIVE)
-            answers = yield Ask(bus_ns, frames)
-            tap(bus_ns, answers, 0)
-            while replies := self._hear(answers, bus_ns):
+            answers = yield _new(Ask, (bus_ns, frames, (), "", ()))
+            while answers:
+                tap(bus_ns, answers, 0)
+                replies = self._hear(answers, bus_ns)
+                if not replies:
+                    break
                 tap(bus_ns, replies, FROM_DRIVE)
                 answers = yield Ask(bus_ns, replies)
-                tap(bus_ns, answers, 0)
             if 0 <= tick < last:
                 t_s = tick * period_ns * 1e-9
                 for u in units:
@@ -75,7 +78,9 @@ class IdealBus:
 
     def _hear(self, frames: Sequence[Frame], bus_ns: int) -> list[Frame]:
         replies: list[Frame] = []
-        for frame in frames:
-            for unit in self.units:
-                replies += unit.hear(frame, bus_ns)
+        for unit in self.units:
+            hear = unit.hear
+            for frame in frames:
+                if replied := hear(frame, bus_ns):
+                    replies += replied
         return replies

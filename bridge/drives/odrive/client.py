@@ -72,6 +72,8 @@ class OdriveClient:
         self._asked_ns: int | None = None
         self._closing_ns: int | None = None
         self._idled_ns = NEVER
+        self._well_until_ns = NEVER
+        """Both drives are in closed loop without trouble; their heartbeats count until then."""
         self.armed = False
         self.sent = (0.0, 0.0)
         """(right, left) torque last sent, at the wheels [N·m], as float32 carries it."""
@@ -184,6 +186,10 @@ class OdriveClient:
 
     def fault(self, now_ns: int) -> str | None:
         """Why the wheels can't be driven now, None if they can."""
+        if now_ns <= self._well_until_ns:
+            since_ns = now_ns - self._encoder_limit_ns
+            if self._right.stamp_ns >= since_ns and self._left.stamp_ns >= since_ns:
+                return None
         for axis in self._axes:
             if axis.trouble:
                 return f"{axis.name}{axis.trouble}"
@@ -266,13 +272,25 @@ class OdriveClient:
             for command in _FOREIGN:
                 hearers[f.identifier(axis.node, command)] = partial(_hear_command, axis)
             for flag in (0, RTR):
-                hearers[f.identifier(axis.node, Command.ESTOP) | flag] = partial(_hear_estop, axis)
+                hearers[f.identifier(axis.node, Command.ESTOP) | flag] = partial(
+                    self._hear_estop, axis
+                )
         return hearers
 
     def _hear_beat(self, axis: Axis, data: bytes | bytearray, now_ns: int) -> None:
         since_ns = self._closing_ns
         if axis.hear_heartbeat(data, now_ns) and since_ns is not None and not self.armed:
             self.armed = self._right.ready_since(since_ns) and self._left.ready_since(since_ns)
+        self._note_well()
+
+    def _hear_estop(self, axis: Axis, _data: bytes | bytearray, _now_ns: int) -> None:
+        axis.hear_estop()
+        self._note_well()
+
+    def _note_well(self) -> None:
+        well = all(axis.closed_loop and not axis.trouble for axis in self._axes)
+        heard_ns = min(axis.heard_ns or NEVER for axis in self._axes)
+        self._well_until_ns = heard_ns + self._heartbeat_limit_ns if well else NEVER
 
 
 def _hear_request(axis: Axis, asked: Command, _data: bytes | bytearray, _now_ns: int) -> None:
@@ -281,10 +299,6 @@ def _hear_request(axis: Axis, asked: Command, _data: bytes | bytearray, _now_ns:
 
 def _hear_command(axis: Axis, _data: bytes | bytearray, _now_ns: int) -> None:
     axis.commanded += 1
-
-
-def _hear_estop(axis: Axis, _data: bytes | bytearray, _now_ns: int) -> None:
-    axis.hear_estop()
 
 
 def _saturated(torque: float) -> float:

@@ -41,6 +41,7 @@ from bridge.frame import EFF, ERR, RTR, Frame
 from configs.brief import DriveModel
 
 _NONE: Sequence[Frame] = ()
+_CLOSED_LOOP = AxisState.CLOSED_LOOP_CONTROL
 _HARDWARE = (2, 4, 4, 58)  # protocol, hardware line, version, variant
 _CONFIRMING_FIRMWARE = (0, 6, 11)
 """From this version on, writes of SDO are answered."""
@@ -103,7 +104,8 @@ class OdriveNode:
             }
         )
         self._offset = 0.0
-        self._calibrated_ns = self._address_ns = NEVER
+        self._calibrated_ns = self._address_ns = self._procedures_ns = NEVER
+        self._limited = model.torque_limiters
         self._next_encoder_ns = 0 if self.encoder_period_ns else NEVER
         self._endpoints = parameters(self, self.control, self._cyclic, self._readings)
         self.readdress(node_id)
@@ -129,7 +131,7 @@ class OdriveNode:
 
     def torque_demand(self, dt_s: float) -> float:
         """Torque that the drive asks of its motor for the next `dt_s` [N·m]; always finite."""
-        if self.state is not AxisState.CLOSED_LOOP_CONTROL:
+        if self.state is not _CLOSED_LOOP:
             return 0.0
         control = self.control
         if control.plain:
@@ -143,21 +145,24 @@ class OdriveNode:
         if self.silent:
             return NEVER
         next_ns = min(self._next_encoder_ns, self._cyclic.next_ns)
-        if self.state is AxisState.CLOSED_LOOP_CONTROL and self.watchdog_ns:
+        if self.state is _CLOSED_LOOP and self.watchdog_ns:
             next_ns = min(next_ns, self.fed_ns + self.watchdog_ns + 1)
-        return min(next_ns, self._calibrated_ns, self._address_ns)
+        return min(next_ns, self._procedures_ns)
 
     def due(self, now_ns: int) -> Sequence[Frame]:
         """Cyclic frames due at this instant, after a look at what disarms."""
-        if self.state is AxisState.CLOSED_LOOP_CONTROL:
+        if self.state is _CLOSED_LOOP and (
+            self._limited or now_ns - self.fed_ns > self.watchdog_ns
+        ):
             self._supervise(now_ns)
         encoder = now_ns >= self._next_encoder_ns
-        if now_ns < self._cyclic.next_ns and now_ns < self._calibrated_ns < self._address_ns + 1:
-            if not encoder:
-                return _NONE
-            self._next_encoder_ns = after(now_ns, self.encoder_period_ns)
-            return (self._encoder_estimates(),)
-        return self._due(now_ns, encoder=encoder)
+        if now_ns >= self._cyclic.next_ns or now_ns >= self._procedures_ns:
+            return self._due(now_ns, encoder=encoder)
+        if not encoder:
+            return _NONE
+        period_ns = self.encoder_period_ns
+        self._next_encoder_ns = (now_ns // period_ns + 1) * period_ns
+        return (self._encoder_estimates(),)
 
     def feedback(self, now_ns: int) -> Frame:
         """The encoder frame out of its turn; the next cyclic one comes a period later."""
@@ -197,6 +202,7 @@ class OdriveNode:
         if now_ns >= self._address_ns:
             self._address_ns = NEVER
             frames.append(self._address())
+        self._procedures_ns = min(self._calibrated_ns, self._address_ns)
         said = self._cyclic.take(now_ns) if now_ns >= self._cyclic.next_ns else ()
         for command in said:
             if encoder and command > Command.GET_ENCODER_ESTIMATES:
@@ -226,7 +232,7 @@ class OdriveNode:
 
     def _to_idle(self) -> None:
         self.state = AxisState.IDLE
-        self._calibrated_ns = NEVER
+        self._calibrated_ns, self._procedures_ns = NEVER, self._address_ns
         if self._model.zero_torque_on_disarm:
             self.control.input_torque = 0.0
 
@@ -235,7 +241,7 @@ class OdriveNode:
         blocking = self.errors
         if not self._model.estop_blocks_arming:
             blocking &= ~AxisError.ESTOP_REQUESTED
-        if self.state is AxisState.CLOSED_LOOP_CONTROL:
+        if self.state is _CLOSED_LOOP:
             return
         if blocking:
             self.result = Result.DISARMED
@@ -360,6 +366,7 @@ class OdriveNode:
         elif asked in _CALIBRATION_NS and self.state is AxisState.IDLE and not self.errors:
             self.state, self.result = AxisState(asked), Result.BUSY
             self._calibrated_ns = now_ns + _CALIBRATION_NS[self.state]
+            self._procedures_ns = min(self._calibrated_ns, self._address_ns)
         elif asked in _CALIBRATION_NS and self.state is AxisState.IDLE:
             self.result = Result.DISARMED
         else:
@@ -459,6 +466,7 @@ class OdriveNode:
             if self.node_id != f.UNADDRESSED:
                 return (self._address(),)
             self._address_ns = now_ns + 1 + self._random.randrange(_ANSWER_WITHIN_NS)
+            self._procedures_ns = min(self._calibrated_ns, self._address_ns)
             return _NONE
         if len(data) < 7:
             self.ignored += 1
