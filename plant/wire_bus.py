@@ -18,12 +18,14 @@ from collections.abc import Sequence
 from heapq import heappop, heappush
 from random import Random
 
-from bridge.can_bus.node import Delivered, Node
+from bridge.can_bus.confinement import NodeState
+from bridge.can_bus.error_frames import of_error, of_state
+from bridge.can_bus.node import Delivered, ErrorFrame, Node, StateChanged
 from bridge.can_bus.queues import Fifo, Mailboxes
 from bridge.can_bus.traffic import Key, Passed, Said
 from bridge.can_bus.wire import Wire
 from bridge.drives import DriveNode
-from bridge.frame import ERR, Frame
+from bridge.frame import Frame
 from bridge.telemetry import FROM_DRIVE, Tap
 from configs.brief import Schedule, WireModel
 from plant.buses import Ask, Begin, Steps
@@ -80,6 +82,7 @@ class WireBus:
         self._of_node = {drive.node: drive for drive in self._drives}
         self._hosts: dict[Key, Node] = {}
         self._key_of: dict[Node, Key] = {}
+        self._states: dict[Node, NodeState] = {}
         for unit in units:
             self._host(unit.brief.robot)
         self._mail: list[tuple[int, int, _Drive, Frame]] = []
@@ -195,8 +198,11 @@ class WireBus:
         for event in self.wire.advance(at_ns):
             if isinstance(event, Delivered):
                 self._deliver(event)
+            elif isinstance(event, ErrorFrame):
+                for key, node in self._hosts.items():
+                    self._passed.append(Passed(event.at_ns, of_error(event, node), to=key))
             else:
-                self._passed.append(Passed(at_ns, Frame(ERR | 0x80, bytes(8))))
+                self._note_state(event)
         while self._mail and self._mail[0][0] <= at_ns:
             _, _, drive, frame = heappop(self._mail)
             drive.unit.move(at_ns, self._zero_ns, self._step_ns)
@@ -235,6 +241,14 @@ class WireBus:
                 target.looks_ns = max(target.looks_ns, end_ns + latency_ns)
                 self._number += 1
                 heappush(self._mail, (target.looks_ns, self._number, target, frame))
+
+    def _note_state(self, event: StateChanged) -> None:
+        node = event.node
+        key = self._key_of.get(node)
+        if key is not None:
+            before = self._states.get(node, NodeState.ERROR_ACTIVE)
+            self._states[node] = event.state
+            self._passed.append(Passed(event.at_ns, of_state(event, before), to=key))
 
     def _submit(self, drive: _Drive, frames: Sequence[Frame]) -> None:
         for frame in frames:

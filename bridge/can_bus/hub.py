@@ -168,11 +168,11 @@ class Hub:
         bus = self._buses[name]
         bus.stamp_ns = stamp_ns
         for client in bus.clients.copy():
-            heard = [Stamped(end, frame) for end, frame, key in frames if key != client.key]
+            heard = [Stamped(p.end_ns, p.frame) for p in frames if p.heard_by(client.key)]
             if client.own:
-                mine = [Stamped(end, frame) for end, frame, key in frames if key == client.key]
-                for one in mine:
-                    self._send(client, wire.encode_stamped(wire.OWN, stamp_ns, [one], client.gone))
+                for mine in (Stamped(p.end_ns, p.frame) for p in frames if p.key == client.key):
+                    own = wire.encode_stamped(wire.OWN, stamp_ns, [mine], client.gone)
+                    self._send(client, own)
             if client.paced:
                 client.pending += heard
                 if asked is not None and asked in ("", client.name):

@@ -23,8 +23,16 @@ class Said(NamedTuple):
 
 
 class Passed(NamedTuple):
-    """A frame that ended on the bus; the key of the client that had sent it, None for a drive."""
+    """A frame that ended on the bus; the key of the client that had sent it, None for a drive.
+
+    An error frame is what the node of one client tells it: `to`.
+    """
 
     end_ns: int
     frame: Frame
     key: Key | None = None
+    to: Key | None = None
+
+    def heard_by(self, key: Key) -> bool:
+        """Whether a client hears it from the bus; its own frames it doesn't."""
+        return key != self.key and self.to in (None, key)

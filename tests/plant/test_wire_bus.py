@@ -13,7 +13,7 @@ from bridge.frame import Frame
 from bridge.telemetry import no_tap
 from configs.brief import NetworkLink, PlantBrief
 from configs.briefing import plant_brief
-from configs.loading import load
+from configs.loading import load, loads
 from plant.buses import Ask, Steps
 from plant.emulation import wire_bus
 from plant.unit import unit_of
@@ -174,7 +174,9 @@ def test_error_frames_reach_the_clients_and_the_frame_is_sent_again() -> None:
     driven.bus.wire.disturb(Disturbance(Kind.CORRUPT, can_id=0x009))
     (ask,) = driven.tick()
     kinds = [passed.frame.can_id for passed in ask.passed]
-    assert any(can_id & ERR for can_id in kinds)
+    errors = [passed for passed in ask.passed if passed.frame.can_id & ERR]
+    assert [(passed.frame.can_id & ~ERR, passed.to) for passed in errors] == [(0x08, "r1")]
+    assert errors[0].frame.data[7] > 0  # the receive error counter of its node
     assert [can_id for can_id in kinds if not can_id & ERR] == [0x009, 0x029]
 
 
@@ -188,3 +190,42 @@ def test_a_drive_that_goes_bus_off_falls_silent_and_the_controller_hears_the_oth
     (ask, *_) = driven.tick()
     assert [passed.frame.can_id for passed in ask.passed] == [0x029]
     assert driven.bus._drives[0].node.state is NodeState.BUS_OFF
+
+
+def test_a_host_that_nobody_acknowledges_hears_of_it_and_finds_its_queue_full() -> None:
+    from bridge.frame import ERR
+
+    driven = Driven(lambda tick: [Frame(0x700, b"")] if tick < 0 else [])
+    host = driven.bus._hosts["r1"]
+    driven.bus.wire.disconnect(host)
+    heard = [passed.frame for ask in driven.ticks(40) for passed in ask.passed]
+    kinds = {frame.can_id & ~ERR for frame in heard if frame.can_id & ERR}
+    assert {0x04, 0x20} <= kinds
+    assert driven.bus.room("r1") == 0
+    assert driven.bus.refused > 0
+
+
+def test_frames_of_seven_robots_on_one_bus_come_to_each_in_its_turn() -> None:
+    robots = "".join(
+        f'[[robot]]\nname = "r{n}"\nbus = "fleet"\npose = {{ x_m = 0.0, y_m = {n}.0 }}\n'
+        for n in range(1, 8)
+    )
+    text = (
+        'schema = 1\nname = "seven"\nduration_s = 1.0\n[clock]\ncontrol_period_s = 0.005\n'
+        'countdown_s = 0.5\nshare_period_s = 0.02\n[bus]\ntiming = "wire"\n' + robots
+    )
+    plant = plant_brief(loads("seven", text), network=NetworkLink("t", "", "", ""))
+    units = [unit_of(robot) for robot in plant.robots]
+    bus = wire_bus(plant, "fleet", units, lambda _: None, no_tap)
+    steps = bus.steps()
+    for _ in range(3):
+        asked, stamps = [], []
+        ask = next(steps)
+        while ask is not None:
+            asked.append(ask.asked)
+            stamps.append(ask.stamp_ns)
+            ask = steps.send([])
+        assert sorted(asked) == [f"r{n}" for n in range(1, 8)]
+        assert stamps == sorted(stamps)
+    nodes = [node for robot in plant.robots for node in (robot.right_node, robot.left_node)]
+    assert nodes == list(range(14))

@@ -421,3 +421,58 @@ def test_who_leaves_a_bus_with_bit_timing_is_named(timed) -> None:
     timed.hub.serve(0.5)
     assert timed.hub.departed("r1") == ["r1"]
     assert timed.hub.departed("r1") == []
+
+
+def test_periodic_tasks_of_python_can_send_until_they_are_stopped(running, join) -> None:
+    bus = join()
+    message = can.Message(arbitration_id=0x123, is_extended_id=False)
+    task = bus.send_periodic(message, 0.002)
+    frames = running.taken(5)
+    task.stop()
+    assert set(frames) == {Frame(0x123, b"")}
+
+
+def test_a_notifier_hands_every_frame_to_its_listeners(running, join) -> None:
+    bus = join()
+    reader = can.BufferedReader()
+    notifier = can.Notifier(bus, [reader])
+    running.deliver(*(Frame(0x100 + n, b"") for n in range(50)))
+    heard = [reader.get_message(5.0) for _ in range(50)]
+    notifier.stop()
+    assert [message.arbitration_id for message in heard] == list(range(0x100, 0x132))
+
+
+def test_several_threads_may_share_a_thread_safe_bus(running, runtime_folder) -> None:
+    with can.ThreadSafeBus(interface="fleetloop", channel="r1") as bus:
+
+        def send(first: int) -> None:
+            for n in range(100):
+                bus.send(can.Message(arbitration_id=first + n, is_extended_id=False))
+
+        threads = [threading.Thread(target=send, args=(k * 0x100,)) for k in range(4)]
+        for thread in threads:
+            thread.start()
+        frames = running.taken(400)
+        for thread in threads:
+            thread.join()
+    assert len(set(frames)) == 400
+    for k in range(4):
+        of_one = [frame.can_id for frame in frames if frame.can_id >> 8 == k]
+        assert of_one == sorted(of_one)
+
+
+def test_what_a_client_sent_before_it_closed_arrives_though_frames_were_on_their_way_to_it(
+    running, join
+) -> None:
+    bus = join()
+    for n in range(20):
+        bus.send(can.Message(arbitration_id=0x200 + n, is_extended_id=False))
+    bus.shutdown()
+    for n in range(20):
+        running.deliver(Frame(0x100 + n, b""))
+    assert [frame.can_id for frame in running.taken(20)] == list(range(0x200, 0x214))
+
+
+def test_buses_that_are_up_are_detected(running) -> None:
+    found = can.detect_available_configs("fleetloop")
+    assert [config["channel"] for config in found] == ["test/r1", "test/r2"]
