@@ -447,7 +447,8 @@ def test_several_threads_may_share_a_thread_safe_bus(running, runtime_folder) ->
 
         def send(first: int) -> None:
             for n in range(100):
-                bus.send(can.Message(arbitration_id=first + n, is_extended_id=False))
+                message = can.Message(arbitration_id=first + n, is_extended_id=False)
+                bus.send(message, timeout=10.0)
 
         threads = [threading.Thread(target=send, args=(k * 0x100,)) for k in range(4)]
         for thread in threads:
