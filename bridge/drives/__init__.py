@@ -7,21 +7,13 @@ and the emulated drive of one wheel. Both ends are pure: frames in, frames out, 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
+from bridge.drives.feeling import Feeling
 from bridge.drives.odrive.client import Motion, OdriveClient
 from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import Frame
 from configs.brief import DriveLink, DriveModel
 
-
-class Feeling(NamedTuple):
-    """What a drive measures of its motor and of the supply."""
-
-    torque_N_m: float  # the motor's, estimated
-    current_A: float  # q axis
-    fet_C: float
-    motor_C: float  # NaN: no thermistor
-    bus_V: float
-    bus_A: float
+__all__ = ["DRIVES", "DriveClient", "DriveNode", "DriveProtocol", "Feeling"]
 
 
 class DriveClient(Protocol):
@@ -61,13 +53,13 @@ class DriveNode(Protocol):
     fed_ns: int
     """When it last took a set-point, bus time."""
     setpoint_id: int
-    """The identifier of the set-point that it takes at its address now."""
+    """The identifier of the set-point that it takes at its address now; negative: it takes none."""
 
     def feed(self, revolutions: float, rev_s: float) -> None:
         """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
 
     def due(self, now_ns: int) -> Sequence[Frame]:
-        """Cyclic frames due at this instant."""
+        """Frames due until this instant, the newest of each; the drive supervises itself first."""
 
     def feedback(self, now_ns: int) -> Frame:
         """The encoder frame out of its turn; the next cyclic one comes a period later."""
@@ -77,8 +69,10 @@ class DriveNode(Protocol):
 
     input_torque: float
     """The torque that the set-point said [N·m], before limits."""
-    next_due_ns: int
-    """The earliest bus time at which `due` has something to do."""
+
+    @property
+    def next_due_ns(self) -> int:
+        """The earliest bus time at which `due` has something to do: after its last call."""
 
     def feel(self, feeling: Feeling) -> None:
         """Take what the drive measures."""

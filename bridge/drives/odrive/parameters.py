@@ -1,0 +1,89 @@
+"""What a host can set of an axis: kept in RAM, saved by Reboot 1, gone after any other reboot.
+
+Floats are finite and not negative, as is everything else; what isn't is refused, and the value
+stays. The vendor's defaults [firmware 0.5.6 source] come with `DriveModel`.
+"""
+
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Self
+
+from bridge.drives.odrive.frames import Command, ControlMode, InputMode
+from configs.brief import DriveModel
+
+FLOAT32_MAX = 3.4028234663852886e38
+MAX_PERIOD_NS = 0xFFFF_FFFF * 1_000_000
+
+
+@dataclass(slots=True)
+class Parameters:
+    """The parameters of one axis."""
+
+    node_id: int
+    period_ns: dict[Command, int]  # of cyclic messages; 0: off
+    watchdog_s: float
+    watchdog_enabled: bool
+    velocity_limit: float  # [rev/s]
+    current_limit: float  # [A]
+    position_gain: float  # [1/s]
+    velocity_gain: float  # [N·m·s/rev]
+    velocity_integrator_gain: float  # [N·m/rev]
+    velocity_ramp: float  # [rev/s²]
+    torque_ramp: float  # [N·m/s]
+    filter_bandwidth: float  # [1/s]
+    trajectory_velocity: float  # [rev/s]
+    trajectory_accel: float  # [rev/s²]
+    trajectory_decel: float  # [rev/s²]
+    motor_calibrated: bool
+    encoder_calibrated: bool
+    inertia: float = 0.0  # [N·m·s²/rev]
+    control_mode: int = ControlMode.TORQUE
+    input_mode: int = InputMode.PASSTHROUGH
+
+    @classmethod
+    def of(cls, model: DriveModel, node_id: int) -> Self:
+        """What a drive has when it is delivered."""
+        return cls(
+            node_id=node_id,
+            period_ns={
+                Command.HEARTBEAT: model.heartbeat_period_ns,
+                Command.GET_ERROR: model.error_period_ns,
+                Command.GET_ENCODER_ESTIMATES: model.encoder_period_ns,
+                Command.GET_IQ: model.iq_period_ns,
+                Command.GET_TEMPERATURE: model.temperature_period_ns,
+                Command.GET_BUS_VOLTAGE_CURRENT: model.bus_period_ns,
+                Command.GET_TORQUES: model.torques_period_ns,
+                Command.GET_POWERS: model.powers_period_ns,
+            },
+            watchdog_s=model.watchdog_ns * 1e-9,
+            watchdog_enabled=model.watchdog_ns > 0,
+            velocity_limit=model.velocity_limit_rev_s,
+            current_limit=model.current_limit_A,
+            position_gain=model.position_gain_1_s,
+            velocity_gain=model.velocity_gain_N_m_s_rev,
+            velocity_integrator_gain=model.velocity_integrator_gain_N_m_rev,
+            velocity_ramp=model.velocity_ramp_rev_s2,
+            torque_ramp=model.torque_ramp_N_m_s,
+            filter_bandwidth=model.input_filter_bandwidth_1_s,
+            trajectory_velocity=model.trajectory_velocity_rev_s,
+            trajectory_accel=model.trajectory_accel_rev_s2,
+            trajectory_decel=model.trajectory_decel_rev_s2,
+            motor_calibrated=model.calibrated,
+            encoder_calibrated=model.calibrated,
+        )
+
+    def copy(self) -> Self:
+        """The same, independent."""
+        return replace(self, period_ns=dict(self.period_ns))
+
+    def put(self, name: str, value: float) -> bool:
+        """Set one number; False if it is none that the drive takes."""
+        if not acceptable(value):
+            return False
+        setattr(self, name, value)
+        return True
+
+
+def acceptable(value: float) -> bool:
+    """Whether a limit, a gain or a rate may have this value."""
+    return isfinite(value) and value >= 0.0
