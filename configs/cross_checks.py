@@ -89,6 +89,17 @@ def _periods(scenario: Scenario) -> Iterator[Problem]:
         )
 
 
+_WHOLE_MILLISECONDS = (
+    "heartbeat_period_s",
+    "torques_period_s",
+    "error_period_s",
+    "iq_period_s",
+    "temperature_period_s",
+    "bus_voltage_period_s",
+    "powers_period_s",
+)
+
+
 def _drives(scenario: Scenario) -> Iterator[Problem]:
     drive = scenario.drive
     if drive.right_node == drive.left_node:
@@ -96,6 +107,16 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
     least_s, most_s = drive.command_latency_s
     if least_s > most_s:
         yield Problem("drive.command_latency_s", [least_s, most_s], "least before most")
+    for key in _WHOLE_MILLISECONDS:
+        period_s = getattr(drive, key)
+        if abs(period_s * 1e3 - round(period_s * 1e3)) > 1e-6:
+            yield Problem(f"drive.{key}", period_s, "whole milliseconds, as drives have them")
+    if drive.under_voltage_V >= drive.over_voltage_V:
+        above = f"must be below drive.over_voltage_V = {drive.over_voltage_V:g}"
+        yield Problem("drive.under_voltage_V", drive.under_voltage_V, above)
+    if drive.derate_from_C >= drive.derate_to_C:
+        above = f"must be below drive.derate_to_C = {drive.derate_to_C:g}"
+        yield Problem("drive.derate_from_C", drive.derate_from_C, above)
     if drive.watchdog_s and drive.watchdog_s < 2 * scenario.clock.control_period_s:
         yield Problem(
             "drive.watchdog_s",
