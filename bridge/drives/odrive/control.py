@@ -103,16 +103,22 @@ class Controller:
         elif limited:
             torque = min(torque, (p.velocity_limit - velocity) * p.velocity_gain)
             torque = max(torque, (-p.velocity_limit - velocity) * p.velocity_gain)
-        saturated = torque_limit is not None and abs(torque) > torque_limit
+        unlimited = torque
         if torque_limit is not None:
             torque = min(max(torque, -torque_limit), torque_limit)
         if mode == ControlMode.TORQUE:
             self._integral = 0.0
-        elif saturated:
-            self._integral *= _INTEGRATOR_KEEP ** (dt_s * _LOOP_HZ)
+        elif torque != unlimited:
+            self._decay(dt_s, self._integral + torque - unlimited)
         else:
             self._integral += p.velocity_integrator_gain * error * dt_s
         return torque
+
+    def _decay(self, dt_s: float, edge: float) -> None:
+        """Let the integral decay, but not past the edge from where on nothing limits any more."""
+        before = self._integral
+        after = before * _INTEGRATOR_KEEP ** (dt_s * _LOOP_HZ)
+        self._integral = edge if (before - edge) * (after - edge) < 0.0 else after
 
     def _follow_inputs(self, dt_s: float, input_torque: float) -> None:
         p = self._parameters

@@ -1,58 +1,15 @@
 """The emulated axis: states, hazards, replies, and that nothing on the bus can break it."""
 
-from dataclasses import replace
 from math import inf, isfinite, nan
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from odrive_axis import MODEL, MS, NODE, arm, axis, beat, tell, torque
 
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisError, AxisState, Command
-from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import EFF, ERR, RTR, Frame
-from configs.brief import DriveModel
-
-MS = 1_000_000
-MODEL = DriveModel(
-    protocol="odrive",
-    torque_constant_N_m_A=0.05,
-    current_limit_A=10.0,
-    velocity_limit_rev_s=10.0,
-    velocity_gain_N_m_s_rev=1 / 6,
-    overspeed_ratio=1.2,
-    torque_limiters=True,
-    heartbeat_period_ns=100 * MS,
-    encoder_period_ns=1 * MS,
-    torques_period_ns=0,
-    watchdog_ns=100 * MS,
-    zero_torque_on_disarm=False,
-    serial_number=0xABCDEF,
-)
-NODE = 3
-
-
-def axis(**changes) -> OdriveNode:
-    return OdriveNode(replace(MODEL, **changes), NODE, MODEL.serial_number)
-
-
-def tell(node: OdriveNode, command: Command, data: bytes = b"", now_ns: int = 0) -> list[Frame]:
-    return list(node.hear(Frame(f.identifier(node.node_id, command), data), now_ns))
-
-
-def arm(node: OdriveNode, now_ns: int = 0) -> OdriveNode:
-    tell(node, Command.SET_AXIS_STATE, f.ONE_U32.pack(8), now_ns)
-    assert node.state is AxisState.CLOSED_LOOP_CONTROL
-    return node
-
-
-def torque(node: OdriveNode, value: float, now_ns: int = 0) -> None:
-    tell(node, Command.SET_INPUT_TORQUE, f.ONE_FLOAT.pack(value), now_ns)
-
-
-def beat(node: OdriveNode) -> f.Heartbeat:
-    (frame,) = node.hear(f.request(node.node_id, Command.HEARTBEAT), 0)
-    return f.decode_heartbeat(frame.data)
 
 
 def test_a_drive_powers_up_idle_without_errors_and_makes_no_torque() -> None:
@@ -251,26 +208,6 @@ def test_a_state_that_is_no_state_is_answered_as_invalid() -> None:
     node = axis()
     tell(node, Command.SET_AXIS_STATE, f.ONE_U32.pack(99))
     assert beat(node).result == f.ProcedureResult.INVALID_STATE
-
-
-frames = st.builds(
-    Frame,
-    st.integers(0, 0x7FF)
-    | st.integers(0, 0x7FF).map(lambda i: i | RTR)
-    | st.integers(0, 2**32 - 1),
-    st.binary(max_size=8),
-)
-
-
-@given(st.lists(frames | st.builds(Frame, st.integers(0x60, 0x7F), st.binary(max_size=8))))
-def test_no_frames_ever_raise_or_make_a_torque_that_is_not_finite(sent: list[Frame]) -> None:
-    for limiters in (True, False):
-        node = axis(torque_limiters=limiters)
-        for t, frame in enumerate(sent):
-            for reply in node.hear(frame, t * MS):
-                assert len(reply.data) <= 8
-            node.due(t * MS)
-            assert isfinite(node.torque_demand())
 
 
 @given(st.binary(max_size=8), st.sampled_from([EFF, ERR]))
