@@ -6,8 +6,10 @@
 
     a, d  signed accelerations [rev/s²]   T = T_a + T_v + T_d
 
-The direction is the side of the goal on which braking at once would end. A move too short for the
-cruising speed turns at the speed where accelerating meets braking,
+The direction is the side of the goal on which braking at once would end. Two things are unlike the
+vendor's planner, which misses the goal in these cases where both limits differ: who is faster than
+v_c brakes with d, and who moves the wrong way turns with the smaller of both. A move too short for
+the cruising speed turns at the speed where accelerating meets braking,
 
     v_c² = (d v_0² + 2 a d Δx) / (d − a)                                                        (4)
 """
@@ -72,13 +74,16 @@ def plan(
     distance = goal - start
     stopping = copysign(start_velocity * start_velocity / (2.0 * decel), start_velocity)
     sign = 1.0 if distance >= stopping else -1.0
+    if sign * start_velocity < 0.0:
+        accel = min(accel, decel)
     a, d, cruise = sign * accel, -sign * decel, sign * speed
-    if sign * start_velocity > speed:
-        a = -a
+    too_fast = sign * start_velocity > speed
+    if too_fast:
+        a = d
     accel_s, decel_s = (cruise - start_velocity) / a, speed / decel
     least = 0.5 * accel_s * (cruise + start_velocity) + 0.5 * decel_s * cruise
-    if sign * distance >= sign * least:
-        cruise_s = (distance - least) / cruise
+    if too_fast or sign * distance >= sign * least:
+        cruise_s = max((distance - least) / cruise, 0.0)
     else:
         square = (d * start_velocity * start_velocity + 2.0 * a * d * distance) / (d - a)
         cruise = sign * sqrt(max(square, 0.0))

@@ -4,7 +4,7 @@ from itertools import pairwise
 from math import exp, nan, pi
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from odrive_axis import MS, arm, asked, axis, beat, floats, modes, tell, torque
 
@@ -177,6 +177,8 @@ def test_torques_are_told_after_limits() -> None:
     st.tuples(st.floats(-50, 50), st.floats(-5, 5), st.floats(-50, 50)),
     st.tuples(st.floats(0.1, 5), st.floats(0.1, 5), st.floats(0.1, 5)),
 )
+@example((0.0, 1.43, 1.0), (1.0, 3.8, 0.6))
+@example((0.0, 3.0, 5.0), (1.0, 0.6, 3.8))
 def test_a_trapezoid_keeps_its_limits_and_ends_at_rest_in_its_goal(ends, limits) -> None:
     start, velocity, goal = ends
     move = plan(start, velocity, goal, limits)
