@@ -366,17 +366,31 @@ class DriveModel:
     watchdog_ns: int  # 0: off
     zero_torque_on_disarm: bool
     serial_number: int  # of the right drive; the left one has the next number
-    velocity_integrator_gain_N_m_rev: float = 1.0 / 3.0
-    position_gain_1_s: float = 20.0
-    iq_period_ns: int = 0  # these as `torques_period_ns`
-    temperature_period_ns: int = 0
-    bus_period_ns: int = 0
-    error_period_ns: int = 0
-    powers_period_ns: int = 0
-    calibrated: bool = True
-    estop_blocks_arming: bool = True  # until Clear_Errors
-    firmware: tuple[int, int, int] = (0, 6, 10)
     command_latency_ns: tuple[int, int] = (0, 0)  # from a frame's end until firmware acts on it
+    error_period_ns: int = 0  # cyclic messages; 0: only on request
+    iq_period_ns: int = 0
+    temperature_period_ns: int = 0
+    bus_period_ns: int = 0  # voltage and current
+    powers_period_ns: int = 0
+    firmware: tuple[int, int, int] = (0, 6, 10)
+    boot_ns: int = 0  # silent for so long after a reboot
+    calibrated: bool = True  # at power-up
+    calibration_ns: int = 2_000_000_000  # each of motor and encoder
+    estop_blocks_arming: bool = True  # until errors are cleared
+    position_gain_1_s: float = 20.0
+    velocity_integrator_gain_N_m_rev: float = 1.0 / 3.0
+    velocity_ramp_rev_s2: float = 1.0
+    torque_ramp_N_m_s: float = 0.01
+    input_filter_bandwidth_1_s: float = 2.0
+    trajectory_velocity_rev_s: float = 2.0
+    trajectory_accel_rev_s2: float = 0.5
+    trajectory_decel_rev_s2: float = 0.5
+    current_margin_A: float = 8.0  # above the limit in force, then it disarms
+    derate_from_C: float = 100.0  # the current limit falls linearly
+    derate_to_C: float = 120.0  # to nothing; 5 K above, it disarms
+    under_voltage_V: float = 10.0
+    over_voltage_V: float = 30.0
+    spinout_power_W: float = 10.0  # 0: not detected
 
 
 @dataclass(frozen=True, slots=True)

@@ -279,17 +279,29 @@ def _drive_model(scenario: Scenario, number: int) -> DriveModel:
         zero_torque_on_disarm=drive.zero_torque_on_disarm,
         velocity_integrator_gain_N_m_rev=drive.velocity_integrator_gain_N_m_rev,
         position_gain_1_s=drive.position_gain_1_s,
-        iq_period_ns=round(drive.iq_period_s * 1e9),
-        temperature_period_ns=round(drive.temperature_period_s * 1e9),
-        bus_period_ns=round(drive.bus_period_s * 1e9),
-        error_period_ns=round(drive.error_period_s * 1e9),
-        powers_period_ns=round(drive.powers_period_s * 1e9),
-        calibrated=drive.calibrated,
-        estop_blocks_arming=drive.estop_blocks_arming,
-        firmware=drive.firmware,
         command_latency_ns=_latency_ns(drive),
         serial_number=SERIAL_NUMBER + 2 * number,
+        error_period_ns=round(drive.error_period_s * 1e9),
+        iq_period_ns=round(drive.iq_period_s * 1e9),
+        temperature_period_ns=round(drive.temperature_period_s * 1e9),
+        bus_period_ns=round(drive.bus_voltage_period_s * 1e9),
+        powers_period_ns=round(drive.powers_period_s * 1e9),
+        firmware=_version(drive.firmware),
+        boot_ns=round(drive.boot_s * 1e9),
+        calibrated=drive.calibrated,
+        calibration_ns=round(drive.calibration_s * 1e9),
+        estop_blocks_arming=drive.estop_blocks_arming,
+        under_voltage_V=drive.under_voltage_V,
+        over_voltage_V=drive.over_voltage_V,
+        derate_from_C=drive.derate_from_C,
+        derate_to_C=drive.derate_to_C,
+        spinout_power_W=drive.spinout_power_W,
     )
+
+
+def _version(text: str) -> tuple[int, int, int]:
+    major, minor, revision = (int(part) for part in text.split("."))
+    return major, minor, revision
 
 
 def _latency_ns(drive: sections.Drive) -> tuple[int, int]:

@@ -93,29 +93,36 @@ def _periods(scenario: Scenario) -> Iterator[Problem]:
         )
 
 
+_WHOLE_MILLISECONDS = (
+    "heartbeat_period_s",
+    "torques_period_s",
+    "error_period_s",
+    "iq_period_s",
+    "temperature_period_s",
+    "bus_voltage_period_s",
+    "powers_period_s",
+)
+
+
 def _drives(scenario: Scenario) -> Iterator[Problem]:
     drive = scenario.drive
     if drive.right_node == drive.left_node:
         yield Problem("drive.left_node", drive.left_node, "must differ from drive.right_node")
-        return
-    taken: dict[tuple[str, int], str] = {}
-    for name in scenario.names:
-        bus = scenario.bus_of(name)
-        for side, node in zip(("right", "left"), scenario.nodes_of(name), strict=True):
-            key = f"robot.{name}.{side}_node"
-            if node > MAX_NODE:
-                right = f"bus {bus} has no node left for it: 0 to {MAX_NODE}"
-                yield Problem(key, node, right)
-            elif (owner := taken.setdefault((bus, node), f"{name}'s {side} drive")) and (
-                owner != f"{name}'s {side} drive"
-            ):
-                yield Problem(key, node, f"on bus {bus} it is {owner} already; choose another")
-    for key, value in drive.model_dump().items():
-        if key.endswith("_period_s") and abs(value * 1e3 - round(value * 1e3)) > 1e-6:
-            yield Problem(f"drive.{key}", value, "a whole number of milliseconds, as drives count")
+    else:
+        yield from _nodes(scenario)
     least_s, most_s = drive.command_latency_s
     if least_s > most_s:
         yield Problem("drive.command_latency_s", [least_s, most_s], "least before most")
+    for key in _WHOLE_MILLISECONDS:
+        period_s = getattr(drive, key)
+        if abs(period_s * 1e3 - round(period_s * 1e3)) > 1e-6:
+            yield Problem(f"drive.{key}", period_s, "whole milliseconds, as drives have them")
+    if drive.under_voltage_V >= drive.over_voltage_V:
+        above = f"must be below drive.over_voltage_V = {drive.over_voltage_V:g}"
+        yield Problem("drive.under_voltage_V", drive.under_voltage_V, above)
+    if drive.derate_from_C >= drive.derate_to_C:
+        above = f"must be below drive.derate_to_C = {drive.derate_to_C:g}"
+        yield Problem("drive.derate_from_C", drive.derate_from_C, above)
     if drive.watchdog_s and drive.watchdog_s < 2 * scenario.clock.control_period_s:
         yield Problem(
             "drive.watchdog_s",
@@ -130,6 +137,21 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
             f"must be below half of encoder.pll_rate_hz = {encoder.pll_rate_hz:g}, as drives want"
             " it: twice the bandwidth times the loop period is a gain below 1",
         )
+
+
+def _nodes(scenario: Scenario) -> Iterator[Problem]:
+    taken: dict[tuple[str, int], str] = {}
+    for name in scenario.names:
+        bus = scenario.bus_of(name)
+        for side, node in zip(("right", "left"), scenario.nodes_of(name), strict=True):
+            key = f"robot.{name}.{side}_node"
+            if node > MAX_NODE:
+                right = f"bus {bus} has no node left for it: 0 to {MAX_NODE}"
+                yield Problem(key, node, right)
+            elif (owner := taken.setdefault((bus, node), f"{name}'s {side} drive")) and (
+                owner != f"{name}'s {side} drive"
+            ):
+                yield Problem(key, node, f"on bus {bus} it is {owner} already; choose another")
 
 
 def _host(scenario: Scenario) -> Iterator[Problem]:

@@ -318,22 +318,33 @@ class Drive(Section):
     right_node: Node = 0
     left_node: Node = 1
     heartbeat_period_s: Positive = 0.1
-    torques_period_s: NotNegative = Field(0.0, description="0: only on request; so the next ones")
+    torques_period_s: NotNegative = Field(
+        0.0, description="this message and the next five: whole milliseconds; 0: only on request"
+    )
+    error_period_s: NotNegative = 0.0
     iq_period_s: NotNegative = 0.0
     temperature_period_s: NotNegative = 0.0
-    bus_period_s: NotNegative = 0.0
-    error_period_s: NotNegative = 0.0
+    bus_voltage_period_s: NotNegative = 0.0
     powers_period_s: NotNegative = 0.0
+    firmware: Annotated[str, Field(pattern=r"^0\.6\.[0-9]{1,2}$")] = Field(
+        "0.6.10", description="from 0.6.11 on, writing an endpoint is answered"
+    )
+    boot_s: NotNegative = Field(0.5, description="silent for so long after a reboot")
+    calibrated: bool = Field(True, description="at power-up; else arming needs a calibration")
+    calibration_s: Positive = Field(2.0, description="of the motor, and then of the encoder")
+    estop_blocks_arming: bool = Field(True, description="until errors are cleared")
+    under_voltage_V: NotNegative = Field(10.0, description="of the bus; below, a drive disarms")
+    over_voltage_V: Positive = Field(30.0, description="of the bus; above, a drive disarms")
+    derate_from_C: Finite = Field(100.0, description="from here the current limit falls linearly")
+    derate_to_C: Finite = Field(120.0, description="to nothing here; 5 K above, a drive disarms")
+    spinout_power_W: NotNegative = Field(
+        10.0, description="disarms if the motor brakes and takes more than this; 0: it never does"
+    )
     watchdog_s: NotNegative = Field(0.1, description="0: off, as drives are delivered")
     command_latency_s: Annotated[tuple[NotNegative, NotNegative], Field(strict=False)] = Field(
         (0.0001, 0.0011),
         description="least and most from the end of a frame until firmware acts on it; preset"
         " realistic on buses with bit timing",
-    )
-    calibrated: bool = Field(True, description="False: it has to be calibrated before it arms")
-    estop_blocks_arming: bool = Field(True, description="until Clear_Errors")
-    firmware: Annotated[tuple[int, int, int], Field(strict=False)] = Field(
-        (0, 6, 10), description="from 0.6.11 on, SDO writes are answered"
     )
     zero_torque_on_disarm: bool = Field(False, description="False: as in the field")
     torque_constant_N_m_A: Positive = 0.05

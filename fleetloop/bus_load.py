@@ -1,11 +1,12 @@
 """What a scenario asks of its buses: load, worst-case response times, and whether that can be.
 
 Per robot and bus: two heartbeats and two encoder frames from the drives, two torque frames from the
-controller every period, and torque telemetry if the scenario has it. Typical lengths are those of
-moving wheels; worst cases are `bridge.can_bus.load`'s. Robots that share a bus are taken together.
+controller every period, and what else of the drives the scenario makes cyclic. Typical lengths are
+those of moving wheels; worst cases are `bridge.can_bus.load`'s. Robots that share a bus are taken
+together.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from statistics import fmean
 
 from bridge.can_bus.bits import frame_bits
@@ -60,7 +61,7 @@ def _axis_messages(robot: RobotBrief, node: int, period_ns: int) -> list[Message
     heartbeat = HEARTBEAT.pack(0, AxisState.CLOSED_LOOP_CONTROL, 0, 0, 0)
     moving = [_TYPICAL_REV_S * (1 + 0.001 * n) for n in range(_SAMPLES)]
     torques = [_TYPICAL_N_M * (1 + 0.01 * n) for n in range(_SAMPLES)]
-    cyclic: Mapping[Command, tuple[int, Sequence[bytes]]] = {
+    cyclic: dict[Command, tuple[int, Sequence[bytes]]] = {
         Command.HEARTBEAT: (drive.heartbeat_period_ns, [heartbeat]),
         Command.GET_ENCODER_ESTIMATES: (
             drive.encoder_period_ns,
@@ -72,8 +73,16 @@ def _axis_messages(robot: RobotBrief, node: int, period_ns: int) -> list[Message
             [TWO_FLOATS.pack(torque, torque * 1.003) for torque in torques],
         ),
     }
+    others = [TWO_FLOATS.pack(24.0 - 0.01 * n, 0.3 + 0.003 * n) for n in range(_SAMPLES)]
+    more: dict[Command, tuple[int, Sequence[bytes]]] = {
+        Command.GET_ERROR: (drive.error_period_ns, [bytes(8)]),
+        Command.GET_IQ: (drive.iq_period_ns, others),
+        Command.GET_TEMPERATURE: (drive.temperature_period_ns, others),
+        Command.GET_BUS_VOLTAGE_CURRENT: (drive.bus_period_ns, others),
+        Command.GET_POWERS: (drive.powers_period_ns, others),
+    }
     messages = []
-    for command, (every_ns, samples) in cyclic.items():
+    for command, (every_ns, samples) in (cyclic | more).items():
         if every_ns:
             can_id = identifier(node, command)
             mean = fmean(frame_bits(Frame(can_id, data)) for data in samples)

@@ -67,13 +67,13 @@ class DriveNode(Protocol):
     fed_ns: int
     """When it last took a set-point, bus time."""
     setpoint_id: int
-    """The identifier of the set-point that it takes at its address now."""
+    """The identifier of the set-point that it takes at its address now; negative: it takes none."""
 
     def feed(self, revolutions: float, rev_s: float) -> None:
         """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
 
     def due(self, now_ns: int) -> Sequence[Frame]:
-        """Cyclic frames due at this instant."""
+        """Frames due until this instant, the newest of each; the drive supervises itself first."""
 
     def feedback(self, now_ns: int) -> Frame:
         """The encoder frame out of its turn; the next cyclic one comes a period later."""

@@ -1,10 +1,10 @@
-"""What a drive measures of its motor and of its supply, whatever its protocol."""
+"""What a drive measures beside its encoder."""
 
 from typing import NamedTuple
 
 
 class Feeling(NamedTuple):
-    """One reading."""
+    """What a drive measures of its motor and of the supply."""
 
     torque_N_m: float  # the motor's, estimated
     current_A: float  # q axis

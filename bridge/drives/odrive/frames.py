@@ -59,9 +59,16 @@ class AxisState(IntEnum):
     STARTUP_SEQUENCE = 2
     FULL_CALIBRATION_SEQUENCE = 3
     MOTOR_CALIBRATION = 4
+    SENSORLESS_CONTROL = 5
     ENCODER_INDEX_SEARCH = 6
     ENCODER_OFFSET_CALIBRATION = 7
     CLOSED_LOOP_CONTROL = 8
+    LOCKIN_SPIN = 9
+    ENCODER_DIR_FIND = 10
+    HOMING = 11
+    ENCODER_HALL_POLARITY_CALIBRATION = 12
+    ENCODER_HALL_PHASE_CALIBRATION = 13
+    ANTICOGGING_CALIBRATION = 14
 
 
 class ControlMode(IntEnum):
@@ -93,8 +100,27 @@ class ProcedureResult(IntEnum):
     BUSY = 1
     CANCELLED = 2
     DISARMED = 3
+    NO_RESPONSE = 4
+    POLE_PAIR_CPR_MISMATCH = 5
+    PHASE_RESISTANCE_OUT_OF_RANGE = 6
+    PHASE_INDUCTANCE_OUT_OF_RANGE = 7
+    UNBALANCED_PHASES = 8
+    INVALID_MOTOR_TYPE = 9
+    ILLEGAL_HALL_STATE = 10
+    TIMEOUT = 11
+    HOMING_WITHOUT_ENDSTOP = 12
     INVALID_STATE = 13
     NOT_CALIBRATED = 14
+    NOT_CONVERGING = 15
+
+
+class RebootAction(IntEnum):
+    """The byte of Reboot."""
+
+    REBOOT = 0
+    SAVE_CONFIGURATION = 1
+    ERASE_CONFIGURATION = 2
+    ENTER_DFU_MODE = 3
 
 
 class AxisError(IntFlag):
@@ -130,6 +156,7 @@ ONE_U32 = struct.Struct("<I")
 TWO_U32 = struct.Struct("<II")
 HEARTBEAT = struct.Struct("<IBBBB")  # axis error, state, procedure result, flags, reserved
 VERSION = struct.Struct("<8B")
+SDO = struct.Struct("<BHB")  # opcode (0 in replies), endpoint, reserved; the value follows
 INPUT_POS = struct.Struct("<fhh")  # rev, 0.001 rev/s, 0.001 N·m
 
 

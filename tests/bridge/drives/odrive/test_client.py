@@ -61,7 +61,7 @@ def robot() -> Robot:
 
 def test_arming_ends_with_both_axes_in_closed_loop_at_zero_torque(robot: Robot) -> None:
     for axis in robot.axes:
-        axis.control.input_torque = 0.4  # a stale one
+        axis.input_torque = 0.4  # a stale one
     robot.arm()
     assert [axis.state for axis in robot.axes] == [AxisState.CLOSED_LOOP_CONTROL] * 2
     assert [axis.torque_demand(0.0) for axis in robot.axes] == [0.0, 0.0]

@@ -1,130 +1,204 @@
-"""The controller of an axis: the modes against closed forms, on a wheel that only has inertia."""
+"""Control and input modes against their closed forms."""
 
-from math import exp, pi
+from itertools import pairwise
+from math import exp, nan, pi
 
 import pytest
-from drive_bench import MODEL
+from hypothesis import example, given
+from hypothesis import strategies as st
+from odrive_axis import MS, arm, asked, axis, beat, floats, modes, tell, torque
 
-from bridge.drives.odrive.control import Control
-from bridge.drives.odrive.frames import ControlMode, InputMode
+from bridge.drives.odrive import frames as f
+from bridge.drives.odrive.frames import AxisError, AxisState, Command, ControlMode, InputMode
+from bridge.drives.odrive.node import OdriveNode
+from bridge.drives.odrive.trapezoid import plan
 
-DT = 0.001
-INERTIA = 0.0074 * 2 * pi  # N·m per rev/s²
-
-
-def control(mode: ControlMode, how: InputMode = InputMode.PASSTHROUGH) -> Control:
-    made = Control(MODEL)
-    made.set_modes(mode, how)
-    return made
+UNWATCHED = {"watchdog_ns": 0}
 
 
-class Wheel:
-    """An inertia that the controller turns."""
-
-    def __init__(self, by: Control) -> None:
-        self.by = by
-        self.position = self.velocity = 0.0
-        by.reset(0.0, 0.0)
-
-    def run(self, seconds: float) -> None:
-        for _ in range(round(seconds / DT)):
-            torque = self.by.demand(DT, self.position, self.velocity, 1.0)
-            self.velocity += DT * torque / INERTIA
-            self.position += DT * self.velocity
+def position(node: OdriveNode, revolutions: float, vel_ff: int = 0, torque_ff: int = 0) -> None:
+    tell(node, Command.SET_INPUT_POS, f.INPUT_POS.pack(revolutions, vel_ff, torque_ff))
 
 
-def test_velocity_control_reaches_its_set_point_at_the_rate_of_its_gain() -> None:
-    by = control(ControlMode.VELOCITY)
-    by.velocity_integrator_gain = 0.0
-    wheel = Wheel(by)
-    by.input_velocity = 1.0
-    wheel.run(0.3)
-    assert wheel.velocity == pytest.approx(1.0 - exp(-0.3 * by.velocity_gain / INERTIA), abs=0.01)
-    wheel.run(4.0)
-    assert wheel.velocity == pytest.approx(1.0, abs=1e-3)
+def spin(node: OdriveNode, seconds: float, inertia: float = 0.01, dt: float = 0.001) -> list[float]:
+    """A flywheel [N·m·s²/rad] on the axis; its speeds [rev/s]."""
+    at, speed, speeds = node.position, node.velocity, []
+    for _ in range(round(seconds / dt)):
+        speed += node.torque_demand(dt) / inertia * dt / (2 * pi)
+        at += speed * dt
+        node.feed(at, speed)
+        speeds.append(speed)
+    return speeds
 
 
-def test_the_integral_overcomes_a_constant_load() -> None:
-    by = control(ControlMode.VELOCITY)
-    wheel = Wheel(by)
-    by.input_velocity = 1.0
-    for _ in range(10_000):
-        torque = by.demand(DT, wheel.position, wheel.velocity, 1.0) - 0.05
-        wheel.velocity += DT * torque / INERTIA
-    assert wheel.velocity == pytest.approx(1.0, abs=1e-3)
+def test_velocity_mode_is_proportional_and_integral_with_feed_forward() -> None:
+    node = axis(**UNWATCHED)
+    modes(node, ControlMode.VELOCITY)
+    floats(node, Command.SET_VEL_GAINS, 0.1, 0.5)
+    arm(node)
+    floats(node, Command.SET_INPUT_VEL, 2.0, 0.05)
+    assert node.torque_demand(0.01) == pytest.approx(0.05 + 0.1 * 2.0)
+    assert node.torque_demand(0.01) == pytest.approx(0.05 + 0.1 * 2.0 + 0.5 * 2.0 * 0.01)
+    node.feed(0.0, 3.0)
+    assert node.torque_demand(0.01) == pytest.approx(0.05 - 0.1 + 2 * 0.01)
 
 
-def test_position_control_goes_to_its_set_point_and_stays() -> None:
-    by = control(ControlMode.POSITION)
-    by.position_gain = 2.0
-    by.velocity_integrator_gain = 0.0
-    wheel = Wheel(by)
-    by.input_position = 0.5
-    wheel.run(8.0)
-    assert wheel.position == pytest.approx(0.5, abs=1e-3)
-    assert wheel.velocity == pytest.approx(0.0, abs=1e-3)
+def test_velocity_mode_reaches_its_velocity() -> None:
+    node = axis(**UNWATCHED)
+    modes(node, ControlMode.VELOCITY)
+    floats(arm(node), Command.SET_INPUT_VEL, 3.0, 0.0)
+    assert spin(node, 6.0)[-1] == pytest.approx(3.0, abs=0.01)
 
 
-def test_a_velocity_ramp_rises_at_its_rate() -> None:
-    by = control(ControlMode.VELOCITY, InputMode.VEL_RAMP)
-    by.velocity_ramp_rate, by.input_velocity = 2.0, 3.0
-    for _ in range(500):
-        by.demand(DT, 0.0, 0.0, 1.0)
-    assert by.velocity == pytest.approx(1.0)
-    for _ in range(2000):
-        by.demand(DT, 0.0, 0.0, 1.0)
-    assert by.velocity == 3.0
+def test_the_velocity_limit_holds_in_velocity_mode_and_the_current_limit_everywhere() -> None:
+    node = axis(**UNWATCHED)
+    modes(node, ControlMode.VELOCITY)
+    floats(node, Command.SET_LIMITS, 4.0, 1.0)
+    floats(arm(node), Command.SET_INPUT_VEL, 9.0, 0.0)
+    assert node.torque_demand(0.001) == pytest.approx(1.0 * 0.05)
+    speeds = spin(node, 20.0)
+    assert speeds[-1] == pytest.approx(4.0, abs=0.02)
+    assert node.state is AxisState.CLOSED_LOOP_CONTROL
+
+
+def test_position_mode_is_a_cascade_over_velocity_mode() -> None:
+    node = axis(**UNWATCHED)
+    node.feed(1.0, 0.5)
+    modes(node, ControlMode.POSITION)
+    floats(node, Command.SET_POS_GAIN, 4.0)
+    floats(node, Command.SET_VEL_GAINS, 0.1, 0.0)
+    arm(node)
+    position(node, 1.25, vel_ff=250, torque_ff=20)
+    assert node.torque_demand(0.001) == pytest.approx(0.02 + 0.1 * (4.0 * 0.25 + 0.25 - 0.5))
+
+
+def test_position_mode_reaches_its_position() -> None:
+    node = axis(**UNWATCHED)
+    modes(node, ControlMode.POSITION)
+    floats(node, Command.SET_POS_GAIN, 4.0)
+    arm(node)
+    position(node, 1.5)
+    spin(node, 10.0)
+    assert node.position == pytest.approx(1.5, abs=0.01)
+
+
+def test_arming_in_position_mode_holds_the_place_where_the_axis_is() -> None:
+    node = axis(**UNWATCHED)
+    modes(node, ControlMode.POSITION)
+    position(node, 100.0)
+    node.feed(7.0, 0.0)
+    assert arm(node).torque_demand(0.001) == 0.0
+
+
+def test_a_velocity_ramp_rises_at_its_rate_and_feeds_inertia_forward() -> None:
+    node = axis(velocity_ramp_rev_s2=2.0, **UNWATCHED)
+    modes(node, ControlMode.VELOCITY, InputMode.VEL_RAMP)
+    floats(node, Command.SET_VEL_GAINS, 0.1, 0.0)
+    floats(node, Command.SET_TRAJ_INERTIA, 0.03)
+    floats(arm(node), Command.SET_INPUT_VEL, 1.0, 0.0)
+    demands = [node.torque_demand(0.1) for _ in range(8)]
+    ramp = [0.1 * 0.2 * n + 0.06 for n in range(1, 6)]
+    assert demands == pytest.approx([*ramp, 0.1, 0.1, 0.1])
 
 
 def test_a_torque_ramp_rises_at_its_rate() -> None:
-    by = control(ControlMode.TORQUE, InputMode.TORQUE_RAMP)
-    by.torque_ramp_rate, by.input_torque = 0.1, 0.4
-    demands = [by.demand(DT, 0.0, 0.0, 1.0) for _ in range(5000)]
-    assert demands[999] == pytest.approx(0.1)
-    assert demands[-1] == pytest.approx(0.4)
+    node = axis(torque_ramp_N_m_s=0.5, **UNWATCHED)
+    modes(node, ControlMode.TORQUE, InputMode.TORQUE_RAMP)
+    torque(arm(node), 0.12)
+    assert [node.torque_demand(0.1) for _ in range(4)] == pytest.approx([0.05, 0.1, 0.12, 0.12])
 
 
-@pytest.mark.parametrize(("distance", "seconds"), [(10.0, 10 / 2 + 2 / 0.5), (2.0, 2 * 2.0)])
-def test_a_trapezoidal_trajectory_takes_the_time_that_its_limits_give(
-    distance: float, seconds: float
-) -> None:
-    by = control(ControlMode.POSITION, InputMode.TRAP_TRAJ)
-    by.input_position, by.arrived = distance, False
-    fastest, steps = 0.0, 0
-    while not by.arrived and steps < 20_000:
-        by.demand(DT, by.position, by.velocity, 1.0)
-        fastest = max(fastest, by.velocity)
-        steps += 1
-    assert steps * DT == pytest.approx(seconds, rel=0.03)
-    assert fastest <= 2.0
-    assert by.position == distance
+def test_a_position_filter_is_critically_damped_of_second_order() -> None:
+    node = axis(input_filter_bandwidth_1_s=2.0, **UNWATCHED)
+    modes(node, ControlMode.POSITION, InputMode.POS_FILTER)
+    arm(node)
+    position(node, 1.0)
+    for _ in range(10_000):
+        node.torque_demand(0.0001)
+    expected = 1.0 - (1.0 + 2.0) * exp(-2.0)
+    assert node.controller.position_setpoint == pytest.approx(expected, abs=1e-3)
 
 
-@pytest.mark.parametrize("dt", [0.0005, 0.005, 0.02])
-def test_the_position_filter_is_critically_damped_at_any_step(dt: float) -> None:
-    by = control(ControlMode.POSITION, InputMode.POS_FILTER)
-    by.filter_bandwidth, by.input_position = 5.0, 1.0
-    places = []
-    for _ in range(round(3.0 / dt)):
-        by.demand(dt, by.position, by.velocity, 1.0)
-        places.append(by.position)
-    assert max(places) <= 1.0 + 1e-6
-    assert places[-1] == pytest.approx(1.0, abs=1e-3)
+def test_a_trapezoidal_move_sets_trajectory_done_when_it_is() -> None:
+    node = axis(**UNWATCHED)
+    modes(node, ControlMode.POSITION, InputMode.TRAP_TRAJ)
+    floats(node, Command.SET_TRAJ_VEL_LIMIT, 1.0)
+    floats(node, Command.SET_TRAJ_ACCEL_LIMITS, 2.0, 4.0)
+    arm(node)
+    assert beat(node).trajectory_done
+    position(node, 2.0)
+    duration = 2.0 / 1.0 + 0.5 * (1.0 / 2.0 + 1.0 / 4.0)
+    spin(node, duration - 0.01)
+    assert not beat(node).trajectory_done
+    spin(node, 0.02)
+    assert beat(node).trajectory_done
+    assert node.controller.position_setpoint == 2.0
 
 
-def test_in_torque_control_speed_limits_torque_and_current_limits_it_silently() -> None:
-    by = control(ControlMode.TORQUE)
-    by.input_torque = 5.0
-    assert by.demand(DT, 0.0, 0.0, 1.0) == pytest.approx(10.0 * 0.05)
-    assert by.demand(DT, 0.0, 9.7, 1.0) == pytest.approx((10.0 - 9.7) / 6)
-    assert by.demand(DT, 0.0, 12.0, 1.0) == pytest.approx((10.0 - 12.0) / 6)
-    assert by.demand(DT, 0.0, 0.0, 0.25) == pytest.approx(0.125)
+@pytest.mark.parametrize("control", [ControlMode.VOLTAGE, 4, 0xFFFF_FFFF])
+def test_a_control_mode_that_does_not_exist_disarms(control: int) -> None:
+    node = arm(axis())
+    modes(node, control)
+    assert beat(node)[:2] == (AxisError.BAD_CONFIG, AxisState.IDLE)
 
 
-def test_arming_forgets_the_integral_and_stays_where_the_wheel_is() -> None:
-    by = control(ControlMode.POSITION)
-    by.input_position = 5.0
-    for _ in range(100):
-        by.demand(DT, 0.0, 0.0, 1.0)
-    by.reset(2.0, 0.0)
-    assert by.demand(DT, 2.0, 0.0, 1.0) == pytest.approx(0.0)
+@pytest.mark.parametrize("inputs", [InputMode.MIRROR, InputMode.TUNING, 4, 9, 0xFFFF_FFFF])
+def test_an_input_mode_that_does_not_exist_disarms_and_keeps_from_arming(inputs: int) -> None:
+    node = arm(axis())
+    modes(node, ControlMode.TORQUE, inputs)
+    assert beat(node)[:2] == (AxisError.BAD_CONFIG, AxisState.IDLE)
+    tell(node, Command.CLEAR_ERRORS)
+    tell(node, Command.SET_AXIS_STATE, f.ONE_U32.pack(8))
+    assert beat(node)[:2] == (AxisError.BAD_CONFIG, AxisState.IDLE)
+
+
+def test_gains_that_are_no_numbers_or_negative_change_nothing() -> None:
+    node = axis(**UNWATCHED)
+    modes(node, ControlMode.VELOCITY)
+    for bad in ((nan, 0.1), (0.1, nan), (-0.1, 0.1), (0.1, -0.1)):
+        floats(node, Command.SET_VEL_GAINS, *bad)
+    floats(node, Command.SET_POS_GAIN, nan)
+    floats(node, Command.SET_TRAJ_VEL_LIMIT, -1.0)
+    floats(arm(node), Command.SET_INPUT_VEL, 0.6, 0.0)
+    assert node.torque_demand(0.0) == pytest.approx(0.1)
+    assert node.ignored == 6
+
+
+def test_torques_are_told_after_limits() -> None:
+    node = arm(axis())
+    torque(node, 5.0)
+    node.torque_demand(0.001)
+    assert asked(node, Command.GET_TORQUES) == (0.5, 0.5)
+    assert asked(node, Command.GET_IQ) == (10.0, 10.0)
+    assert node.input_torque == 5.0
+
+
+@given(
+    st.tuples(st.floats(-50, 50), st.floats(-5, 5), st.floats(-50, 50)),
+    st.tuples(st.floats(0.1, 5), st.floats(0.1, 5), st.floats(0.1, 5)),
+)
+@example((0.0, 1.43, 1.0), (1.0, 3.8, 0.6))
+@example((0.0, 3.0, 5.0), (1.0, 0.6, 3.8))
+def test_a_trapezoid_keeps_its_limits_and_ends_at_rest_in_its_goal(ends, limits) -> None:
+    start, velocity, goal = ends
+    move = plan(start, velocity, goal, limits)
+    assert move is not None
+    step = move.duration_s / 200
+    points = [move.at(n * step) for n in range(201)]
+    assert points[0][:2] == pytest.approx((start, velocity), abs=1e-6)
+    assert move.at(move.duration_s) == (goal, 0.0, 0.0)
+    fastest = max(limits[0], abs(velocity))
+    for one, two in pairwise(points):
+        assert abs(two.velocity) <= fastest + 1e-6
+        assert abs(two.velocity - one.velocity) <= max(limits[1:]) * step + 1e-6
+        assert abs(two.position - one.position) <= fastest * step + 1e-6
+
+
+def test_a_trajectory_without_acceleration_is_not_begun() -> None:
+    assert plan(0.0, 0.0, 1.0, (1.0, 0.0, 1.0)) is None
+    node = axis(**UNWATCHED)
+    modes(node, ControlMode.POSITION, InputMode.TRAP_TRAJ)
+    floats(node, Command.SET_TRAJ_ACCEL_LIMITS, 0.0, 0.0)
+    arm(node)
+    position(node, 2.0)
+    assert node.torque_demand(MS * 1e-9) == 0.0

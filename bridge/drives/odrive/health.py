@@ -1,0 +1,83 @@
+"""What a drive's measurements mean: derating, and what disarms it.
+
+    measured                                    consequence
+    FET or motor between θ_1 and θ_2            current limit × (θ_2 − θ) / (θ_2 − θ_1)         (1)
+    FET above θ_2 + 5 K                         INVERTER_OVER_TEMP
+    motor above θ_2 + 5 K                       MOTOR_OVER_TEMP; no thermistor (NaN): not looked at
+    FET not a number                            THERMISTOR_DISCONNECTED, current limit 0
+    bus below, above its limits, not a number   DC_BUS_UNDER_VOLTAGE, DC_BUS_OVER_VOLTAGE
+    |i_q| above the limit in force + margin     CURRENT_LIMIT_VIOLATION
+    P_mechanical < −P_s and P_electrical > P_s  SPINOUT_DETECTED
+
+Powers are low-passed with 20 rad/s. Both thermistors derate alike. Source: ODrive firmware 0.5.6,
+thermistor.cpp, motor.cpp, controller.cpp; names of the errors are 0.6's.
+"""
+
+from math import exp, pi
+
+from bridge.drives.feeling import Feeling
+from bridge.drives.odrive.frames import AxisError
+from configs.brief import DriveModel
+
+TRIP_K = 5.0
+_POWER_BANDWIDTH_RAD_S = 20.0
+
+
+def derating(celsius: float, model: DriveModel) -> float:
+    """The factor on the current limit by (1), in [0, 1]; 0 for NaN."""
+    span = model.derate_to_C - model.derate_from_C
+    if not celsius < model.derate_to_C:
+        return 0.0
+    return 1.0 if celsius <= model.derate_from_C else (model.derate_to_C - celsius) / span
+
+
+def current_limit(feeling: Feeling, limit_A: float, model: DriveModel) -> float:
+    """The current limit in force [A]."""
+    factor = derating(feeling.fet_C, model)
+    if feeling.motor_C == feeling.motor_C:
+        factor = min(factor, derating(feeling.motor_C, model))
+    return limit_A * factor
+
+
+def conditions(feeling: Feeling, limit_in_force_A: float, model: DriveModel) -> int:
+    """What must disarm the drive now, as bits of `AxisError`."""
+    hottest_C = model.derate_to_C + TRIP_K
+    bits = 0
+    if feeling.fet_C != feeling.fet_C:
+        bits |= AxisError.THERMISTOR_DISCONNECTED.value
+    elif feeling.fet_C >= hottest_C:
+        bits |= AxisError.INVERTER_OVER_TEMP.value
+    if feeling.motor_C >= hottest_C:
+        bits |= AxisError.MOTOR_OVER_TEMP.value
+    if not feeling.bus_V >= model.under_voltage_V:
+        bits |= AxisError.DC_BUS_UNDER_VOLTAGE.value
+    elif feeling.bus_V > model.over_voltage_V:
+        bits |= AxisError.DC_BUS_OVER_VOLTAGE.value
+    if not abs(feeling.current_A) <= limit_in_force_A + model.current_margin_A:
+        bits |= AxisError.CURRENT_LIMIT_VIOLATION.value
+    return bits
+
+
+class SpinoutDetector:
+    """The motor brakes while it takes power: the encoder isn't where it was calibrated."""
+
+    __slots__ = ("_electrical_W", "_mechanical_W", "_threshold_W")
+
+    def __init__(self, threshold_W: float) -> None:
+        self._threshold_W = threshold_W
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the past: what arming does."""
+        self._electrical_W = self._mechanical_W = 0.0
+
+    def detects(self, feeling: Feeling, velocity_rev_s: float, dt_s: float) -> bool:
+        """Take what was measured over `dt_s`."""
+        keep = exp(-_POWER_BANDWIDTH_RAD_S * dt_s)
+        mechanical = feeling.torque_N_m * velocity_rev_s * 2.0 * pi
+        electrical = feeling.bus_V * feeling.bus_A
+        self._mechanical_W = mechanical + keep * (self._mechanical_W - mechanical)
+        self._electrical_W = electrical + keep * (self._electrical_W - electrical)
+        if not self._threshold_W > 0.0:
+            return False
+        return self._mechanical_W < -self._threshold_W < self._threshold_W < self._electrical_W

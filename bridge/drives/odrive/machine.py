@@ -1,0 +1,296 @@
+"""The axis behind the messages: its states, why it disarms, and the torque that it asks for.
+
+    state         on                                          to            result
+    IDLE          CLOSED_LOOP asked                           CLOSED_LOOP   SUCCESS
+    IDLE          the same, errors active or modes unknown    IDLE          DISARMED
+    IDLE          the same, motor or encoder not calibrated   IDLE          NOT_CALIBRATED
+    IDLE          calibration asked (3, 4, 6, 7)              calibrating   BUSY
+    calibrating   its time is over                            IDLE          SUCCESS
+    calibrating   IDLE asked                                  IDLE          CANCELLED
+    any           HOMING asked                                IDLE          HOMING_WITHOUT_ENDSTOP
+    any           a procedure asked that isn't emulated       IDLE          INVALID_STATE
+    CLOSED_LOOP   IDLE asked                                  IDLE          SUCCESS
+    not IDLE      e-stop, watchdog, overspeed, bad input,     IDLE          DISARMED
+                  or what `health` finds
+
+Errors stay until cleared, and what caused them raises them again. Only CLOSED_LOOP makes torque;
+calibration takes its time and turns nothing. Asking for CLOSED_LOOP in CLOSED_LOOP and asking for
+state 0 change nothing.
+
+Kept as the field has it: without a watchdog the last torque acts for ever; inputs sent while idle
+are stored and act on arming (position inputs don't: arming begins where the axis is), unless
+`zero_torque_on_disarm`. The watchdog is fed by set-points and by arming. Firmware 0.6; where its
+documentation is silent, 0.5.6's source.
+"""
+
+from math import isfinite
+
+from bridge.drives.feeling import Feeling
+from bridge.drives.odrive import calibration, control, health
+from bridge.drives.odrive.calibration import NEVER, Calibration
+from bridge.drives.odrive.control import Controller
+from bridge.drives.odrive.frames import AxisError, AxisState, ControlMode, InputMode
+from bridge.drives.odrive.frames import ProcedureResult as Result
+from bridge.drives.odrive.parameters import FLOAT32_MAX, Parameters
+from configs.brief import DriveModel
+
+
+class Axis:
+    """One axis. Told the time, never asks for it."""
+
+    __slots__ = (
+        "_conditions",
+        "_offset",
+        "_plain",
+        "_silence_ns",
+        "_spinout",
+        "_torque_limit",
+        "_unfelt_s",
+        "calibration",
+        "controller",
+        "demand",
+        "disarm_reason",
+        "errors",
+        "fed_ns",
+        "feeling",
+        "input_torque",
+        "model",
+        "parameters",
+        "position",
+        "result",
+        "serial",
+        "state",
+        "velocity",
+    )
+
+    def __init__(self, model: DriveModel, serial: int) -> None:
+        self.model = model
+        self.serial = serial
+
+    def power_up(self, parameters: Parameters) -> None:
+        """Idle, without errors, with these parameters."""
+        self.parameters = parameters
+        self.controller = Controller(parameters)
+        self.state = AxisState.IDLE
+        self.errors = self.disarm_reason = AxisError(0)
+        self.result = Result.SUCCESS
+        self.input_torque = self.demand = 0.0
+        self.position = self.velocity = self._offset = 0.0
+        self.feeling: Feeling | None = None
+        self.fed_ns = 0
+        self._conditions = 0
+        self._unfelt_s = 0.0
+        self._spinout = health.SpinoutDetector(self.model.spinout_power_W)
+        self.calibration = Calibration(self.model.calibration_ns)
+        self.apply()
+
+    def apply(self) -> None:
+        """Let changed parameters act."""
+        p = self.parameters
+        armed = self.state is AxisState.CLOSED_LOOP_CONTROL
+        limiters = self.model.torque_limiters
+        watched = armed and p.watchdog_enabled
+        self._silence_ns = min(round(p.watchdog_s * 1e9), NEVER) if watched else NEVER
+        self._plain = (
+            not limiters
+            and p.control_mode == ControlMode.TORQUE
+            and p.input_mode == InputMode.PASSTHROUGH
+        )
+        limit_A = p.current_limit
+        if self.feeling is not None:
+            limit_A = health.current_limit(self.feeling, limit_A, self.model)
+        self._torque_limit = limit_A * self.model.torque_constant_N_m_A if limiters else None
+        if armed and not control.exists(p.control_mode, p.input_mode):
+            self.disarm(AxisError.BAD_CONFIG)
+
+    # --- the plant's end -------------------------------------------------------------------------
+
+    def feed(self, revolutions: float, rev_s: float) -> None:
+        """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
+        self.position = revolutions + self._offset
+        self.velocity = rev_s
+
+    def feel(self, feeling: Feeling) -> None:
+        """Take what the drive measures; derate, and disarm if that says so."""
+        self.feeling = feeling
+        model = self.model
+        limit_A = health.current_limit(feeling, self.parameters.current_limit, model)
+        if self._torque_limit is not None:
+            self._torque_limit = limit_A * model.torque_constant_N_m_A
+        armed = self.state is AxisState.CLOSED_LOOP_CONTROL
+        if armed and self._spinout.detects(feeling, self.velocity, self._unfelt_s):
+            self.disarm(AxisError.SPINOUT_DETECTED)
+        self._unfelt_s = 0.0
+        found = health.conditions(feeling, limit_A, model)
+        raised = found & ~self._conditions
+        self._conditions = found
+        if raised:
+            self.disarm(AxisError(raised))
+
+    def torque_demand(self, dt_s: float = 0.0) -> float:
+        """Torque asked of the motor for the next `dt_s` [N·m]; always finite, 0 unless armed."""
+        if self.state is not AxisState.CLOSED_LOOP_CONTROL:
+            return 0.0
+        if self._plain:
+            return self.input_torque
+        self._check_motion()
+        if self.state is not AxisState.CLOSED_LOOP_CONTROL:
+            return 0.0
+        self._unfelt_s += dt_s
+        motion = self.position, self.velocity
+        torque = self.controller.step(dt_s, self.input_torque, motion, self._torque_limit)
+        if not -FLOAT32_MAX <= torque <= FLOAT32_MAX:
+            self.disarm(AxisError.BAD_CONFIG)
+            return 0.0
+        self.demand = torque
+        return torque
+
+    @property
+    def effective_torque(self) -> float:
+        """The torque that it asks for now, without going on [N·m]."""
+        if self._plain and self.state is AxisState.CLOSED_LOOP_CONTROL:
+            return self.input_torque
+        return self.demand
+
+    # --- supervision -----------------------------------------------------------------------------
+
+    def supervise(self, now_ns: int) -> None:
+        """Look at the watchdog, the procedure that runs, and the motion."""
+        if now_ns - self.fed_ns > self._silence_ns:
+            self.disarm(AxisError.WATCHDOG_TIMER_EXPIRED)
+        while now_ns >= self.calibration.ends_ns:
+            self.calibration.end(self.parameters)
+            self.state = self.calibration.state
+            if self.state is AxisState.IDLE:
+                self.result = Result.SUCCESS
+        if self.state is AxisState.CLOSED_LOOP_CONTROL and not self._plain:
+            self._check_motion()
+
+    def disarm(self, error: AxisError) -> None:
+        """Raise an error; stop whatever runs."""
+        self.errors |= error
+        if self.state is not AxisState.IDLE:
+            self.disarm_reason = error
+            self.result = Result.DISARMED
+            self._to_idle()
+
+    def estop(self) -> None:
+        """Stop; whether arming then needs Clear_Errors is a setting."""
+        if self.model.estop_blocks_arming:
+            self.errors |= AxisError.ESTOP_REQUESTED
+        self.disarm_reason |= AxisError.ESTOP_REQUESTED
+        if self.state is not AxisState.IDLE:
+            self.result = Result.DISARMED
+            self._to_idle()
+
+    def clear_errors(self) -> None:
+        """Forget errors but those whose cause is still measured."""
+        self.errors, self.disarm_reason = AxisError(self._conditions), AxisError(0)
+
+    def _check_motion(self) -> None:
+        model = self.model
+        fastest = model.overspeed_ratio * self.parameters.velocity_limit
+        if not isfinite(self.position + self.velocity):
+            self.disarm(AxisError.MISSING_ESTIMATE)
+        elif model.torque_limiters and abs(self.velocity) > fastest:
+            self.disarm(AxisError.VELOCITY_LIMIT_VIOLATION)
+
+    # --- what it is told -------------------------------------------------------------------------
+
+    def set_torque(self, torque: float, now_ns: int) -> None:
+        """Take a torque input [N·m]. NaN disarms, and so does ∞ where nothing limits it."""
+        if torque != torque or not (self.model.torque_limiters or isfinite(torque)):
+            self.input_torque = 0.0
+            self.disarm(AxisError.BAD_CONFIG)
+            return
+        self.fed_ns = now_ns
+        self.input_torque = min(max(torque, -FLOAT32_MAX), FLOAT32_MAX)
+
+    def set_velocity(self, velocity: float, torque: float, now_ns: int) -> None:
+        """Take a velocity input [rev/s] and its feed-forward, the torque input from now on."""
+        if velocity != velocity:
+            torque = velocity
+        else:
+            self.controller.input_velocity = min(max(velocity, -FLOAT32_MAX), FLOAT32_MAX)
+        self.set_torque(torque, now_ns)
+
+    def set_position(self, position: float, velocity: float, torque: float, now_ns: int) -> None:
+        """Take a position input [rev] and feed-forwards, the other inputs from now on."""
+        if position != position:
+            torque = position
+        else:
+            self.controller.move_to(min(max(position, -FLOAT32_MAX), FLOAT32_MAX))
+        self.set_velocity(velocity, torque, now_ns)
+
+    def set_modes(self, control_mode: int, input_mode: int) -> None:
+        """Choose control and input mode. Those that don't exist disarm: now, or on arming."""
+        p = self.parameters
+        if (control_mode, input_mode) != (p.control_mode, p.input_mode):
+            p.control_mode, p.input_mode = control_mode, input_mode
+            self.controller.reset(self.position)
+            self.apply()
+
+    def move_origin(self, position: float) -> bool:
+        """Call the present position `position` [rev]; False if that is no number."""
+        if not isfinite(position) or not isfinite(self.position):
+            return False
+        self._offset += position - self.position
+        self.position = position
+        return True
+
+    def request(self, asked: int, now_ns: int) -> None:
+        """Change the state, if that can be."""
+        if asked == AxisState.UNDEFINED:
+            return
+        if asked == AxisState.CLOSED_LOOP_CONTROL == self.state:
+            return
+        calibrating = self.calibration.runs
+        self._to_idle()
+        match asked:
+            case AxisState.IDLE:
+                self.result = Result.CANCELLED if calibrating else Result.SUCCESS
+            case AxisState.STARTUP_SEQUENCE:
+                self.result = Result.SUCCESS
+            case AxisState.HOMING:
+                self.result = Result.HOMING_WITHOUT_ENDSTOP
+            case AxisState.CLOSED_LOOP_CONTROL:
+                self._arm(now_ns)
+            case _ if calibration.exists(asked):
+                self._calibrate(asked, now_ns)
+            case _:
+                self.result = Result.INVALID_STATE
+
+    def _arm(self, now_ns: int) -> None:
+        p = self.parameters
+        if not control.exists(p.control_mode, p.input_mode):
+            self.errors |= AxisError.BAD_CONFIG
+        if self.errors:
+            self.result = Result.DISARMED
+        elif not (p.motor_calibrated and p.encoder_calibrated):
+            self.result = Result.NOT_CALIBRATED
+        else:
+            self.result = Result.SUCCESS
+            self.disarm_reason = AxisError(0)
+            self.state = AxisState.CLOSED_LOOP_CONTROL
+            self.fed_ns = now_ns
+            self._unfelt_s = 0.0
+            self._spinout.reset()
+            self.controller.reset(self.position)
+            self.apply()
+
+    def _calibrate(self, asked: int, now_ns: int) -> None:
+        if self.errors:
+            self.result = Result.DISARMED
+        elif not self.calibration.begin(asked, self.parameters, now_ns):
+            self.result = Result.NOT_CALIBRATED
+        else:
+            self.result = Result.BUSY
+            self.state = self.calibration.state
+
+    def _to_idle(self) -> None:
+        self.state = AxisState.IDLE
+        self.demand = 0.0
+        self._silence_ns = NEVER
+        self.calibration.cancel()
+        if self.model.zero_torque_on_disarm:
+            self.input_torque = self.controller.input_velocity = 0.0

@@ -1,0 +1,128 @@
+"""What an axis says of itself: the data of its messages, as functions of the axis.
+
+Without measurements (an ideal motor) current and torque are the demanded ones, temperatures 25 °C
+and the bus has 24 V. What a single can't hold saturates; NaN stays.
+"""
+
+from collections.abc import Callable, Mapping
+from math import pi
+
+from bridge.drives.odrive import frames as f
+from bridge.drives.odrive.frames import Command
+from bridge.drives.odrive.machine import Axis
+from bridge.drives.odrive.parameters import FLOAT32_MAX
+
+PROTOCOL_VERSION = 2
+HARDWARE = (4, 4, 58)
+"""Product line, version, variant: an ODrive Pro."""
+AMBIENT_C = 25.0
+NOMINAL_V = 24.0
+_pack = f.TWO_FLOATS.pack
+
+
+def floats(first: float, second: float) -> bytes:
+    """Two floats for the wire."""
+    try:
+        return _pack(first, second)
+    except OverflowError:
+        return _pack(_single(first), _single(second))
+
+
+def version(axis: Axis) -> bytes:
+    """Get_Version; a released firmware."""
+    return f.VERSION.pack(PROTOCOL_VERSION, *HARDWARE, *axis.model.firmware, 0)
+
+
+def heartbeat(axis: Axis) -> bytes:
+    """Heartbeat: errors that are active or disarmed it last."""
+    done = axis.controller.trajectory_done
+    return f.HEARTBEAT.pack(axis.errors | axis.disarm_reason, axis.state, axis.result, done, 0)
+
+
+def error(axis: Axis) -> bytes:
+    """Get_Error."""
+    return f.TWO_U32.pack(axis.errors, axis.disarm_reason)
+
+
+def address(axis: Axis) -> bytes:
+    """Address: node id and serial number, connection 0."""
+    return bytes((axis.parameters.node_id, *axis.serial.to_bytes(6, "little"), 0))
+
+
+def encoder_estimates(axis: Axis) -> bytes:
+    """Get_Encoder_Estimates."""
+    return floats(axis.position, axis.velocity)
+
+
+def iq(axis: Axis) -> bytes:
+    """Get_Iq: set-point and measurement."""
+    return floats(iq_setpoint(axis), iq_measured(axis))
+
+
+def temperature(axis: Axis) -> bytes:
+    """Get_Temperature: FETs and motor."""
+    feeling = axis.feeling
+    if feeling is None:
+        return floats(AMBIENT_C, AMBIENT_C)
+    return floats(feeling.fet_C, feeling.motor_C)
+
+
+def bus(axis: Axis) -> bytes:
+    """Get_Bus_Voltage_Current."""
+    return floats(bus_voltage(axis), bus_current(axis))
+
+
+def torques(axis: Axis) -> bytes:
+    """Get_Torques: target after limits, and estimate."""
+    return floats(axis.effective_torque, _torque_estimate(axis))
+
+
+def powers(axis: Axis) -> bytes:
+    """Get_Powers: electrical and mechanical."""
+    return floats(bus_voltage(axis) * bus_current(axis), _mechanical_power(axis))
+
+
+def iq_setpoint(axis: Axis) -> float:
+    """Current asked for [A]."""
+    return axis.effective_torque / axis.model.torque_constant_N_m_A
+
+
+def iq_measured(axis: Axis) -> float:
+    """Current measured [A]."""
+    return iq_setpoint(axis) if axis.feeling is None else axis.feeling.current_A
+
+
+def bus_voltage(axis: Axis) -> float:
+    """Voltage of the supply [V]."""
+    return NOMINAL_V if axis.feeling is None else axis.feeling.bus_V
+
+
+def bus_current(axis: Axis) -> float:
+    """Current from the supply [A]; negative while braking feeds it."""
+    return _mechanical_power(axis) / NOMINAL_V if axis.feeling is None else axis.feeling.bus_A
+
+
+def _torque_estimate(axis: Axis) -> float:
+    return axis.effective_torque if axis.feeling is None else axis.feeling.torque_N_m
+
+
+def _mechanical_power(axis: Axis) -> float:
+    return _torque_estimate(axis) * axis.velocity * 2.0 * pi
+
+
+def _single(value: float) -> float:
+    return min(max(value, -FLOAT32_MAX), FLOAT32_MAX)
+
+
+REPORTS: Mapping[int, Callable[[Axis], bytes]] = {
+    Command.GET_VERSION: version,
+    Command.HEARTBEAT: heartbeat,
+    Command.GET_ERROR: error,
+    Command.GET_ENCODER_ESTIMATES: encoder_estimates,
+    Command.GET_IQ: iq,
+    Command.GET_TEMPERATURE: temperature,
+    Command.GET_BUS_VOLTAGE_CURRENT: bus,
+    Command.GET_TORQUES: torques,
+    Command.GET_POWERS: powers,
+}
+"""By command: sent when asked for by a remote or an empty frame, and cyclically."""
