@@ -6,6 +6,7 @@ that are linear in (v, ω), so they come from the same stages.
 
 from math import cos, sin
 
+from configs.errors import InfrastructureError
 from plant.robot import Robot, State
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
@@ -14,38 +15,51 @@ _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot 
 def rk4(
     robot: Robot, state: State, tau_right: float, tau_left: float, t_s: float, step_s: float
 ) -> State:
-    """State after `step_s` from scenario time `t_s`, under held torques [N·m]."""
-    x, y, theta, v, omega, right_angle, left_angle = state
-    accelerations = robot.accelerations
-    half = 0.5 * step_s
-    if robot.disturbed:
-        right_1, left_1 = robot.net(tau_right, tau_left, t_s)
-        right_2, left_2 = robot.net(tau_right, tau_left, t_s + half)
-        right_4, left_4 = robot.net(tau_right, tau_left, t_s + step_s)
-    else:
-        right_1 = right_2 = right_4 = tau_right
-        left_1 = left_2 = left_4 = tau_left
-    a1, w1 = accelerations(v, omega, right_1, left_1)
-    v2, omega2, theta2 = v + half * a1, omega + half * w1, theta + half * omega
-    a2, w2 = accelerations(v2, omega2, right_2, left_2)
-    v3, omega3, theta3 = v + half * a2, omega + half * w2, theta + half * omega2
-    a3, w3 = accelerations(v3, omega3, right_2, left_2)
-    v4, omega4, theta4 = v + step_s * a3, omega + step_s * w3, theta + step_s * omega3
-    a4, w4 = accelerations(v4, omega4, right_4, left_4)
+    """State after `step_s` from scenario time `t_s`, under held torques [N·m].
 
-    sixth = step_s / 6.0
-    travel = sixth * (v + 2.0 * (v2 + v3) + v4)
-    turn = sixth * (omega + 2.0 * (omega2 + omega3) + omega4)
-    rolled, turned = travel * robot.inv_r, turn * robot.b * robot.inv_r
-    after = (
-        x
-        + sixth * (v * cos(theta) + 2.0 * (v2 * cos(theta2) + v3 * cos(theta3)) + v4 * cos(theta4)),
-        y
-        + sixth * (v * sin(theta) + 2.0 * (v2 * sin(theta2) + v3 * sin(theta3)) + v4 * sin(theta4)),
-        theta + turn,
-        v + sixth * (a1 + 2.0 * (a2 + a3) + a4),
-        omega + sixth * (w1 + 2.0 * (w2 + w3) + w4),
-        right_angle + rolled + turned,
-        left_angle + rolled - turned,
-    )
-    return _new(State, after)
+    Raises:
+        InfrastructureError: the motion has left what numbers can hold: a loop that diverged.
+    """
+    try:
+        x, y, theta, v, omega, right_angle, left_angle = state
+        accelerations = robot.accelerations
+        half = 0.5 * step_s
+        if robot.disturbed:
+            right_1, left_1 = robot.net(tau_right, tau_left, t_s)
+            right_2, left_2 = robot.net(tau_right, tau_left, t_s + half)
+            right_4, left_4 = robot.net(tau_right, tau_left, t_s + step_s)
+        else:
+            right_1 = right_2 = right_4 = tau_right
+            left_1 = left_2 = left_4 = tau_left
+        a1, w1 = accelerations(v, omega, right_1, left_1)
+        v2, omega2, theta2 = v + half * a1, omega + half * w1, theta + half * omega
+        a2, w2 = accelerations(v2, omega2, right_2, left_2)
+        v3, omega3, theta3 = v + half * a2, omega + half * w2, theta + half * omega2
+        a3, w3 = accelerations(v3, omega3, right_2, left_2)
+        v4, omega4, theta4 = v + step_s * a3, omega + step_s * w3, theta + step_s * omega3
+        a4, w4 = accelerations(v4, omega4, right_4, left_4)
+
+        sixth = step_s / 6.0
+        travel = sixth * (v + 2.0 * (v2 + v3) + v4)
+        turn = sixth * (omega + 2.0 * (omega2 + omega3) + omega4)
+        rolled, turned = travel * robot.inv_r, turn * robot.b * robot.inv_r
+        after = (
+            x
+            + sixth
+            * (v * cos(theta) + 2.0 * (v2 * cos(theta2) + v3 * cos(theta3)) + v4 * cos(theta4)),
+            y
+            + sixth
+            * (v * sin(theta) + 2.0 * (v2 * sin(theta2) + v3 * sin(theta3)) + v4 * sin(theta4)),
+            theta + turn,
+            v + sixth * (a1 + 2.0 * (a2 + a3) + a4),
+            omega + sixth * (w1 + 2.0 * (w2 + w3) + w4),
+            right_angle + rolled + turned,
+            left_angle + rolled - turned,
+        )
+        return _new(State, after)
+    except (ValueError, OverflowError) as error:
+        raise InfrastructureError(
+            f"t = {t_s:.3f} s: a robot's motion has diverged, v = {state.v:.3g} m/s,"
+            f" ω = {state.omega:.3g} rad/s: gains that don't suit the rate or the delay of its loop?"
+            " `fleetloop check` says more"
+        ) from error

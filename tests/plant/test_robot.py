@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from configs.brief import Body, Disturbance
+from configs.errors import InfrastructureError
 from plant.integrate import rk4
 from plant.robot import Robot, State
 
@@ -107,3 +108,10 @@ def test_a_disturbance_acts_like_the_opposite_torque() -> None:
     pushed = run(Robot(ETSRO, held), REST, 0.0, 0.0, 1.0)
     driven = run(Robot(ETSRO, CALM), REST, -torque, -torque, 1.0)
     assert pushed.v == pytest.approx(driven.v, rel=1e-12)
+
+
+def test_a_motion_that_diverges_is_named_with_its_time() -> None:
+    robot = Robot(ETSRO, CALM)
+    lost = State(0.0, 0.0, 1e308, 1e308, 1e308, 0.0, 0.0)
+    with pytest.raises(InfrastructureError, match=r"t = 1\.500 s: a robot's motion has diverged"):
+        rk4(robot, lost, 0.0, 0.0, 1.5, 1.0)
