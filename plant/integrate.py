@@ -56,10 +56,10 @@ def rk4(
             right_angle + rolled + turned,
             left_angle + rolled - turned,
         )
-        return _new(State, after)
     except (ValueError, OverflowError) as error:
         raise InfrastructureError(
             f"t = {t_s:.3f} s: a robot's motion has diverged, v = {state.v:.3g} m/s,"
             f" ω = {state.omega:.3g} rad/s: gains that don't suit the rate or the delay of its loop?"
             " `fleetloop check` says more"
         ) from error
+    return _new(State, after)
