@@ -27,7 +27,13 @@ class Child:
     """One process of the run."""
 
     def __init__(
-        self, nursery: Nursery, name: str, module: str, brief: object, fds: Sequence[int] = ()
+        self,
+        nursery: Nursery,
+        name: str,
+        module: str,
+        brief: object,
+        fds: Sequence[int] = (),
+        core: int | None = None,
     ) -> None:
         self.name = name
         self.status: Status | None = None
@@ -35,7 +41,7 @@ class Child:
         stdin, self._stdin = os.pipe()
         self._stdout, stdout = os.pipe()
         try:
-            self._pid = nursery.bear(module, stdin, stdout, fds)
+            self._pid = nursery.bear(module, stdin, stdout, fds, core)
         except InfrastructureError:
             os.close(self._stdin)
             os.close(self._stdout)

@@ -59,7 +59,7 @@ def rk4(
     except (ValueError, OverflowError) as error:
         raise InfrastructureError(
             f"t = {t_s:.3f} s: a robot's motion has diverged, v = {state.v:.3g} m/s,"
-            f" ω = {state.omega:.3g} rad/s: gains that don't suit the rate or the delay of its loop?"
+            f" ω = {state.omega:.3g} rad/s: do its gains suit the rate and the delay of its loop?"
             " `fleetloop check` says more"
         ) from error
     return _new(State, after)
