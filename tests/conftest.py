@@ -1,5 +1,6 @@
 """Shared by all tests: a private folder for sockets, and scenarios as small as they can be."""
 
+import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +15,7 @@ settings.load_profile("fleetloop")
 @pytest.fixture(autouse=True)
 def runtime_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Sockets of this test only; the path is short, as Unix sockets need it."""
-    with tempfile.TemporaryDirectory(prefix="fl-", dir="/tmp") as folder:
+    short = "/tmp" if os.access("/tmp", os.W_OK) else tempfile.gettempdir()
+    with tempfile.TemporaryDirectory(prefix="fl-", dir=short) as folder:
         monkeypatch.setenv("FLEETLOOP_RUNTIME", f"{folder}/r")
         yield Path(folder) / "r"

@@ -39,8 +39,9 @@ in_guest() {
     elif ! "${urgent[@]}" "$tool" --engine "$engine" --timeout 120 -- true >/dev/null 2>&1; then
         skip "$tests: the $engine guest does not start here"
     else
+        # Its root is the host's, read-only; memory is where temporary files can be.
         "${urgent[@]}" "$tool" --engine "$engine" --timeout 420 -- \
-            "$(command -v python)" -m pytest -p no:cacheprovider "$tests"
+            env TMPDIR=/dev/shm "$(command -v python)" -m pytest -p no:cacheprovider "$tests"
     fi
 }
 
