@@ -18,6 +18,7 @@ each process is bound to its identity by a random password that it alone is give
     a guest            a client of buses on another machine
                 puts   its lines up, its token; which buses it may open is the relay's to say
                 hears  its lines down
+                sees   the token of the relay
 
 Plant and controllers may watch the launcher's token: on other machines, its end is how they learn
 that the run is over. Who comes from another machine has a password that was agreed on before, or a
@@ -155,6 +156,7 @@ def plan(
             puts=(keys.guest_lines("up", user),),
             hears=(keys.guest_lines("down", user),),
             token=keys.guest_lines("alive", user),
+            watches=(keys.guest_relay(user),),
         )
     known = dict(guests or {})
     passwords = {user: known.get(user) or secrets.token_urlsafe(24) for user in rights}

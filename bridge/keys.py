@@ -10,7 +10,9 @@
     fleetloop/<run>/@clock/go                from the launcher to plant and controllers
     fleetloop/<run>/@progress/<process>      how far a process is, to the launcher
     fleetloop/<run>/@report/<process>        a process's last word, to the launcher
-    fleetloop/@guest/<user>/<line>/<bus>/..  a client of a bus on another machine: up, down, alive
+    fleetloop/@guest/<user>/<line>/<bus>/..  a client of a bus on another machine: up, down, alive;
+                                             <run>/<bus> if it names the run as well
+    fleetloop/@guest/<user>/@relay           liveliness token: somebody takes this user's lines
 
 A process is `launcher`, `plant`, `recorder` or `agent/<robot>`. Chunks that begin with @ are
 verbatim: no wildcard of data subscriptions matches them.
@@ -78,20 +80,27 @@ def report(run: str, process: str) -> str:
     return f"{_run(run)}/@report/{_process(process)}"
 
 
-def guest_line(user: str, line: str, bus: str) -> str:
-    """Where a guest talks to a bus; its keys end in up, down and alive."""
-    return f"fleetloop/@guest/{_chunk(user)}/{_chunk(line)}/{_chunk(bus)}"
+def guest_line(user: str, line: str, channel: str) -> str:
+    """Where a guest talks to a bus or run/bus; its keys end in up, down and alive."""
+    run, _, bus = channel.rpartition("/")
+    chunks = (user, line, run, bus) if run else (user, line, bus)
+    return f"fleetloop/@guest/{'/'.join(_chunk(chunk) for chunk in chunks)}"
 
 
 def guest_lines(end: str, user: str) -> str:
     """All lines of a guest."""
-    return f"fleetloop/@guest/{_chunk(user)}/*/*/{end}"
+    return f"fleetloop/@guest/{_chunk(user)}/**/{end}"
+
+
+def guest_relay(user: str) -> str:
+    """Liveliness token of who takes a guest's lines."""
+    return f"fleetloop/@guest/{_chunk(user)}/@relay"
 
 
 def guest_of(place: str) -> tuple[str, str]:
-    """The user and the bus of a guest's line."""
-    parts = place.split("/")
-    return parts[2], parts[4]
+    """The user and the channel, a bus or run/bus, of a guest's line."""
+    _, _, user, _, channel = place.split("/", 4)
+    return user, channel
 
 
 def process_of(key: str) -> str:

@@ -32,6 +32,7 @@ from configs.errors import InfrastructureError
 LEASE_MS = 1000
 """A peer that is silent for this long is gone."""
 CLOSE_S = 1.0
+_PROBE_S = 1.0
 _PORT_TRIES = 5
 _POLLED_DEPTH = 4096
 """Messages that wait for who polls; many times more than any schedule lets be on their way."""
@@ -101,34 +102,29 @@ class ZenohLink:
 
     def on_gone(self, key: str, act: Callable[[], None]) -> None:
         """Call `act`, on the network's thread, when the token on `key` goes, or the way to it."""
-        self.each_gone(key, lambda _: act())
 
-    def each_gone(self, key: str, act: Callable[[str], None]) -> None:
-        """Call `act`, on the network's thread, with the key of every token that goes."""
+        def take(_: str, alive: bool) -> None:
+            if not alive:
+                act()
 
-        def take(sample: zenoh.Sample) -> None:
-            if sample.kind == zenoh.SampleKind.DELETE:
-                act(str(sample.key_expr))
+        self.each_live(key, take)
 
-        self._declared.append(
-            self._session.liveliness().declare_subscriber(
-                key, Callback(take, indirect=False), history=True
-            )
-        )
-
-    def watch_live(self, key_expr: str, tag: str) -> None:
-        """Queue b"1" for every token that is there or comes, b"0" for every one that goes."""
-        put = self._inbox.put
+    def each_live(self, key_expr: str, act: Callable[[str, bool], None]) -> None:
+        """Call `act`, on the network's thread, with every token that is there, comes or goes."""
 
         def take(sample: zenoh.Sample) -> None:
-            alive = sample.kind == zenoh.SampleKind.PUT
-            put(Arrival(tag, str(sample.key_expr), b"1" if alive else b"0"))
+            act(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
         self._declared.append(
             self._session.liveliness().declare_subscriber(
                 key_expr, Callback(take, indirect=False), history=True
             )
         )
+
+    def watch_live(self, key_expr: str, tag: str) -> None:
+        """Queue b"1" for every token that is there or comes, b"0" for every one that goes."""
+        put = self._inbox.put
+        self.each_live(key_expr, lambda key, alive: put(Arrival(tag, key, b"1" if alive else b"0")))
 
     stuck = False
     """A session of this process did not close in time: the process must end without its leave."""
@@ -239,11 +235,31 @@ def _client(network: NetworkLink, timeout_s: float) -> zenoh.Session:
     if network.tls is not None:
         _set(config, "transport/link/tls", _mutual_tls(network.tls, "connect"))
     failure = (
-        f"{network.user}: no session with the router at {network.endpoint} within {timeout_s:g} s:"
-        " nobody listens there, or it refused the login"
+        f"{network.user}: no session with the router at {network.endpoint} within {timeout_s:g} s"
     )
-    with _few_threads(_APP):
-        return _open_bounded(config, timeout_s + 1.0, failure)
+    try:
+        with _few_threads(_APP):
+            return _open_bounded(config, timeout_s + 1.0, failure)
+    except InfrastructureError as error:
+        raise InfrastructureError(f"{failure}: {_why(network.endpoint)}") from error
+
+
+def _why(endpoint: str) -> str:
+    """Why there is no session: Zenoh itself says of all reasons that it timed out."""
+    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    found: list[str] = []
+
+    def connect() -> None:
+        try:
+            socket.create_connection((host.strip("[]"), int(port)), _PROBE_S).close()
+            found.append("somebody listens there, and refused the login")
+        except (OSError, ValueError) as error:
+            found.append(f"nobody listens there ({getattr(error, 'strerror', None) or error})")
+
+    prober = threading.Thread(target=connect, daemon=True)  # a name may take long to resolve
+    prober.start()
+    prober.join(_PROBE_S)
+    return found[0] if found else "nobody answers there"
 
 
 @contextlib.contextmanager

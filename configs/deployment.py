@@ -21,6 +21,7 @@ from configs.cross_checks import Problem
 from configs.errors import ScenarioError
 from configs.scenario import Scenario
 from configs.sections import Name, Section
+from configs.users import read_users
 
 PLANT, RECORDER = "plant", "recorder"
 Endpoint = Annotated[str, Field(pattern=r"^(tcp|tls)/.+:\d+$")]
@@ -193,14 +194,7 @@ def passwords(network: NetworkSection | None, identities: tuple[str, ...]) -> di
             "network.users = (missing): name a file with a line identity:password for each of"
             f" {', '.join(identities)}, or give network.tls"
         )
-    try:
-        text = path.read_text("utf-8")
-        mode = path.stat().st_mode
-    except OSError as error:
-        raise ScenarioError(f"network.users = {path}: {error.strerror}") from error
-    if mode & 0o077:
-        raise ScenarioError(f"network.users = {path}: others may read it; chmod 600 {path}")
-    known = dict(row.strip().split(":", 1) for row in text.splitlines() if ":" in row)
+    known = read_users(path, "network.users")
     if absent := [identity for identity in identities if not known.get(identity)]:
         raise ScenarioError(f"network.users = {path}: no line {absent[0]}:<password>")
     return {identity: known[identity] for identity in identities}

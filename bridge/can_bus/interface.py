@@ -1,7 +1,10 @@
 """The python-can interface `fleetloop`: an emulated bus that any python-can program opens by name.
 
     can.Bus(interface="fleetloop", channel="r1")
-    can.Bus(interface="fleetloop", channel="r1", endpoint="tls/host:7447", user="bench", ...)
+    can.Bus(interface="fleetloop", channel="r1", endpoint="tls/host:7447", user="me", ...)
+
+The second form is for another machine: the same bus with the same promises, over Zenoh, for whom
+the run's deployment lets in.
 
 Works between processes, without kernel module or root; lossless and in order for who reads; no echo
 of own frames unless asked; classic CAN only. `Message.timestamp` is bus time: seconds since the bus
@@ -25,12 +28,13 @@ from can.typechecking import AutoDetectedConfig, CanFilters
 from bridge.can_bus import packet as wire
 from bridge.can_bus import places
 from bridge.can_bus.convert import to_frame, to_message
+from bridge.can_bus.credentials import OPTIONS, network_of
 from bridge.can_bus.lines import Line, UnixLine
 from bridge.frame import Frame
-from configs.brief import TlsFiles
 from configs.errors import ScenarioError
 
-_REMOTE = frozenset({"endpoint", "user", "password", "ca", "certificate", "private_key"})
+FLUSH_S = 10.0
+"""How long a hub that doesn't read may keep waiting who gathers what it sends."""
 _new = tuple.__new__  # of a frame, past its constructor: this is the hot path
 _IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ignore_config"})
 
@@ -51,9 +55,7 @@ class FleetloopBus(can.BusABC):
         receive_own_messages: frames sent come back, with `is_rx` False.
         connect_timeout: how long to wait for the bus to answer [s].
         fd: must be False; the bus is classic CAN.
-        endpoint: from another machine, where the run's router is, for example tls/host:7447.
-        user, password: who is known there; with TLS the user is the certificate's common name.
-        ca, certificate, private_key: files of mutual TLS, in PEM.
+        endpoint, user, ...: from another machine, see `bridge.can_bus.credentials`.
 
     Raises:
         can.CanInitializationError: no such bus, or it refused; the text names what there is.
@@ -71,16 +73,11 @@ class FleetloopBus(can.BusABC):
         fd: bool = False,
         **kwargs: Any,
     ) -> None:
-        remote = {key: str(kwargs.pop(key)) for key in _REMOTE if kwargs.get(key) is not None}
-        if unknown := sorted(kwargs.keys() - _IGNORED - _REMOTE):
+        remote = {key: str(kwargs.pop(key)) for key in OPTIONS if kwargs.get(key) is not None}
+        if unknown := sorted(kwargs.keys() - _IGNORED - OPTIONS):
             raise TypeError(f"the fleetloop interface has no option {', '.join(unknown)}")
         if fd:
             raise can.CanInitializationError(f"bus {channel!r} is classic CAN: fd must be False")
-        if remote and not {"endpoint", "user"} <= remote.keys():
-            raise can.CanInitializationError(
-                f"bus {channel!r}: from another machine give endpoint and user, with a password or"
-                f" with ca, certificate and private_key; given: {', '.join(sorted(remote))}"
-            )
         self._paced = bool(paced)
         self._gathered = gathered or self._paced
         self._name = paced if isinstance(paced, str) else socket.gethostname()
@@ -104,20 +101,7 @@ class FleetloopBus(can.BusABC):
         # Zenoh costs nobody anything who doesn't need it.
         from bridge.can_bus.remote import RemoteLine
 
-        tls = None
-        if "ca" in remote:
-            tls = TlsFiles(
-                remote["ca"], remote.get("certificate", ""), remote.get("private_key", "")
-            )
-        return RemoteLine(
-            remote["endpoint"],
-            self.channel,
-            hello,
-            timeout_s,
-            user=remote["user"],
-            password=remote.get("password", ""),
-            tls=tls,
-        )
+        return RemoteLine(network_of(remote), self.channel, hello, timeout_s)
 
     def _connect(self, own: bool, timeout_s: float, remote: dict[str, str]) -> Line:
         flags = wire.PACED if self._paced else wire.GATHERED if self._gathered else 0
@@ -189,6 +173,8 @@ class FleetloopBus(can.BusABC):
         if self._queue:
             self._await_room(timeout)
         if self._gathered:
+            if len(self._outbox) == wire.MAX_FRAMES:
+                self._flush(0)
             self._outbox.append(frame)
             return
         data = wire.encode_frames(0, self._stamp_ns, (frame,))
@@ -274,8 +260,11 @@ class FleetloopBus(can.BusABC):
 
     def _flush(self, flags: int) -> None:
         frames, self._outbox = self._outbox, []
+        data = wire.encode_frames(flags, self._stamp_ns, frames)
         try:
-            self._send_now(wire.encode_frames(flags, self._stamp_ns, frames))
+            self._send_now(data)
+        except BlockingIOError:
+            self._send_late(data, FLUSH_S)
         except OSError:
             # The reason, if there is one, is still to be read.
             return

@@ -1,18 +1,30 @@
 """The relay: lets guests from other machines onto the buses of a run, in the router's process.
 
+    guest ── up ──► router ── window ──► Unix socket ──► hub
+          ◄─ down ─        ◄─ window ──             ◄──
+
 A guest's packets go to the hub over a Unix socket of its own, and the hub's to the guest, verbatim:
 to the hub a guest is a client like any other. The router's access control binds the `user` in a
 guest's keys to its login; the relay lets a user onto the buses that it was granted, and says why it
-refuses. A guest whose liveliness token goes leaves its bus.
+refuses.
 
-One thread takes what guests send; one thread per guest hands on what the hub sends, so that a guest
-who doesn't read keeps only itself waiting.
+Nothing waits here. Both ways a window (`bridge.can_bus.window`) bounds what is on its way: a guest
+whose hub is busy sees its transmit buffer full, and what a guest doesn't read stays with the hub,
+which keeps and counts it as it does for all its clients. So one thread serves all guests.
+
+A guest that leaves says goodbye behind its last packet and is told when all before it has reached
+the hub; one whose liveliness token goes has left. The bus's end goes to every guest with its
+reason, and the relay waits a little until they have it.
 """
 
 import contextlib
+import os
 import queue
+import select
 import socket
 import threading
+import time
+from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -21,24 +33,88 @@ from typing import NamedTuple, Self
 from bridge import keys
 from bridge.can_bus import packet as wire
 from bridge.can_bus import places
+from bridge.can_bus.window import Receiver, Sender
 from bridge.link import Publisher
 from bridge.zenoh_link import ZenohLink
 
 ALL_BUSES = "*"
-_SEND_S = 1.0
+GOODBYE_S = 0.5
+"""How long guests may take to hear of the end."""
 _JOIN_S = 1.0
+_TURN = 64
+"""Packets of one guest before the others have their turn."""
+_READ, _WRITE, _HANG_UP = select.EPOLLIN, select.EPOLLOUT, select.EPOLLHUP | select.EPOLLERR
+_BYE = bytes((wire.BYE,))
 
 
 class _Event(NamedTuple):
     place: str  # of a guest's line; "": the relay ends
-    packet: bytes | None  # None: the guest has gone
+    packet: bytes | None = None
+    alive: bool | None = None  # its token came or went
+
+
+class _Guest:
+    """One guest's line between router and hub."""
+
+    __slots__ = ("awaits", "down", "leaving", "place", "room", "sock", "taken", "told", "waiting")
+
+    def __init__(self, place: str, sock: socket.socket, down: Publisher) -> None:
+        self.place = place
+        self.sock = sock
+        self.down = down
+        self.room = Sender()  # of the way down
+        self.taken = Receiver()  # of the way up
+        self.waiting: deque[bytes] = deque()  # the hub has no room for these yet
+        self.leaving = self.told = False  # it said goodbye; it was told of the end
+        self.awaits = _READ
+
+    def push(self) -> bool:
+        """Give the hub what waits; whether nothing is left."""
+        while self.waiting:
+            try:
+                self.sock.send(self.waiting[0])
+            except BlockingIOError:
+                return False
+            except OSError:
+                self.waiting.clear()  # the hub has gone; its last words are still to be read
+                return True
+            if (room := self.taken.take(self.waiting.popleft())) is not None:
+                self.down.put(room)
+        return True
+
+    def pull(self, most: int | None) -> bool:
+        """Hand on at most so many packets of the hub, as far as there is room; False at the end.
+
+        None: all that is there, room or not: the hub's last words are as many as a socket holds.
+        """
+        while most is None or (most > 0 and self.room.has_room()):
+            try:
+                packet = self.sock.recv(wire.MAX_BYTES)
+            except BlockingIOError:
+                return True
+            except ConnectionResetError:
+                continue  # the hub left something unread; what it said is still there
+            except OSError:
+                return False
+            if not packet:
+                return False
+            self.told |= packet[:1] == _BYE
+            self.room.send(packet)
+            self.down.put(packet)
+            most = most and most - 1
+        return True
+
+    def wants(self) -> int:
+        """What to wait for at the hub's socket."""
+        read = _READ if self.room.has_room() and not self.leaving else 0
+        return read | (_WRITE if self.waiting else 0)
 
 
 class Relay:
     """Joins guests and hub; a context manager.
 
     Args:
-        folder: the run's private folder with the buses' sockets.
+        folder: the run's private folder with the buses' sockets; its name is the run's.
         buses: those that there are.
         granted: for each user its buses, `ALL_BUSES` for all.
     """
@@ -55,24 +131,34 @@ class Relay:
         self._buses = tuple(buses)
         self._granted = granted
         self._events: queue.SimpleQueue[_Event] = queue.SimpleQueue()
-        self._sockets: dict[str, socket.socket] = {}
-        self._readers: list[threading.Thread] = []
+        self._alive: set[str] = set()
+        self._guests: dict[str, _Guest] = {}
+        self._by_fd: dict[int, _Guest] = {}
+        self._unheard: set[str] = set()  # told of the end, and have not said that they know
+        self._closing = False
+        self._over_at: float | None = None
+        self._lock = threading.Lock()  # of the descriptor below
+        self._epoll = select.epoll()
+        self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._epoll.register(self._wake, _READ)
         self._thread = threading.Thread(target=self._serve, daemon=True)
         for user in granted:
             # One by one: guests must be told that somebody hears them, and may see no wider key.
             link.each_keyed(keys.guest_lines("up", user), self._hear)
-            link.each_gone(keys.guest_lines("alive", user), self._lose)
+            link.each_live(keys.guest_lines("alive", user), self._note)
+            link.declare_live(keys.guest_relay(user))
         self._thread.start()
 
     def close(self) -> None:
-        """Leave all buses. Idempotent."""
-        self._events.put(_Event("", None))
-        self._thread.join(_JOIN_S)
-        for sock in tuple(self._sockets.values()):
-            with contextlib.suppress(OSError):
-                sock.shutdown(socket.SHUT_RDWR)
-        for reader in self._readers:
-            reader.join(_JOIN_S)
+        """Tell all guests of the end, wait `GOODBYE_S` at most until they know. Idempotent."""
+        if self._closing:
+            return
+        self._closing = True
+        self._put(_Event(""))
+        self._thread.join(GOODBYE_S + _JOIN_S)
+        with self._lock:
+            wake, self._wake = self._wake, -1
+        os.close(wake)
 
     def __enter__(self) -> Self:
         return self
@@ -88,80 +174,132 @@ class Relay:
     # --- on Zenoh's threads ----------------------------------------------------------------------
 
     def _hear(self, key: str, packet: bytes) -> None:
-        self._events.put(_Event(key.removesuffix("/up"), packet))
+        self._put(_Event(key.removesuffix("/up"), packet))
 
-    def _lose(self, key: str) -> None:
-        self._events.put(_Event(key.removesuffix("/alive"), None))
+    def _note(self, key: str, alive: bool) -> None:
+        self._put(_Event(key.removesuffix("/alive"), alive=alive))
+
+    def _put(self, event: _Event) -> None:
+        self._events.put(event)
+        with self._lock:
+            if self._wake >= 0:
+                os.eventfd_write(self._wake, 1)
 
     # --- on the relay's own ----------------------------------------------------------------------
 
     def _serve(self) -> None:
-        while (event := self._events.get()).place:
-            if event.packet is None:
-                self._leave(event.place)
-            elif event.place in self._sockets:
-                self._pass_up(event.place, event.packet)
-            else:
-                self._join(event.place, event.packet)
+        while self._over_at is None or (self._unheard and time.monotonic() < self._over_at):
+            for fd, event in self._epoll.poll(0.02 if self._over_at else None):
+                if fd == self._wake:
+                    os.eventfd_read(self._wake)
+                    self._take_events()
+                elif (guest := self._by_fd.get(fd)) is not None:
+                    self._move(guest, ended=bool(event & _HANG_UP))
+        for guest in tuple(self._guests.values()):
+            self._part(guest)
+        self._epoll.close()
 
-    def _join(self, place: str, packet: bytes) -> None:
-        hello = wire.decode(packet)
-        if hello is None or hello.kind != wire.HELLO:
-            return  # of somebody who has left
-        user, bus = keys.guest_of(place)
+    def _take_events(self) -> None:
+        with contextlib.suppress(queue.Empty):
+            while True:
+                place, packet, alive = self._events.get_nowait()
+                if not place:
+                    self._over_at = time.monotonic() + GOODBYE_S
+                    self._end_all()
+                elif packet is not None:
+                    self._take(place, packet)
+                elif alive:
+                    self._alive.add(place)
+                else:
+                    self._alive.discard(place)
+                    self._leave(place)
+
+    def _take(self, place: str, packet: bytes) -> None:
+        guest = self._guests.get(place)
+        kind = packet[0] if packet else 0
+        if guest is None:
+            # Who isn't alive has left: what it said before it left may come later than its end.
+            if kind == wire.HELLO and place in self._alive and self._over_at is None:
+                self._join(place, packet)
+            elif kind == wire.BYE:
+                self._unheard.discard(place)
+            return
+        if kind == wire.HELLO or guest.leaving:
+            return  # a hello that was said again
+        if kind == wire.BYE:
+            guest.leaving = True
+        elif not guest.room.hear(packet):
+            if len(packet) > wire.MAX_BYTES or not guest.taken.arrive(packet):
+                self._end(guest, "you sent more than there was room for")
+                return
+            guest.waiting.append(packet)
+        self._move(guest)
+
+    def _move(self, guest: _Guest, *, ended: bool = False) -> None:
+        """Move packets both ways as far as they go; `ended`: the hub has closed its end."""
+        pushed = guest.push()
+        if guest.leaving:
+            if pushed or ended:
+                self._end(guest, "you have left")
+                return
+        elif not guest.pull(None if ended else _TURN):
+            self._end(guest, "the bus has gone")
+            return
+        if (wanted := guest.wants()) != guest.awaits:
+            guest.awaits = wanted
+            self._epoll.modify(guest.sock, wanted)
+
+    def _join(self, place: str, hello: bytes) -> None:
+        user, channel = keys.guest_of(place)
+        run, _, bus = channel.rpartition("/")
         down = self._link.publisher(f"{place}/down")
         granted = self._granted.get(user, ())
-        if bus not in self._buses:
-            self._refuse(down, f"no bus {bus!r} is up; buses here: {', '.join(self._buses)}")
+        here = ", ".join(self._buses)
+        if run not in ("", self._folder.name):
+            self._refuse(down, f"no run {run!r} is here but {self._folder.name!r}; buses: {here}")
+        elif bus not in self._buses:
+            self._refuse(down, f"no bus {bus!r} is up; buses here: {here}")
         elif ALL_BUSES not in granted and bus not in granted:
             self._refuse(down, f"{user!r} may open {', '.join(granted) or 'no bus'}, not {bus!r}")
         else:
             sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-            sock.settimeout(_SEND_S)
+            sock.setblocking(False)
             try:
                 sock.connect(str(places.socket_path(self._folder, bus)))
-                sock.send(packet)
+                sock.send(hello)
             except OSError as error:
                 sock.close()
                 self._refuse(down, f"the bus doesn't answer: {error}")
                 return
-            sock.settimeout(None)
-            self._sockets[place] = sock
-            reader = threading.Thread(target=self._pass_down, args=(sock, down), daemon=True)
-            self._readers = [r for r in self._readers if r.is_alive()] + [reader]
-            reader.start()
+            guest = self._guests[place] = self._by_fd[sock.fileno()] = _Guest(place, sock, down)
+            self._epoll.register(sock, guest.awaits)
 
     def _refuse(self, down: Publisher, reason: str) -> None:
         down.put(wire.encode_text(wire.REFUSED, reason))
 
-    def _pass_up(self, place: str, packet: bytes) -> None:
-        if len(packet) > wire.MAX_BYTES or packet[:1] == bytes((wire.HELLO,)):
-            return  # a hello that was said again
-        try:
-            self._sockets[place].send(packet)
-        except OSError:
-            self._leave(place)
-
     def _leave(self, place: str) -> None:
-        sock = self._sockets.pop(place, None)
-        if sock is not None:
-            with contextlib.suppress(OSError):
-                sock.shutdown(socket.SHUT_RDWR)
+        """A guest is no more: what it said before still reaches the hub, what it hears is lost."""
+        self._unheard.discard(place)
+        if (guest := self._guests.get(place)) is not None:
+            guest.leaving = True
+            self._move(guest)
 
-    # --- on a guest's thread ---------------------------------------------------------------------
+    def _end_all(self) -> None:
+        for guest in tuple(self._guests.values()):
+            guest.push()
+            guest.pull(None)
+            self._end(guest, "the run has ended")
 
-    def _pass_down(self, sock: socket.socket, down: Publisher) -> None:
-        """What the hub sends goes to the guest, to the end."""
-        last = b""
-        with sock:
-            while True:
-                try:
-                    packet = sock.recv(wire.MAX_BYTES)
-                except OSError:
-                    packet = b""
-                if not packet:
-                    break
-                last = packet
-                down.put(packet)
-        if last[:1] != bytes((wire.BYE,)):
-            down.put(wire.encode_text(wire.BYE, "the bus has gone"))
+    def _end(self, guest: _Guest, reason: str) -> None:
+        """Leave the hub in a guest's name; it is told why, if the hub hasn't said so."""
+        if not guest.told:
+            guest.down.put(wire.encode_text(wire.BYE, reason))
+        if not guest.leaving:
+            self._unheard.add(guest.place)
+        self._part(guest)
+
+    def _part(self, guest: _Guest) -> None:
+        if self._guests.pop(guest.place, None) is not None:
+            del self._by_fd[guest.sock.fileno()]
+            self._epoll.unregister(guest.sock)
+            guest.sock.close()

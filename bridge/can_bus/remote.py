@@ -3,105 +3,153 @@
     guest ── <bus>/up ──► router, relay ── Unix socket ──► hub
           ◄─ <bus>/down ─
 
-Packets are the same as on the Unix socket, so are the promises: lossless, in order, no echo. The
-guest holds a liveliness token for as long as it lives; the router says when that is gone, and the
-relay leaves the hub in its name. What a guest doesn't read waits at the guest, up to `BACKLOG`
-packets; then its line is broken.
+Packets are the same as on the Unix socket, so are the promises: lossless, in order, no echo, room
+that is bounded both ways (`window`). Leaving waits, at most `CLOSE_S`, until the hub has all that
+was sent. The guest holds a liveliness token for as long as it lives and watches the relay's: when
+that goes, or the network to it (noticed within Zenoh's lease), the line is broken and says so, for
+good.
 """
 
+import atexit
 import contextlib
 import os
 import queue
 import secrets
-import select
+import threading
 import time
 
 from bridge import keys
+from bridge.can_bus import packet as wire
+from bridge.can_bus.window import Receiver, Sender
 from bridge.zenoh_link import open_client
-from configs.brief import NetworkLink, TlsFiles
+from configs.brief import NetworkLink
 from configs.errors import InfrastructureError
 
-BACKLOG = 100_000
-_HELLO_EVERY_S = 0.1
+CLOSE_S = 1.0
+_FIRST_HELLO_S, _LAST_HELLO_S = 0.01, 0.2
+_ENDS = frozenset({wire.BYE, wire.REFUSED})
 
 
 class RemoteLine:
     """One guest's line to a bus behind a router."""
 
-    def __init__(
-        self,
-        endpoint: str,
-        bus: str,
-        hello: bytes,
-        timeout_s: float,
-        *,
-        user: str,
-        password: str,
-        tls: TlsFiles | None,
-    ) -> None:
+    def __init__(self, network: NetworkLink, channel: str, hello: bytes, timeout_s: float) -> None:
         """Connect, and say hello until the relay answers.
 
         Raises:
             OSError: no router there, the login was refused, or nobody relays that bus.
+            ScenarioError: user or channel can't be names.
         """
         deadline = time.monotonic() + timeout_s
+        place = keys.guest_line(network.user, secrets.token_hex(8), channel)
         self._packets: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._lock = threading.Lock()  # packets and descriptor change together
+        self._news = threading.Condition(self._lock)
+        self._room, self._taken = Sender(), Receiver()
         self._broken = ""
-        self._readable = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC | os.EFD_SEMAPHORE)
-        network = NetworkLink("", endpoint, user, password or user, tls)
+        self._ended = threading.Event()
         try:
             self._link = open_client(network, timeout_s)
         except InfrastructureError as error:
-            os.close(self._readable)
             raise OSError(str(error)) from error
-        place = keys.guest_line(user, secrets.token_hex(8), bus)
-        self._alive = f"{place}/alive"
+        # Later, when the interpreter ends, a session can't be closed and keeps the process.
+        atexit.register(self.close)
+        self._readable = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC | os.EFD_SEMAPHORE)
         self._link.each(f"{place}/down", self._take)
+        self._link.on_gone(keys.guest_relay(network.user), self._lose)
         self._up = self._link.publisher(f"{place}/up")
-        self._link.declare_live(self._alive)
+        self._link.declare_live(f"{place}/alive")
+        again_s = _FIRST_HELLO_S
         while True:
             self._up.put(hello)
-            if select.select([self._readable], [], [], _HELLO_EVERY_S)[0]:
-                return
+            with self._news:
+                if self._news.wait_for(self._has_packets, again_s):
+                    return
+            again_s = min(2.0 * again_s, _LAST_HELLO_S)
             if time.monotonic() > deadline:
+                self._ended.set()  # nobody to wait for
                 self.close()
                 raise TimeoutError(
-                    f"nobody at {endpoint} answers to {user!r} for a bus within {timeout_s:g} s"
+                    f"nobody at {network.endpoint} answers to {network.user!r} within"
+                    f" {timeout_s:g} s: the run there has no such guest, or this isn't its"
+                    " certificate"
                 )
 
+    # --- on Zenoh's thread -----------------------------------------------------------------------
+
     def _take(self, packet: bytes) -> None:
-        if self._packets.qsize() >= BACKLOG:
-            self._broken = f"{BACKLOG} packets wait to be read"
-            packet = b""
-        if self._readable >= 0:
-            os.eventfd_write(self._readable, 1)  # first: every packet that is got is counted
-            self._packets.put(packet)
+        kind = packet[0] if packet else 0
+        with self._news:
+            if kind in _ENDS:
+                self._ended.set()
+            if self._readable < 0 or self._broken:
+                return
+            if not self._room.hear(packet):
+                self._keep(packet)
+            if kind in _ENDS:
+                self._break("the bus has gone")
+            self._news.notify_all()
+        if kind == wire.BYE:
+            self._up.put(packet)  # heard
+
+    def _lose(self) -> None:
+        with self._news:
+            if self._readable >= 0 and not self._broken:
+                self._break("the run's router has gone, or the network to it")
+            self._ended.set()
+            self._news.notify_all()
+
+    def _keep(self, packet: bytes) -> None:
+        os.eventfd_write(self._readable, 1)
+        self._packets.put(packet)
+
+    def _break(self, reason: str) -> None:
+        """No more comes: the descriptor stays readable, as at the end of a socket."""
+        self._broken = reason
+        self._ended.set()
+        self._keep(b"")
+
+    def _has_packets(self) -> bool:
+        return not self._packets.empty()
+
+    # --- a line ----------------------------------------------------------------------------------
 
     def send(self, packet: bytes) -> None:
-        """Send at once; waits only while the network is full."""
-        if self._readable < 0:
-            raise OSError("the line is closed")
+        """Send at once."""
+        with self._lock:
+            if self._broken or self._readable < 0:
+                raise OSError(self._broken or "the line is closed")
+            if not self._room.has_room():
+                raise BlockingIOError
+            self._room.send(packet)
         self._up.put(packet)
 
-    def await_room(self, timeout_s: float) -> bool:  # noqa: ARG002 - a send waits itself
-        """There always is."""
-        return True
+    def await_room(self, timeout_s: float) -> bool:
+        """Wait until there is room to send, or the line is broken."""
+        with self._news:
+            return self._news.wait_for(
+                lambda: self._room.has_room() or bool(self._broken) or self._readable < 0, timeout_s
+            )
 
     def receive(self, wait_s: float | None) -> bytes | None:
         """The next packet."""
-        if self._readable < 0:
-            raise OSError("the line is closed")
         try:
-            if wait_s is not None and wait_s <= 0.0:
-                packet = self._packets.get_nowait()
-            else:
+            if wait_s is None or wait_s > 0.0:
                 packet = self._packets.get(timeout=wait_s)
+            else:
+                with self._lock:
+                    packet = self._packets.get_nowait()
         except queue.Empty:
             return None
-        with contextlib.suppress(BlockingIOError):
-            os.eventfd_read(self._readable)
-        if not packet and self._broken:
-            raise OSError(self._broken)
+        with self._lock:
+            if self._readable < 0 or not packet:
+                self._packets.put(b"")  # the end stays the end
+                raise OSError(self._broken or "the line is closed")
+            with contextlib.suppress(BlockingIOError):
+                os.eventfd_read(self._readable)
+            room = self._taken.take(packet)
+        if room is not None:
+            self._up.put(room)
         return packet
 
     def fileno(self) -> int:
@@ -109,8 +157,16 @@ class RemoteLine:
         return self._readable
 
     def close(self) -> None:
-        """Leave."""
-        readable, self._readable = self._readable, -1
-        if readable >= 0:
-            self._link.close()
-            os.close(readable)
+        """Say goodbye, wait until the hub has what was sent before it, and leave."""
+        with self._news:
+            readable, self._readable = self._readable, -1
+            self._packets.put(b"")  # whoever waits in another thread
+            self._news.notify_all()
+        if readable < 0:
+            return
+        atexit.unregister(self.close)
+        os.close(readable)
+        if not self._ended.is_set():
+            self._up.put(wire.encode_text(wire.BYE))
+            self._ended.wait(CLOSE_S)
+        self._link.close()

@@ -1,0 +1,71 @@
+"""How a program on another machine says where a run's router is, and who it is.
+
+    option         what
+    endpoint       tcp/HOST:PORT, or tls/HOST:PORT for mutual TLS
+    user           a guest of the run's deployment; with TLS its certificate's common name
+    password       with tcp: the one in the deployment's file of users,
+    users          or a file of the program's own with the line USER:PASSWORD
+    ca             with tls: who signed the router's certificate and the guest's, PEM
+    certificate    with tls: the guest's, PEM
+    private_key    with tls: the guest's, PEM
+
+Over tcp whoever is on the way reads and changes frames; it is for networks that are one's own.
+"""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from configs.brief import NetworkLink, TlsFiles
+from configs.errors import ScenarioError
+from configs.users import read_users
+
+_TLS = ("ca", "certificate", "private_key")
+OPTIONS = frozenset({"endpoint", "user", "password", "users", *_TLS})
+_ENDPOINT = re.compile(r"(tcp|tls)/.+:\d+")
+
+
+def network_of(options: Mapping[str, str]) -> NetworkLink:
+    """How to reach the router, from the options that were given.
+
+    Raises:
+        ScenarioError: an option is missing, wrong, or doesn't go with the others.
+    """
+    endpoint, user = options.get("endpoint"), options.get("user")
+    if not endpoint or not user:
+        raise ScenarioError(
+            "from another machine give endpoint and user, with password or users over tcp, with"
+            f" {', '.join(_TLS)} over tls; given: {', '.join(sorted(options))}"
+        )
+    if not _ENDPOINT.fullmatch(endpoint):
+        raise ScenarioError(f"endpoint = {endpoint!r}: must be tcp/HOST:PORT or tls/HOST:PORT")
+    secure = endpoint.startswith("tls/")
+    needed, others = (_TLS, ("password", "users")) if secure else (("password",), _TLS)
+    if wrong := [name for name in others if name in options]:
+        raise ScenarioError(f"{wrong[0]} doesn't go with {endpoint}: give {', '.join(needed)}")
+    if secure:
+        return NetworkLink("", endpoint, user, user, _tls(options))
+    return NetworkLink("", endpoint, user, _password(options, user))
+
+
+def _tls(options: Mapping[str, str]) -> TlsFiles:
+    for name in _TLS:
+        if name not in options:
+            raise ScenarioError(f"{name} = (missing): over tls give {', '.join(_TLS)}")
+        try:
+            Path(options[name]).open("rb").close()
+        except OSError as error:
+            raise ScenarioError(f"{name} = {options[name]}: {error.strerror}") from error
+    return TlsFiles(*(options[name] for name in _TLS))
+
+
+def _password(options: Mapping[str, str], user: str) -> str:
+    if ("password" in options) == ("users" in options):
+        raise ScenarioError("over tcp give either password or users")
+    if "password" in options:
+        return options["password"]
+    path = Path(options["users"]).expanduser()
+    known = read_users(path, "users")
+    if not known.get(user):
+        raise ScenarioError(f"users = {path}: no line {user}:<password>")
+    return known[user]
