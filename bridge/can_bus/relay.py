@@ -24,7 +24,6 @@ import select
 import socket
 import threading
 import time
-from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -33,7 +32,7 @@ from typing import NamedTuple, Self
 from bridge import keys
 from bridge.can_bus import packet as wire
 from bridge.can_bus import places
-from bridge.can_bus.window import Receiver, Sender
+from bridge.can_bus.guest import READ, Guest
 from bridge.link import Publisher
 from bridge.zenoh_link import ZenohLink
 
@@ -43,71 +42,13 @@ GOODBYE_S = 0.5
 _JOIN_S = 1.0
 _TURN = 64
 """Packets of one guest before the others have their turn."""
-_READ, _WRITE, _HANG_UP = select.EPOLLIN, select.EPOLLOUT, select.EPOLLHUP | select.EPOLLERR
-_BYE = bytes((wire.BYE,))
+_HANG_UP = select.EPOLLHUP | select.EPOLLERR
 
 
 class _Event(NamedTuple):
     place: str  # of a guest's line; "": the relay ends
     packet: bytes | None = None
     alive: bool | None = None  # its token came or went
-
-
-class _Guest:
-    """One guest's line between router and hub."""
-
-    __slots__ = ("awaits", "down", "leaving", "place", "room", "sock", "taken", "told", "waiting")
-
-    def __init__(self, place: str, sock: socket.socket, down: Publisher) -> None:
-        self.place = place
-        self.sock = sock
-        self.down = down
-        self.room = Sender()  # of the way down
-        self.taken = Receiver()  # of the way up
-        self.waiting: deque[bytes] = deque()  # the hub has no room for these yet
-        self.leaving = self.told = False  # it said goodbye; it was told of the end
-        self.awaits = _READ
-
-    def push(self) -> bool:
-        """Give the hub what waits; whether nothing is left."""
-        while self.waiting:
-            try:
-                self.sock.send(self.waiting[0])
-            except BlockingIOError:
-                return False
-            except OSError:
-                self.waiting.clear()  # the hub has gone; its last words are still to be read
-                return True
-            if (room := self.taken.take(self.waiting.popleft())) is not None:
-                self.down.put(room)
-        return True
-
-    def pull(self, most: int | None) -> bool:
-        """Hand on at most so many packets of the hub, as far as there is room; False at the end.
-
-        None: all that is there, room or not: the hub's last words are as many as a socket holds.
-        """
-        while most is None or (most > 0 and self.room.has_room()):
-            try:
-                packet = self.sock.recv(wire.MAX_BYTES)
-            except BlockingIOError:
-                return True
-            except ConnectionResetError:
-                continue  # the hub left something unread; what it said is still there
-            except OSError:
-                return False
-            if not packet:
-                return False
-            self.told |= packet[:1] == _BYE
-            self.room.send(packet)
-            self.down.put(packet)
-            most = most and most - 1
-        return True
-
-    def wants(self) -> int:
-        """What to wait for at the hub's socket."""
-        read = _READ if self.room.has_room() and not self.leaving else 0
-        return read | (_WRITE if self.waiting else 0)
 
 
 class Relay:
@@ -132,15 +73,15 @@ class Relay:
         self._granted = granted
         self._events: queue.SimpleQueue[_Event] = queue.SimpleQueue()
         self._alive: set[str] = set()
-        self._guests: dict[str, _Guest] = {}
-        self._by_fd: dict[int, _Guest] = {}
+        self._guests: dict[str, Guest] = {}
+        self._by_fd: dict[int, Guest] = {}
         self._unheard: set[str] = set()  # told of the end, and have not said that they know
         self._closing = False
         self._over_at: float | None = None
         self._lock = threading.Lock()  # of the descriptor below
         self._epoll = select.epoll()
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
-        self._epoll.register(self._wake, _READ)
+        self._epoll.register(self._wake, READ)
         self._thread = threading.Thread(target=self._serve, daemon=True)
         for user in granted:
             # One by one: guests must be told that somebody hears them, and may see no wider key.
@@ -235,7 +176,7 @@ class Relay:
             guest.waiting.append(packet)
         self._move(guest)
 
-    def _move(self, guest: _Guest, *, ended: bool = False) -> None:
+    def _move(self, guest: Guest, *, ended: bool = False) -> None:
         """Move packets both ways as far as they go; `ended`: the hub has closed its end."""
         pushed = guest.push()
         if guest.leaving:
@@ -271,7 +212,7 @@ class Relay:
                 sock.close()
                 self._refuse(down, f"the bus doesn't answer: {error}")
                 return
-            guest = self._guests[place] = self._by_fd[sock.fileno()] = _Guest(place, sock, down)
+            guest = self._guests[place] = self._by_fd[sock.fileno()] = Guest(place, sock, down)
             self._epoll.register(sock, guest.awaits)
 
     def _refuse(self, down: Publisher, reason: str) -> None:
@@ -290,7 +231,7 @@ class Relay:
             guest.pull(None)
             self._end(guest, "the run has ended")
 
-    def _end(self, guest: _Guest, reason: str) -> None:
+    def _end(self, guest: Guest, reason: str) -> None:
         """Leave the hub in a guest's name; it is told why, if the hub hasn't said so."""
         if not guest.told:
             guest.down.put(wire.encode_text(wire.BYE, reason))
@@ -298,7 +239,7 @@ class Relay:
             self._unheard.add(guest.place)
         self._part(guest)
 
-    def _part(self, guest: _Guest) -> None:
+    def _part(self, guest: Guest) -> None:
         if self._guests.pop(guest.place, None) is not None:
             del self._by_fd[guest.sock.fileno()]
             self._epoll.unregister(guest.sock)

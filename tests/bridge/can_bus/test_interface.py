@@ -3,9 +3,11 @@
 import errno
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import can
 import pytest
+from hub_running import Remote, Running
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,49 +17,18 @@ from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.traffic import Passed
 from bridge.frame import EFF, RTR, Frame
 
+LOCAL_ONLY = pytest.mark.parametrize("where", ["local"], indirect=True)
 
-class Running:
-    """A hub that a thread keeps going while clients in this thread wait for it."""
 
-    def __init__(self) -> None:
-        folder = places.create_run_folder("test")
-        self.hub = Hub(places.listen(folder, ("r1", "r2")))
-        self._lock = threading.Lock()
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._serve)
-        self._thread.start()
-
-    def _serve(self) -> None:
-        while not self._over.is_set():
-            with self._lock:
-                self.hub.collect(0.0)
-            self._over.wait(0.001)
-
-    def deliver(self, *frames: Frame, bus: str = "r1", stamp_ns: int = 1_000_000) -> None:
-        with self._lock:
-            self.hub.deliver(bus, stamp_ns, frames)
-
-    def taken(self, count: int, bus: str = "r1") -> list[Frame]:
-        """What clients sent, once `count` frames are there."""
-        frames: list[Frame] = []
-        for _ in range(5000):
-            with self._lock:
-                frames += self.hub.take(bus)
-            if len(frames) >= count:
-                break
-            self._over.wait(0.001)
-        return frames
-
-    def close(self) -> None:
-        self._over.set()
-        self._thread.join()
-        self.hub.close("the test is over")
-        places.remove_run_folder(places.base_folder() / "test")
+@pytest.fixture(params=["local", "remote"])
+def where(request: pytest.FixtureRequest) -> str:
+    """Clients on the hub's machine, and on another one: the same contract."""
+    return request.param
 
 
 @pytest.fixture
-def running(runtime_folder) -> Iterator[Running]:
-    running = Running()
+def running(where: str, runtime_folder, tmp_path: Path) -> Iterator[Running]:
+    running = Running(tmp_path if where == "remote" else None)
     yield running
     running.close()
 
@@ -67,7 +38,8 @@ def join(running: Running) -> Iterator[Callable[..., can.BusABC]]:
     buses: list[can.BusABC] = []
 
     def open_bus(channel: str = "r1", **options) -> can.BusABC:
-        bus = can.Bus(interface="fleetloop", channel=channel, **options)
+        settings = running.remote.settings() if running.remote is not None else {}
+        bus = can.Bus(interface="fleetloop", channel=channel, **settings, **options)
         buses.append(bus)
         return bus
 
@@ -198,17 +170,20 @@ def test_fd_frames_and_unknown_options_are_refused(running, join) -> None:
         join(baud=1)
 
 
+@LOCAL_ONLY
 def test_a_bus_that_is_not_there_is_named_with_those_that_are(running, join) -> None:
     with pytest.raises(can.CanInitializationError, match=r"no bus 'r9'.*test/r1, test/r2"):
         join("r9")
 
 
+@LOCAL_ONLY
 def test_channels_go_by_bus_by_run_and_by_path(running, join) -> None:
     for channel in ("r1", "test/r1", str(places.base_folder() / "test" / "r1.can")):
         join(channel).send(can.Message(arbitration_id=1, is_extended_id=False))
     assert len(running.taken(3)) == 3
 
 
+@LOCAL_ONLY
 def test_live_buses_are_detected(running) -> None:
     found = can.detect_available_configs("fleetloop")
     assert [config["channel"] for config in found] == ["test/r1", "test/r2"]
@@ -241,13 +216,15 @@ def answered(hub: Hub) -> bool:
 
 
 @pytest.fixture
-def paced(runtime_folder) -> Iterator[Hub]:
+def paced(where: str, runtime_folder, tmp_path: Path) -> Iterator[Hub]:
     """A hub driven by the test, and a paced client in a thread that answers like a controller."""
     folder = places.create_run_folder("test")
     hub = Hub(places.listen(folder, ("r1",)))
+    remote = Remote(tmp_path) if where == "remote" else None
+    settings = remote.settings() if remote is not None else {}
 
     def answer() -> None:
-        bus = can.Bus(interface="fleetloop", channel="r1", paced=True)
+        bus = can.Bus(interface="fleetloop", channel="r1", paced=True, **settings)
         try:
             while True:
                 message = bus.recv(10.0)
@@ -266,6 +243,8 @@ def paced(runtime_folder) -> Iterator[Hub]:
     yield hub
     hub.close("the test is over")
     thread.join()
+    if remote is not None:
+        remote.close()
     places.remove_run_folder(folder)
 
 
@@ -442,8 +421,9 @@ def test_a_notifier_hands_every_frame_to_its_listeners(running, join) -> None:
     assert [message.arbitration_id for message in heard] == list(range(0x100, 0x132))
 
 
-def test_several_threads_may_share_a_thread_safe_bus(running, runtime_folder) -> None:
-    with can.ThreadSafeBus(interface="fleetloop", channel="r1") as bus:
+def test_several_threads_may_share_a_thread_safe_bus(running) -> None:
+    settings = running.remote.settings() if running.remote is not None else {}
+    with can.ThreadSafeBus(interface="fleetloop", channel="r1", **settings) as bus:
 
         def send(first: int) -> None:
             for n in range(100):
@@ -462,6 +442,45 @@ def test_several_threads_may_share_a_thread_safe_bus(running, runtime_folder) ->
         assert of_one == sorted(of_one)
 
 
+def test_what_gathers_waits_for_a_busy_hub_and_loses_nothing(running, join) -> None:
+    bus = join(gathered=True)
+    sent = list(range(3000))
+    done = threading.Event()
+
+    def send() -> None:
+        for n in sent:
+            bus.send(can.Message(arbitration_id=1, is_extended_id=False, data=n.to_bytes(2, "big")))
+            bus.recv(0.0)
+        done.set()
+
+    sender = threading.Thread(target=send)
+    with running.lock:  # the hub is busy
+        sender.start()
+        assert not done.wait(0.2)
+    frames = running.taken(3000)
+    sender.join()
+    assert [int.from_bytes(frame.data, "big") for frame in frames] == sent
+
+
+def test_a_hub_that_does_not_read_is_a_full_transmit_buffer_within_the_timeout(
+    running, join
+) -> None:
+    bus = join()
+    message = can.Message(arbitration_id=1, is_extended_id=False)
+    sent = 0
+    with running.lock:
+        with pytest.raises(can.CanOperationError, match="transmit buffer full") as caught:
+            while sent < 5000:
+                bus.send(message, timeout=0.05)
+                sent += 1
+        assert caught.value.error_code == errno.ENOBUFS
+        with pytest.raises(can.CanOperationError, match="transmit buffer full"):
+            bus.send(message)
+    assert len(running.taken(sent)) == sent
+    bus.send(message, timeout=5.0)
+    assert len(running.taken(1)) == 1
+
+
 def test_what_a_client_sent_before_it_closed_arrives_though_frames_were_on_their_way_to_it(
     running, join
 ) -> None:
@@ -474,6 +493,7 @@ def test_what_a_client_sent_before_it_closed_arrives_though_frames_were_on_their
     assert [frame.can_id for frame in running.taken(20)] == list(range(0x200, 0x214))
 
 
+@LOCAL_ONLY
 def test_buses_that_are_up_are_detected(running) -> None:
     found = can.detect_available_configs("fleetloop")
     assert [config["channel"] for config in found] == ["test/r1", "test/r2"]
