@@ -56,6 +56,12 @@ class Running:
                     self.hub.collect(0.0)
             self._over.wait(0.001)
 
+    @property
+    def endpoint(self) -> str:
+        """Where those on other machines come in."""
+        assert self.remote is not None
+        return self.remote.link.endpoint
+
     def open(self, channel: str = "r1", user: str = "bench", **options) -> can.BusABC:
         """A bus from another machine."""
         assert self.remote is not None

@@ -1,0 +1,68 @@
+"""What a program on another machine gives to be let in."""
+
+from pathlib import Path
+
+import pytest
+
+from bridge.can_bus.credentials import network_of
+from configs.brief import TlsFiles
+from configs.errors import ScenarioError
+
+TCP = {"endpoint": "tcp/lab:7447", "user": "bench"}
+TLS = {"endpoint": "tls/lab:7447", "user": "bench"}
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> dict[str, str]:
+    names = ("ca", "certificate", "private_key")
+    for name in names:
+        (tmp_path / name).write_text("PEM")
+    return {name: str(tmp_path / name) for name in names}
+
+
+def users(folder: Path, text: str = "boss:x\nbench:a:b\n", mode: int = 0o600) -> str:
+    path = folder / "users"
+    path.write_text(text)
+    path.chmod(mode)
+    return str(path)
+
+
+def test_a_password_goes_with_tcp_given_or_from_a_file(tmp_path: Path) -> None:
+    assert network_of({**TCP, "password": "word"}).password == "word"
+    found = network_of({**TCP, "users": users(tmp_path)})
+    assert (found.user, found.password, found.tls) == ("bench", "a:b", None)
+
+
+def test_certificates_go_with_tls(files: dict[str, str]) -> None:
+    assert network_of({**TLS, **files}).tls == TlsFiles(*files.values())
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ({"endpoint": "tcp/lab:7447"}, "give endpoint and user"),
+        ({**TCP, "endpoint": "lab:7447"}, r"'lab:7447': must be tcp/HOST:PORT or tls/HOST:PORT"),
+        (TCP, "give either password or users"),
+        ({**TCP, "password": "x", "users": "f"}, "give either password or users"),
+        ({**TCP, "password": "x", "ca": "f"}, "ca doesn't go with tcp/lab:7447: give password"),
+        ({**TLS, "password": "x"}, "password doesn't go with tls/lab:7447: give ca, certificate"),
+        (TLS, r"ca = \(missing\)"),
+    ],
+)
+def test_what_is_missing_or_does_not_go_together_is_named(
+    options: dict[str, str], complaint: str
+) -> None:
+    with pytest.raises(ScenarioError, match=complaint):
+        network_of(options)
+
+
+def test_a_file_that_is_not_there_is_named(files: dict[str, str]) -> None:
+    with pytest.raises(ScenarioError, match="private_key = /no/key: No such file"):
+        network_of({**TLS, **files, "private_key": "/no/key"})
+
+
+def test_a_file_of_passwords_is_ones_own_and_has_ones_line(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="others may read it; chmod 600"):
+        network_of({**TCP, "users": users(tmp_path, mode=0o644)})
+    with pytest.raises(ScenarioError, match="no line bench:<password>"):
+        network_of({**TCP, "users": users(tmp_path, "boss:x\n")})
