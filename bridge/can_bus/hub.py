@@ -16,7 +16,6 @@ takes with `say` who sent what, gives with `pass_on` what ended when and who had
 with `left_queue` whose transmit queue has room again.
 """
 
-import contextlib
 import select
 import socket
 import time
@@ -29,6 +28,8 @@ from bridge.frame import Frame
 
 BACKLOG = 100_000
 MAX_CLIENTS = 64
+GOODBYE_S = 0.5
+"""How long the end of a bus may wait for clients that are behind."""
 _READ, _WRITE = select.EPOLLIN, select.EPOLLOUT
 
 
@@ -273,18 +274,40 @@ class Hub:
         return self._epoll.fileno()
 
     def close(self, reason: str) -> None:
-        """Say goodbye to all clients and close everything. Idempotent."""
+        """Say goodbye to all clients and close everything. Idempotent.
+
+        Who is behind has `GOODBYE_S` to take what was kept for it.
+        """
+        if self._epoll.closed:
+            return
         goodbye = wire.encode_text(wire.BYE, reason)
+        clients = [client for bus in self._buses.values() for client in bus.clients]
+        for client in clients:
+            if client.backlog:
+                client.backlog.append(goodbye)  # past the bound: it is the last one
+            else:
+                self._send(client, goodbye)
+        self._let_catch_up([client for client in clients if client.backlog])
         for bus in self._buses.values():
-            for client in bus.clients:
-                with contextlib.suppress(OSError):
-                    client.sock.send(goodbye)
             bus.listener.close()
         for reader in self._readers.values():
             if isinstance(reader, _Client):
                 reader.sock.close()
         self._readers.clear()
         self._epoll.close()
+
+    def _let_catch_up(self, behind: Sequence[_Client]) -> None:
+        deadline = time.monotonic() + GOODBYE_S
+        poller = select.poll()
+        clients = {client.sock.fileno(): client for client in behind}
+        for fd in clients:
+            poller.register(fd, select.POLLOUT)
+        while clients and (left_s := deadline - time.monotonic()) > 0.0:
+            for fd, _ in poller.poll(left_s * 1e3):
+                self._drain(clients[fd])
+                if clients[fd].sock.fileno() < 0 or not clients[fd].backlog:
+                    poller.unregister(fd)
+                    del clients[fd]
 
     # --- the clients' end ------------------------------------------------------------------------
 

@@ -4,10 +4,11 @@
           ◄─ <bus>/down ─
 
 Packets are the same as on the Unix socket, so are the promises: lossless, in order, no echo, room
-that is bounded both ways (`window`). Leaving waits, at most `CLOSE_S`, until the hub has all that
-was sent. The guest holds a liveliness token for as long as it lives and watches the relay's: when
-that goes, or the network to it (noticed within Zenoh's lease), the line is broken and says so, for
-good.
+that is bounded both ways (`window`). What the guest doesn't read waits here, up to `BACKLOG`
+packets, and then at the hub, which drops and counts what is too much. Leaving waits, at most
+`CLOSE_S`, until the hub has all that was sent. The guest holds a liveliness token for as long as it
+lives and watches the relay's: when that goes, or the network to it (noticed within Zenoh's lease),
+the line is broken and says so, for good.
 """
 
 import atexit
@@ -17,6 +18,7 @@ import queue
 import secrets
 import threading
 import time
+from collections import deque
 
 from bridge import keys
 from bridge.can_bus import packet as wire
@@ -25,6 +27,7 @@ from bridge.zenoh_link import open_client
 from configs.brief import NetworkLink
 from configs.errors import InfrastructureError
 
+BACKLOG = 100_000
 CLOSE_S = 1.0
 _FIRST_HELLO_S, _LAST_HELLO_S = 0.01, 0.2
 _ENDS = frozenset({wire.BYE, wire.REFUSED})
@@ -46,6 +49,7 @@ class RemoteLine:
         self._lock = threading.Lock()  # packets and descriptor change together
         self._news = threading.Condition(self._lock)
         self._room, self._taken = Sender(), Receiver()
+        self._held: deque[bytes] = deque()  # past the backlog: no room is given back for them yet
         self._broken = ""
         self._ended = threading.Event()
         try:
@@ -84,13 +88,20 @@ class RemoteLine:
                 self._ended.set()
             if self._readable < 0 or self._broken:
                 return
+            answer = None
             if not self._room.hear(packet):
                 self._keep(packet)
+                if kind == wire.BYE:
+                    answer = packet  # heard
+                elif self._packets.qsize() < BACKLOG:
+                    answer = self._taken.take(packet)
+                else:
+                    self._held.append(packet)
             if kind in _ENDS:
                 self._break("the bus has gone")
             self._news.notify_all()
-        if kind == wire.BYE:
-            self._up.put(packet)  # heard
+        if answer is not None:
+            self._up.put(answer)
 
     def _lose(self) -> None:
         with self._news:
@@ -147,7 +158,7 @@ class RemoteLine:
                 raise OSError(self._broken or "the line is closed")
             with contextlib.suppress(BlockingIOError):
                 os.eventfd_read(self._readable)
-            room = self._taken.take(packet)
+            room = self._taken.take(self._held.popleft()) if self._held else None
         if room is not None:
             self._up.put(room)
         return packet

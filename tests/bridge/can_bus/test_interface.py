@@ -198,6 +198,35 @@ def test_the_end_of_the_bus_is_an_error_that_says_why(running, join) -> None:
         bus.recv(5.0)
 
 
+def test_who_is_behind_when_the_bus_ends_still_gets_all_of_it_and_the_reason(running, join) -> None:
+    bus = join()
+    heard: list[int] = []
+    for k in range(5000):
+        running.deliver(Frame(1, k.to_bytes(4, "big")))
+
+    def read() -> None:
+        with pytest.raises(can.CanOperationError, match="the test is over"):
+            while True:
+                heard.append(int.from_bytes(bus.recv(5.0).data, "big"))
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    running.close()
+    reader.join()
+    assert heard == list(range(5000))
+
+
+def test_who_does_not_read_delays_the_end_of_the_bus_by_a_bound(running, join) -> None:
+    import time
+
+    join()
+    for _ in range(3000):
+        running.deliver(Frame(1, b""))
+    began = time.monotonic()
+    running.close()
+    assert time.monotonic() - began < 3.0
+
+
 def test_shutdown_twice_is_once(running, join) -> None:
     bus = join()
     bus.shutdown()

@@ -18,7 +18,7 @@ from hub_running import Running
 from bridge import keys
 from bridge.can_bus import hub as hub_module
 from bridge.can_bus import packet as wire
-from bridge.can_bus import window
+from bridge.can_bus import remote, window
 from bridge.frame import Frame
 from bridge.zenoh_link import open_client
 from configs.brief import NetworkLink
@@ -178,6 +178,7 @@ def test_what_a_guest_does_not_read_is_dropped_and_counted_by_the_hub_as_for_all
     running: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(hub_module, "BACKLOG", 500)
+    monkeypatch.setattr(remote, "BACKLOG", 100)
     with running.open() as late:
         for n in range(5000):
             running.deliver(Frame(1, n.to_bytes(4, "big")))
