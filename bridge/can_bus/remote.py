@@ -20,6 +20,8 @@ import threading
 import time
 from collections import deque
 
+import zenoh
+
 from bridge import keys
 from bridge.can_bus import packet as wire
 from bridge.can_bus.window import Receiver, Sender
@@ -83,11 +85,18 @@ class RemoteLine:
 
     def _take(self, packet: bytes) -> None:
         kind = packet[0] if packet else 0
+        answer = self._keep_or_answer(packet, kind)
+        if answer is not None:
+            with contextlib.suppress(OSError):
+                self._say(answer)
+        if kind in _ENDS:
+            # Not before it was answered: who waits for it then closes the session.
+            self._ended.set()
+
+    def _keep_or_answer(self, packet: bytes, kind: int) -> bytes | None:
         with self._news:
-            if kind in _ENDS:
-                self._ended.set()
             if self._readable < 0 or self._broken:
-                return
+                return None
             answer = None
             if not self._room.hear(packet):
                 self._keep(packet)
@@ -100,8 +109,7 @@ class RemoteLine:
             if kind in _ENDS:
                 self._break("the bus has gone")
             self._news.notify_all()
-        if answer is not None:
-            self._up.put(answer)
+        return answer
 
     def _lose(self) -> None:
         with self._news:
@@ -117,7 +125,6 @@ class RemoteLine:
     def _break(self, reason: str) -> None:
         """No more comes: the descriptor stays readable, as at the end of a socket."""
         self._broken = reason
-        self._ended.set()
         self._keep(b"")
 
     def _has_packets(self) -> bool:
@@ -133,7 +140,7 @@ class RemoteLine:
             if not self._room.has_room():
                 raise BlockingIOError
             self._room.send(packet)
-        self._up.put(packet)
+        self._say(packet)
 
     def await_room(self, timeout_s: float) -> bool:
         """Wait until there is room to send, or the line is broken."""
@@ -160,8 +167,15 @@ class RemoteLine:
                 os.eventfd_read(self._readable)
             room = self._taken.take(self._held.popleft()) if self._held else None
         if room is not None:
-            self._up.put(room)
+            with contextlib.suppress(OSError):  # the line's end is still to be read
+                self._say(room)
         return packet
+
+    def _say(self, packet: bytes) -> None:
+        try:
+            self._up.put(packet)
+        except zenoh.ZError as error:
+            raise OSError("the line is closed") from error
 
     def fileno(self) -> int:
         """Readable when a packet waits."""
@@ -177,7 +191,8 @@ class RemoteLine:
             return
         atexit.unregister(self.close)
         os.close(readable)
-        if not self._ended.is_set():
-            self._up.put(wire.encode_text(wire.BYE))
-            self._ended.wait(CLOSE_S)
+        if not self._broken:
+            with contextlib.suppress(OSError):
+                self._say(wire.encode_text(wire.BYE))
+        self._ended.wait(CLOSE_S)
         self._link.close()

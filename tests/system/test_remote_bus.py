@@ -1,11 +1,13 @@
 """A program on another machine opens a robot's bus during a run, over TLS or with a password."""
 
+import asyncio
 import subprocess
 import sys
 from pathlib import Path
 
 import can
 import pytest
+from odrive_can import ODriveCAN
 from system.processes import Run, running
 from system.test_elsewhere import certificates, free_port
 
@@ -69,6 +71,34 @@ def test_a_guest_with_a_certificate_sees_the_bus_asks_and_learns_of_its_end(tmp_
         with pytest.raises(can.CanOperationError, match="end of the run"):
             while bus.recv(5.0) is not None:
                 pass
+
+
+def test_an_independent_odrive_client_asks_an_axis_from_afar(tmp_path: Path) -> None:
+    certificates(tmp_path, ("router", "bench"))
+    where, endpoint = deployment(tmp_path)
+    args = ("two_robots", "--speed", "1", "--deployment", str(where))
+    with (
+        running(tmp_path / "run", *args, bus_time_s=0.2),
+        guest(tmp_path, endpoint) as bus,
+    ):
+        # Its DBC knows no torque frame of 4 bytes, as the controller beside it sends them.
+        bus.set_filters([{"can_id": node, "can_mask": 0x7FF} for node in (0x021, 0x037)])
+        asyncio.run(ask(bus))
+
+
+async def ask(bus: can.BusABC) -> None:
+    """Heartbeat, a request and its answer, twice: node 1 is the left wheel."""
+    axis = ODriveCAN(axis_id=1, can_bus=bus)
+    async with asyncio.timeout(20.0):
+        await axis.start()
+        try:
+            axis.check_alive()
+            axis.check_errors()
+            for _ in range(2):
+                answer = await axis.get_bus_voltage_current()
+                assert answer["Bus_Voltage"] == pytest.approx(24.0)
+        finally:
+            axis.stop()
 
 
 def test_a_guest_that_is_killed_harms_nobody(tmp_path: Path) -> None:
