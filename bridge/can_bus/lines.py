@@ -81,6 +81,9 @@ class UnixLine:
             return self._recv(wire.MAX_BYTES, socket.MSG_DONTWAIT)
         except BlockingIOError:
             return None
+        except ConnectionResetError:
+            # The hub closed with something of ours unread; what it said is still to be read.
+            return self._recv(wire.MAX_BYTES, socket.MSG_DONTWAIT)
 
     def fileno(self) -> int:
         """The socket's descriptor."""

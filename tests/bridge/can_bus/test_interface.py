@@ -510,6 +510,19 @@ def test_a_hub_that_does_not_read_is_a_full_transmit_buffer_within_the_timeout(
     assert len(running.taken(1)) == 1
 
 
+@LOCAL_ONLY
+def test_what_a_client_sent_before_it_closed_arrives_though_it_left_frames_unread(
+    running, join
+) -> None:
+    bus = join()
+    running.deliver(*(Frame(0x100 + n, b"") for n in range(20)))
+    with running.lock:  # the kernel tells the hub of a reset before it hands out what was sent
+        for n in range(20):
+            bus.send(can.Message(arbitration_id=0x200 + n, is_extended_id=False))
+        bus.shutdown()
+    assert [frame.can_id for frame in running.taken(20)] == list(range(0x200, 0x214))
+
+
 def test_what_a_client_sent_before_it_closed_arrives_though_frames_were_on_their_way_to_it(
     running, join
 ) -> None:
