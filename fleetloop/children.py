@@ -33,7 +33,6 @@ class Child:
         module: str,
         brief: object,
         fds: Sequence[int] = (),
-        core: int | None = None,
     ) -> None:
         self.name = name
         self.status: Status | None = None
@@ -41,7 +40,7 @@ class Child:
         stdin, self._stdin = os.pipe()
         self._stdout, stdout = os.pipe()
         try:
-            self._pid = nursery.bear(module, stdin, stdout, fds, core)
+            self._pid = nursery.bear(module, stdin, stdout, fds)
         except InfrastructureError:
             os.close(self._stdin)
             os.close(self._stdout)

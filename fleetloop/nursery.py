@@ -56,17 +56,14 @@ class Nursery:
                 start_new_session=True,
             )
 
-    def bear(
-        self, module: str, stdin: int, stdout: int, fds: Sequence[int], core: int | None = None
-    ) -> int:
-        """Start a process of a role with these descriptors, to live on a core; return its id.
+    def bear(self, module: str, stdin: int, stdout: int, fds: Sequence[int]) -> int:
+        """Start a process of a role with these descriptors; return its id.
 
         Raises:
             InfrastructureError: the nursery is gone or doesn't answer.
         """
         try:
-            order = module if core is None else f"{module} {core}"
-            socket.send_fds(self._socket, [order.encode()], [stdin, stdout, *fds])
+            socket.send_fds(self._socket, [module.encode()], [stdin, stdout, *fds])
             answer = self._socket.recv(64)
         except OSError as error:
             raise InfrastructureError(f"can't start {module}: the nursery: {error}") from error
@@ -108,14 +105,13 @@ def _serve() -> None:
     gc.freeze()
     orders = socket.socket(fileno=os.dup(0))
     while True:
-        order, fds = _receive(orders)
-        if not order:
+        module, fds = _receive(orders)
+        if not module:
             return
-        module, _, core = order.partition(" ")
         child = os.fork()
         if child == 0:
             orders.close()
-            _be(module, fds, core)
+            _be(module, fds)
         for fd in fds:
             os.close(fd)
         orders.send(str(child).encode())
@@ -132,13 +128,11 @@ def _receive(orders: socket.socket) -> tuple[str, list[int]]:
     return message.decode(), list(fds)
 
 
-def _be(module: str, fds: Sequence[int], core: str) -> None:
+def _be(module: str, fds: Sequence[int]) -> None:
     """In the child: become the process. Never returns."""
     status = 1
     try:
         os.setsid()
-        if core:
-            os.sched_setaffinity(0, {int(core)})
         high = [fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 1000) for fd in fds]
         for fd in fds:
             os.close(fd)

@@ -3,7 +3,6 @@
 Each is told, by its brief, exactly what it may know; its buses' listening sockets go to the plant.
 """
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +15,6 @@ from configs.deployment import PLANT, RECORDER, Deployment, agent_role
 from configs.loading import to_toml
 from configs.scenario import Scenario
 from fleetloop import placing
-from fleetloop.affinity import cores_of
 from fleetloop.children import Child
 from fleetloop.nursery import FIRST_FD, Nursery
 
@@ -47,9 +45,6 @@ def spawn(orders: Orders, links: Links, folder: Path, children: list[Child]) -> 
     robots = [r for r in scenario.names if deployment.is_ours(r) and here(PLANT)]
     ours = list(dict.fromkeys(scenario.bus_of(robot) for robot in robots))
     listeners = places.listen(folder, ours)
-    cores = sorted(os.sched_getaffinity(0))
-    home, placed = cores_of(0 if realtime else len(scenario.names), cores)
-    core_of = dict(zip(scenario.names, placed, strict=False))
     try:
         with Nursery(batch=not realtime) as nursery:
             if here(PLANT):
@@ -58,14 +53,13 @@ def spawn(orders: Orders, links: Links, folder: Path, children: list[Child]) -> 
                     listeners=tuple((bus, FIRST_FD + n) for n, bus in enumerate(ours)),
                 )
                 fds = [listeners[bus].fileno() for bus in ours]
-                children.append(Child(nursery, PLANT, "plant", plant, fds, core=home))
+                children.append(Child(nursery, PLANT, "plant", plant, fds))
             for robot in scenario.names:
                 if here(role := agent_role(robot)):
                     bus = scenario.bus_of(robot)
                     socket = str(places.socket_path(folder, bus)) if robot in robots else ""
                     agent = _agent(orders, links, robot, socket, realtime=realtime)
-                    core = core_of.get(robot)
-                    children.append(Child(nursery, role, "agents", agent, core=core))
+                    children.append(Child(nursery, role, "agents", agent))
             recorder = _recorder(orders, links)
             children.append(Child(nursery, RECORDER, "fleetloop.recorder", recorder))
     finally:
