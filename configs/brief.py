@@ -423,7 +423,7 @@ class EncoderModel:
     index: bool
     noise_counts: float  # rms
     pll_bandwidth_rad_s: float
-    pll_rate_hz: float
+    pll_rate_Hz: float
 
 
 @dataclass(frozen=True, slots=True)

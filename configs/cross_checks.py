@@ -130,11 +130,11 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
             "0 (off) or at least two control periods, or every torque comes too late",
         )
     encoder = scenario.encoder
-    if 2.0 * encoder.pll_bandwidth_rad_s >= encoder.pll_rate_hz:
+    if 2.0 * encoder.pll_bandwidth_rad_s >= encoder.pll_rate_Hz:
         yield Problem(
             "encoder.pll_bandwidth_rad_s",
             encoder.pll_bandwidth_rad_s,
-            f"must be below half of encoder.pll_rate_hz = {encoder.pll_rate_hz:g}, as drives want"
+            f"must be below half of encoder.pll_rate_Hz = {encoder.pll_rate_Hz:g}, as drives want"
             " it: twice the bandwidth times the loop period is a gain below 1",
         )
 

@@ -48,7 +48,7 @@ class Encoder(Section):
         0.0, description="rms, of the angle before it is counted"
     )
     pll_bandwidth_rad_s: Positive = 1000.0
-    pll_rate_hz: Annotated[float, Field(ge=100, le=100_000, allow_inf_nan=False)] = Field(
+    pll_rate_Hz: Annotated[float, Field(ge=100, le=100_000, allow_inf_nan=False)] = Field(
         8000.0, description="rate of the drive's control loop"
     )
 

@@ -20,8 +20,8 @@ CONTROLLER_COLUMNS = {
     "x_e_m": "x_e_m",
     "y_e_m": "y_e_m",
     "theta_e_rad": "theta_e_rad",
-    "tau_right_Nm": "tau_right_Nm",
-    "tau_left_Nm": "tau_left_Nm",
+    "tau_right_N_m": "tau_right_N_m",
+    "tau_left_N_m": "tau_left_N_m",
 }
 COLUMNS = ("t_s", "robot", *PLANT_COLUMNS, *CONTROLLER_COLUMNS)
 

@@ -180,9 +180,9 @@ def torques(record: Record, _: Scenario) -> Figure:
         for n, robot in enumerate(record.robots):
             rows = record.controller[robot]
             colour, dash = _style(n)
-            t, values = _envelope(rows["t_s"], rows[f"tau_{side}_Nm"])
+            t, values = _envelope(rows["t_s"], rows[f"tau_{side}_N_m"])
             axes.plot(t, values, color=colour, linestyle=dash, linewidth=1.0, label=robot)
-        peak = max(float(np.abs(r[f"tau_{side}_Nm"]).max()) for r in record.controller.values())
+        peak = max(float(np.abs(r[f"tau_{side}_N_m"]).max()) for r in record.controller.values())
         if peak > 1.0:
             axes.set_yscale("symlog", linthresh=1.0, linscale=2.0)
         axes.set(ylabel=f"τ {side} [N·m]")

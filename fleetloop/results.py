@@ -160,7 +160,7 @@ def claim(expect: dict[str, Any]) -> str:
 def _cells(values: dict[str, Any]) -> list[str]:
     settles = [_time(values["settle_s"][name]) for name in ERRORS]
     finals = [f"{values['final_max'][name]:.5f}" for name in ERRORS]
-    return [*settles, *finals, f"{values['peak_torque_Nm']:.2f}"]
+    return [*settles, *finals, f"{values['peak_torque_N_m']:.2f}"]
 
 
 def _time(value: float | None) -> str:

@@ -130,11 +130,11 @@ def _final(t: np.ndarray) -> slice:
 
 def _robot(rows: np.ndarray) -> dict[str, Any]:
     t, last = rows["t_s"], _final(rows["t_s"])
-    torque = max(_peak(rows["tau_right_Nm"]), _peak(rows["tau_left_Nm"]))
+    torque = max(_peak(rows["tau_right_N_m"]), _peak(rows["tau_left_N_m"]))
     return {
         "settle_s": {name: settle_s(t, rows[name]) for name in ERRORS},
         "final_max": {name: _peak(rows[name][last]) for name in ERRORS},
-        "peak_torque_Nm": torque,
+        "peak_torque_N_m": torque,
         "settle_s_dot_s": settle_s(t, rows["s_dot"] - rows["s_dot"][-1]),
     }
 
@@ -150,7 +150,7 @@ def _worst(robots: list[dict[str, Any]]) -> dict[str, Any] | None:
     return {
         "settle_s": {name: None if None in v else max(v) for name, v in settles.items()},
         "final_max": {name: max(robot["final_max"][name] for robot in robots) for name in ERRORS},
-        "peak_torque_Nm": max(robot["peak_torque_Nm"] for robot in robots),
+        "peak_torque_N_m": max(robot["peak_torque_N_m"] for robot in robots),
     }
 
 

@@ -80,7 +80,7 @@ class Encoder:
         self._model = model
         self._random = random
         self._phase = random.random()
-        bandwidth = model.pll_bandwidth_rad_s / model.pll_rate_hz
+        bandwidth = model.pll_bandwidth_rad_s / model.pll_rate_Hz
         self._gain_p = 2.0 * bandwidth  # T k_p
         self._gain_v = bandwidth * bandwidth  # T² k_i: velocities are counts per loop period
         self._offset = 0.0  # what the count has more than it should, whole
@@ -98,7 +98,7 @@ class Encoder:
         self._angle = angle_rad * per_radian + self._phase
         self._counted = self._angle // 1.0
         self._since = 0.0  # loop periods since the last sample
-        self._velocity = speed_rad_s * per_radian / self._model.pll_rate_hz
+        self._velocity = speed_rad_s * per_radian / self._model.pll_rate_Hz
         self._position = self._counted + self._offset + 0.5
 
     def step(self, angle_rad: float, dt_s: float) -> tuple[float, float]:
@@ -108,7 +108,7 @@ class Encoder:
         end = angle_rad * model.counts_per_rev * PER_RADIAN + self._phase
         if not -_LARGEST_COUNT <= end <= _LARGEST_COUNT:
             end = copysign(_LARGEST_COUNT, end) if isfinite(end) else start
-        periods = dt_s * model.pll_rate_hz
+        periods = dt_s * model.pll_rate_Hz
         since = self._since
         samples = int(since + periods + _EARLY)
         if samples:
@@ -121,7 +121,7 @@ class Encoder:
         self._since = since + periods - samples
         self._angle = end
         counts = model.counts_per_rev
-        return self._position / counts, self._velocity * model.pll_rate_hz / counts
+        return self._position / counts, self._velocity * model.pll_rate_Hz / counts
 
     def inject(self, fault: EncoderFault, amount: float | None = None) -> None:
         """Set a fault, beside those already there; `amount` as in the module's table.

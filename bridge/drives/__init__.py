@@ -48,7 +48,7 @@ class DriveClient(Protocol):
     def fault(self, now_ns: int) -> str | None:
         """Why the wheels can't be driven now, None if they can."""
 
-    def torque(self, right_Nm: float, left_Nm: float) -> Sequence[Frame]:
+    def torque(self, right_N_m: float, left_N_m: float) -> Sequence[Frame]:
         """Set-points for both wheels [N·m]; `sent` then says what the bus carries of them."""
 
     def rest(self, now_ns: int) -> Sequence[Frame]:

@@ -34,7 +34,7 @@ def test_the_defaults_are_those_of_a_small_robot_on_odrives() -> None:
     assert (motor.motor_thermal_time_s, motor.fet_thermal_time_s) == (60.0, 60.0)
     assert motor.ambient_C == 25.0
     assert (encoder.counts_per_rev, encoder.pll_bandwidth_rad_s) == (8192, 1000.0)
-    assert encoder.pll_rate_hz == 8000.0
+    assert encoder.pll_rate_Hz == 8000.0
     assert (supply.voltage_V, supply.resistance_ohm, supply.absorbs) == (24.0, 0.1, True)
 
 
@@ -86,7 +86,7 @@ def test_every_shipped_scenario_can_be_checked_with_realistic_drives(name: str) 
         ("encoder.counts_per_rev=0", "encoder.counts_per_rev", "greater than or equal to 4"),
         ("encoder.counts_per_rev=8192.5", "encoder.counts_per_rev", "integer"),
         ("encoder.pll_bandwidth_rad_s=4000.0", "encoder.pll_bandwidth_rad_s", "below half"),
-        ("encoder.pll_rate_hz=1.0", "encoder.pll_rate_hz", "greater than or equal to 100"),
+        ("encoder.pll_rate_Hz=1.0", "encoder.pll_rate_Hz", "greater than or equal to 100"),
         ("supply.voltage_V=0.0", "supply.voltage_V", "greater than 0"),
         ("supply.absorbs=1", "supply.absorbs", "boolean"),
         ("drive.preset='real'", "drive.preset", "realistic"),

@@ -19,7 +19,7 @@ from fleetloop.run import Options, run_scenario
 
 HEADER = (
     "t_s,robot,x_m,y_m,theta_rad,v_m_s,omega_rad_s,s,s_dot,v_r_hat,x_e_m,y_e_m,theta_e_rad,"
-    "tau_right_Nm,tau_left_Nm"
+    "tau_right_N_m,tau_left_N_m"
 )
 
 
@@ -40,7 +40,7 @@ def test_the_summary_holds_what_is_promised(finished_run: Path) -> None:
                 "theta_e_rad",
             }
         )
-        assert robot["peak_torque_Nm"] > 0
+        assert robot["peak_torque_N_m"] > 0
     assert set(summary["s_spread"]) == {"peak", "settle_s", "final"}
     assert summary["overruns"] == 0
     # Two encoder and two torque frames per tick from tick 0 on, heartbeats, and the arming.
@@ -96,7 +96,7 @@ def test_the_table_has_the_promised_columns_and_a_row_per_tick_and_robot(
     row = table[2 * 1500 + 1]
     assert float(row["t_s"]) == 3.0
     assert float(row["x_m"]) == record.plant["r2"]["x_m"][1500]
-    assert float(row["tau_left_Nm"]) == record.controller["r2"]["tau_left_Nm"][1500]
+    assert float(row["tau_left_N_m"]) == record.controller["r2"]["tau_left_N_m"][1500]
 
 
 def test_npz_and_csv_hold_the_same(finished_run: Path, tmp_path: Path) -> None:

@@ -224,7 +224,7 @@ def test_a_run_survives_an_interface_that_goes_down_and_up_and_arms_again(
     assert set(torques) == {bytes(4)}
     rows = Record.open(tmp_path / "run" / "record.mcap").controller
     assert {robot: len(of_robot) for robot, of_robot in rows.items()} == {"r1": 1400, "r2": 1400}
-    assert np.abs(rows["r1"]["tau_right_Nm"][-100:]).min() > 0.0  # it drives again
+    assert np.abs(rows["r1"]["tau_right_N_m"][-100:]).min() > 0.0  # it drives again
 
 
 def heard(bus: can.BusABC, torques: int, within_s: float) -> list[tuple[float, int, bytes]]:

@@ -215,13 +215,13 @@ class OdriveClient:
 
     # --- torque ----------------------------------------------------------------------------------
 
-    def torque(self, right_Nm: float, left_Nm: float) -> tuple[Frame, Frame]:
+    def torque(self, right_N_m: float, left_N_m: float) -> tuple[Frame, Frame]:
         """Set-points for both wheels [N·m]; beyond float32 they saturate."""
         to_right, to_left = self._to_shaft
         try:
-            both = _PACK_TWO(right_Nm * to_right, left_Nm * to_left)
+            both = _PACK_TWO(right_N_m * to_right, left_N_m * to_left)
         except OverflowError:
-            both = _PACK_TWO(_saturated(right_Nm * to_right), _saturated(left_Nm * to_left))
+            both = _PACK_TWO(_saturated(right_N_m * to_right), _saturated(left_N_m * to_left))
         right, left = _UNPACK_TWO(both)
         of_right, of_left = self._to_wheel
         self.sent = (right * of_right, left * of_left)

@@ -49,7 +49,7 @@ def test_states_and_errors_have_names() -> None:
 
 def test_a_setpoint_has_its_unit() -> None:
     assert words(Frame(0x00E, bytes.fromhex("0000803E"))) == (
-        "node  0  Set_Input_Torque  Input_Torque=0.25 Nm"
+        "node  0  Set_Input_Torque  Input_Torque=0.25 N·m"
     )
 
 
