@@ -236,13 +236,37 @@ def export(
     target: Annotated[
         Path, typer.Argument(metavar="FILE.csv|FILE.npz", help="What to write; the ending decides.")
     ],
+    signals: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME,NAME",
+            help="Only these signals, in this order, after t_s and robot; 'all' for every recorded"
+            " one. Else truth, path variable, errors, torques.",
+        ),
+    ] = "",
+    robots: Annotated[str, typer.Option(metavar="R1,R2", help="Only these robots; else all.")] = "",
+    from_s: Annotated[
+        float | None,
+        typer.Option("--from", metavar="SECONDS", help="From this scenario time on [s]."),
+    ] = None,
+    to_s: Annotated[
+        float | None,
+        typer.Option("--to", metavar="SECONDS", help="Up to and with this scenario time [s]."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite FILE if it exists.")] = False,
 ) -> None:
-    """Write one row per tick and robot: truth, path variable, errors, torques."""
+    """Write one row per tick and robot, each robot up to its own end."""
+    from fleetloop.export import Selection
     from fleetloop.export import export as export_run
     from fleetloop.terminal import say
 
-    export_run(run, target)
-    say(f"wrote {target}")
+    chosen = Selection(
+        signals=tuple(filter(None, signals.split(","))),
+        robots=tuple(filter(None, robots.split(","))),
+        from_s=from_s,
+        to_s=to_s,
+    )
+    say(f"wrote {target}: {export_run(run, target, chosen, force=force)} rows")
 
 
 @app.command()

@@ -47,7 +47,10 @@ class Captioned:
 
 
 def all_figures(record: Record, scenario: Scenario) -> list[Captioned]:
-    """Every figure of a run; the record holds at least one tick of every robot."""
+    """Every figure of a run; the record holds at least one tick of a controller.
+
+    Each robot is drawn up to its own end; an edge's difference while both its ends are there.
+    """
     with mpl.rc_context(_STYLE):
         chosen = [*_FIGURES, _CLOCK] if scenario.clock.mode == "realtime" else _FIGURES
         return [Captioned(name, caption, draw(record, scenario)) for name, caption, draw in chosen]
@@ -98,6 +101,8 @@ def positions(record: Record, _: Scenario) -> Figure:
     figure, axes = _axes(height_in=4.6)
     for n, robot in enumerate(record.robots):
         truth, used = record.plant[robot], record.controller[robot]
+        if not len(truth):
+            continue
         colour, dash = _style(n)
         pick = _stride(len(used))
         axes.plot(used["x_d_m"][pick], used["y_d_m"][pick], color="0.75", linewidth=2.6, zorder=1)
@@ -142,11 +147,10 @@ def error_of(signal: str, symbol: str, unit: str) -> Callable[[Record, Scenario]
 def parameter_errors(record: Record, scenario: Scenario) -> Figure:
     """s_i − s_j for every edge j → i."""
     s = {robot: rows["s"] for robot, rows in record.controller.items()}
-    length = min(len(values) for values in s.values())
-    series = {
-        f"{hearer} − {speaker}": s[hearer][:length] - s[speaker][:length]
-        for speaker, hearer in scenario.topology.edges
-    }
+    series = {}
+    for speaker, hearer in scenario.topology.edges:
+        both = min(len(s[hearer]), len(s[speaker]))
+        series[f"{hearer} − {speaker}"] = s[hearer][:both] - s[speaker][:both]
     return _over_time(record, series, "Path parameter errors", "s$_i$ − s$_j$ [m]", zoom=True)
 
 
@@ -161,7 +165,7 @@ def speed_estimates(record: Record, scenario: Scenario) -> Figure:
     series = {robot: rows["v_r_hat"] for robot, rows in record.controller.items()}
     figure = _over_time(record, series, "Estimates of the reference speed", "v̂$_r$ [m/s]")
     axes = figure.axes[0]
-    end = max(rows["t_s"][-1] for rows in record.controller.values())
+    end = max(rows["t_s"][-1] for rows in record.controller.values() if len(rows))
     steps = [(0.0, scenario.leader.speed_m_s)]
     steps += [(step.t_s, step.speed_m_s) for step in scenario.leader.steps if step.t_s <= end]
     times, speeds = zip(*steps, (end, steps[-1][1]), strict=True)
@@ -182,7 +186,8 @@ def torques(record: Record, _: Scenario) -> Figure:
             colour, dash = _style(n)
             t, values = _envelope(rows["t_s"], rows[f"tau_{side}_N_m"])
             axes.plot(t, values, color=colour, linestyle=dash, linewidth=1.0, label=robot)
-        peak = max(float(np.abs(r[f"tau_{side}_N_m"]).max()) for r in record.controller.values())
+        commanded = (np.abs(rows[f"tau_{side}_N_m"]) for rows in record.controller.values())
+        peak = max(float(values.max(initial=0.0)) for values in commanded)
         if peak > 1.0:
             axes.set_yscale("symlog", linthresh=1.0, linscale=2.0)
         axes.set(ylabel=f"τ {side} [N·m]")
@@ -200,12 +205,14 @@ def clock_figures(record: Record, _: Scenario) -> Figure:
     for axes, (signal, title) in zip(panels, names, strict=True):
         values = np.concatenate([rows[signal] for rows in record.controller.values()])
         values = np.clip(values[np.isfinite(values)] * 1e6, 1.0, None)
-        axes.hist(values, bins=np.geomspace(1.0, max(values.max(), 10.0), 60), color=_COLOURS[0])
-        for share, dash in ((50, "-"), (99, "--"), (99.9, ":")):
+        bins = np.geomspace(1.0, values.max(initial=10.0), 60)
+        axes.hist(values, bins=bins, color=_COLOURS[0])
+        for share, dash in ((50, "-"), (99, "--"), (99.9, ":")) if len(values) else ():
             at = float(np.percentile(values, share))
             axes.axvline(at, color=_COLOURS[1], linestyle=dash, label=f"p{share:g} {at:.0f} µs")
         axes.set(xscale="log", yscale="log", title=title, xlabel="µs", ylabel="ticks")
-        axes.legend(fontsize=7)
+        if len(values):
+            axes.legend(fontsize=7)
     return figure
 
 
@@ -249,8 +256,8 @@ def _settled(series: Sequence[np.ndarray]) -> int | None:
         outside = np.flatnonzero(~(np.abs(values) <= 0.05))
         if len(outside):
             last = max(last, int(outside[-1]) + 1)
-    shortest = min((len(values) for values in series), default=0)
-    return last if last < shortest - 2 else None
+    longest = max((len(values) for values in series), default=0)
+    return last if last < longest - 2 else None
 
 
 def _envelope(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -264,10 +264,12 @@ def _write(
     first: int,
     count: int,
     rows: bytes,
-    _: bool,
+    final: bool,
 ) -> None:
     if count:
         writer.add(robot, source, first, rows)
+    if final:
+        writer.end(robot, source)
 
 
 def _write_traffic(

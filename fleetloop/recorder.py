@@ -43,12 +43,17 @@ class _Recorder:
         self.unheard.discard(arrival.tag)
         if rows.length and kind == "can":
             self._record.traffic(robot, rows.rows)
-        elif rows.length:
-            source: Source = "plant" if kind == "plant" else "controller"
+        elif kind != "can":
+            self._take_rows(robot, "plant" if kind == "plant" else "controller", rows)
+        if rows.final:
+            self.unfinished.discard(arrival.tag)
+
+    def _take_rows(self, robot: str, source: Source, rows: Rows) -> None:
+        if rows.length:
             self._record.add(robot, source, rows.first_tick, rows.rows)
             self.ticks = max(self.ticks, rows.first_tick + rows.length)
         if rows.final:
-            self.unfinished.discard(arrival.tag)
+            self._record.end(robot, source)
 
 
 def run(brief: RecorderBrief, stop: Stop) -> str:

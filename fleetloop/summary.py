@@ -66,13 +66,13 @@ def check_expectations(expectations: Sequence[Expect]) -> None:
 
 
 def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
-    """The summary of a run, complete or not."""
-    ticks = min((len(rows) for rows in record.controller.values()), default=0)
-    controllers = {robot: rows[:ticks] for robot, rows in record.controller.items()}
-    expectations = [_expectation(expect, record, ticks) for expect in scenario.expect]
+    """The summary of a run, complete or not; of every robot all its own rows."""
+    controllers = {robot: rows for robot, rows in record.controller.items() if len(rows)}
+    ticks = max((len(rows) for rows in controllers.values()), default=0)
+    expectations = [_expectation(expect, record) for expect in scenario.expect]
     held = all(item["held"] is not False for item in expectations) and not stats.stopped_robots
     verdict = stats.ended if stats.ended != "completed" else "held" if held else "failed"
-    robots = {robot: _robot(rows) for robot, rows in controllers.items()} if ticks else {}
+    robots = {robot: _robot(rows) for robot, rows in controllers.items()}
     simulated_s = ticks * scenario.clock.control_period_s
     return {
         "verdict": verdict,
@@ -87,7 +87,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         "teardown_s": round(stats.teardown_s, 3),
         "robots": robots,
         "worst": _worst(list(robots.values())),
-        "s_spread": _spread_of(controllers) if ticks else None,
+        "s_spread": _spread_of(record.controller),
         "expectations": expectations,
         "stopped_robots": stats.stopped_robots,
         "notices": stats.notices,
@@ -118,8 +118,9 @@ def settle_s(t: np.ndarray, values: np.ndarray, band: float = SETTLE_BAND) -> fl
 
 
 def spread(controllers: dict[str, np.ndarray]) -> np.ndarray:
-    """max_i s_i − min_i s_i at every tick."""
-    s = np.stack([rows["s"] for rows in controllers.values()])
+    """max_i s_i − min_i s_i at every tick at which all of them have a row."""
+    ticks = min(len(rows) for rows in controllers.values())
+    s = np.stack([rows["s"][:ticks] for rows in controllers.values()])
     difference: np.ndarray = s.max(axis=0) - s.min(axis=0)
     return difference
 
@@ -132,6 +133,7 @@ def _robot(rows: np.ndarray) -> dict[str, Any]:
     t, last = rows["t_s"], _final(rows["t_s"])
     torque = max(_peak(rows["tau_right_N_m"]), _peak(rows["tau_left_N_m"]))
     return {
+        "ticks": len(rows),
         "settle_s": {name: settle_s(t, rows[name]) for name in ERRORS},
         "final_max": {name: _peak(rows[name][last]) for name in ERRORS},
         "peak_torque_N_m": torque,
@@ -154,9 +156,11 @@ def _worst(robots: list[dict[str, Any]]) -> dict[str, Any] | None:
     }
 
 
-def _spread_of(controllers: dict[str, np.ndarray]) -> dict[str, float | None]:
-    t = next(iter(controllers.values()))["t_s"]
+def _spread_of(controllers: dict[str, np.ndarray]) -> dict[str, float | None] | None:
     values = spread(controllers)
+    if not len(values):
+        return None
+    t = next(iter(controllers.values()))["t_s"][: len(values)]
     return {
         "peak": float(values.max()),
         "settle_s": settle_s(t, values),
@@ -166,20 +170,21 @@ def _spread_of(controllers: dict[str, np.ndarray]) -> dict[str, float | None]:
 
 def _realtime(controllers: dict[str, np.ndarray], stats: RunStats) -> dict[str, Any]:
     """How well the wall clock was kept: counts, and percentiles over all ticks."""
-    ticks = len(next(iter(controllers.values())))
     robots = {
         robot: {
             **counts,
-            "miss_percent": round(100.0 * counts["misses"] / ticks, 4),
+            "miss_percent": round(100.0 * counts["misses"] / len(controllers[robot]), 4),
             "late_us": _percentiles(controllers[robot]["late_s"]),
             "round_trip_us": _percentiles(controllers[robot]["round_trip_s"]),
         }
         for robot, counts in stats.realtime.items()
+        if robot in controllers
     }
-    total = sum(counts["misses"] for counts in stats.realtime.values())
+    total = sum(stats.realtime[robot]["misses"] for robot in robots)
+    ticks = sum(len(controllers[robot]) for robot in robots)
     cpu = sum(stats.cpu_s.values()) / stats.wall_s if stats.wall_s > 0 else 0.0
     return {
-        "miss_percent": round(100.0 * total / (ticks * len(robots)), 4),
+        "miss_percent": round(100.0 * total / max(1, ticks), 4),
         "late_us": _percentiles(np.concatenate([r["late_s"] for r in controllers.values()])),
         "round_trip_us": _percentiles(
             np.concatenate([r["round_trip_s"] for r in controllers.values()])
@@ -214,19 +219,18 @@ def _percentiles(seconds: np.ndarray) -> dict[str, float]:
     }
 
 
-def _expectation(expect: Expect, record: Record, ticks: int) -> dict[str, Any]:
+def _expectation(expect: Expect, record: Record) -> dict[str, Any]:
     robots = expect.robots or record.robots
     signals = {signal.name for signal in PLANT_SIGNALS}
     source = record.plant if expect.signal in signals - {"t_s"} else record.controller
     if expect.signal == SPREAD:
-        rows = {robot: record.controller[robot][:ticks] for robot in robots}
-        series = [(rows[robots[0]]["t_s"], spread(rows))] if ticks else []
+        values = spread({robot: record.controller[robot] for robot in robots})
+        series = [(record.controller[robots[0]]["t_s"][: len(values)], values)]
     else:
-        series = [(source[r]["t_s"][:ticks], source[r][expect.signal][:ticks]) for r in robots]
+        series = [(source[r]["t_s"], source[r][expect.signal]) for r in robots]
     end = expect.to_s if expect.to_s is not None else np.inf
-    values = np.concatenate(
-        [np.empty(0), *(v[(t >= expect.from_s) & (t <= end)] for t, v in series)]
-    )
+    found_of = [v[(t >= expect.from_s) & (t <= end)] for t, v in series]
+    values = np.concatenate(found_of)
     result: dict[str, Any] = expect.model_dump(mode="json", exclude_none=True)
     if not len(values):
         return result | {"held": None, "found": None}  # the run ended before
@@ -235,4 +239,6 @@ def _expectation(expect: Expect, record: Record, ticks: int) -> dict[str, Any]:
     held &= expect.max_abs is None or found["max_abs"] <= expect.max_abs
     held &= expect.min is None or found["min"] >= expect.min
     held &= expect.max is None or found["max"] <= expect.max
-    return result | {"held": held, "found": found}
+    # A robot that ended before has not held it; another's violation stands.
+    reached = all(len(part) > 0 for part in found_of)
+    return result | {"held": held if reached or not held else None, "found": found}

@@ -32,6 +32,11 @@ class BackgroundWriter:
         self._raise()
         self._blocks.put(partial(self._record.add, robot, source, first_tick, rows))
 
+    def end(self, robot: str, source: Source) -> None:
+        """As `RunRecord.end`; what failed earlier is raised here."""
+        self._raise()
+        self._blocks.put(partial(self._record.end, robot, source))
+
     def traffic(self, bus: str, frames: bytes) -> None:
         """As `RunRecord.traffic`; what failed earlier is raised here."""
         self._raise()

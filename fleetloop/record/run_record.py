@@ -52,6 +52,10 @@ class RunRecord:
         """Add rows of consecutive ticks, as `RecordWriter.add`."""
         self._rows.add(robot, source, first_tick, rows)
 
+    def end(self, robot: str, source: Source) -> None:
+        """Take note that no row of this source follows, as `RecordWriter.end`."""
+        self._rows.end(robot, source)
+
     def traffic(self, bus: str, frames: bytes) -> None:
         """Add frames that crossed a bus, in the records of `bridge.telemetry.FRAME_ROW`."""
         self._logs[bus].write(frames)

@@ -1,8 +1,9 @@
 """Rows in, record out: the same file whatever the order in which blocks arrive.
 
 Blocks of one source (a robot's plant or controller rows) come in order; those of different sources
-as they like. A group of `CHUNK_TICKS` ticks is written once every source has delivered it, in the
-order of the robots; the rest at the end. So the file depends on the run alone.
+as they like. A group of `CHUNK_TICKS` ticks is written once every source has delivered it or said
+that nothing follows, in the order of the robots; the rest at the end. So the file depends on the
+run alone, and a source that ends early holds nobody's rows back.
 """
 
 from collections.abc import Sequence
@@ -26,9 +27,10 @@ _WIDTHS = {Kind.PLANT: len(PLANT_SIGNALS), Kind.CONTROLLER: len(AGENT_SIGNALS)}
 class _Rows:
     """Rows of one source that aren't written yet."""
 
-    __slots__ = ("blocks", "count", "first_tick")
+    __slots__ = ("blocks", "count", "ended", "first_tick")
 
     def __init__(self) -> None:
+        self.ended = False
         self.first_tick = 0
         self.count = 0
         self.blocks: list[np.ndarray] = []
@@ -70,6 +72,10 @@ class RecordWriter:
         """
         kind = _KINDS[source]
         held = self._sources[self._numbers[robot], kind]
+        if held.ended:
+            raise InfrastructureError(
+                f"{self._path}: rows of {source} {robot} at tick {first_tick}, after its last"
+            )
         expected = held.first_tick + held.count
         if first_tick != expected:
             raise InfrastructureError(
@@ -78,8 +84,19 @@ class RecordWriter:
             )
         held.add(np.frombuffer(rows, "<f8").reshape(-1, _WIDTHS[kind]))
         if held.count >= CHUNK_TICKS:
-            while min(rows.count for rows in self._sources.values()) >= CHUNK_TICKS:
-                self._write_group(CHUNK_TICKS)
+            self._write_groups()
+
+    def end(self, robot: str, source: Source) -> None:
+        """Take note that no row of this source follows. Idempotent."""
+        self._sources[self._numbers[robot], _KINDS[source]].ended = True
+        self._write_groups()
+
+    def _write_groups(self) -> None:
+        """Write the groups that every source has delivered."""
+        while all(rows.ended or rows.count >= CHUNK_TICKS for rows in self._sources.values()):
+            if not any(rows.count for rows in self._sources.values()):
+                return
+            self._write_group(CHUNK_TICKS)
 
     def close(self) -> None:
         """Write what is left and complete the file."""

@@ -1,9 +1,12 @@
-"""A finished run that tests of the operator's tools look at."""
+"""Finished runs that tests of the operator's tools look at."""
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from fleetloop.record.reader import Record
+from fleetloop.record.writer import RecordWriter
 from fleetloop.run import Options, run_scenario
 
 
@@ -12,3 +15,24 @@ def finished_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("runs") / "done"
     assert run_scenario("two_robots", Options(in_process=True, out=folder, as_json=True)) == 0
     return folder
+
+
+@pytest.fixture(scope="package")
+def uneven_run(finished_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same run without its summary, but r2's controller ended after 1200 of the 2000 ticks."""
+    folder = tmp_path_factory.mktemp("runs") / "uneven"
+    folder.mkdir()
+    whole = Record.open(finished_run / "record.mcap")
+    with RecordWriter(
+        folder / "record.mcap", whole.robots, whole.scenario_toml, 2_000_000
+    ) as writer:
+        for robot in whole.robots:
+            writer.add(robot, "plant", 0, signals_of(whole.plant[robot]))
+        writer.add("r1", "controller", 0, signals_of(whole.controller["r1"]))
+        writer.add("r2", "controller", 0, signals_of(whole.controller["r2"][:1200]))
+    return folder
+
+
+def signals_of(rows: np.ndarray) -> bytes:
+    """Rows of a record as `bridge.telemetry` packs them: without the tick."""
+    return np.stack([rows[name] for name in rows.dtype.names[1:]], axis=1).tobytes()

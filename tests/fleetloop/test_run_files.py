@@ -1,6 +1,5 @@
-"""What a run leaves: summary, report, figures, export, and comparison of two runs."""
+"""What a run leaves: summary, report, figures, and comparison of two runs."""
 
-import csv
 import json
 import shutil
 from pathlib import Path
@@ -9,18 +8,11 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from configs.errors import ScenarioError
 from configs.loading import load
 from fleetloop.diff import compare, print_comparison
-from fleetloop.export import COLUMNS, export
 from fleetloop.record.reader import Record
 from fleetloop.report import write_report
 from fleetloop.run import Options, run_scenario
-
-HEADER = (
-    "t_s,robot,x_m,y_m,theta_rad,v_m_s,omega_rad_s,s,s_dot,v_r_hat,x_e_m,y_e_m,theta_e_rad,"
-    "tau_right_N_m,tau_left_N_m"
-)
 
 
 def test_the_summary_holds_what_is_promised(finished_run: Path) -> None:
@@ -80,41 +72,6 @@ def test_the_page_can_be_made_again_without_a_summary(finished_run: Path, tmp_pa
     shutil.copy(finished_run / "record.mcap", tmp_path)
     page = write_report(tmp_path).read_text()
     assert "the run left no summary.json" in page
-
-
-def test_the_table_has_the_promised_columns_and_a_row_per_tick_and_robot(
-    finished_run: Path, tmp_path: Path
-) -> None:
-    export(finished_run, tmp_path / "a.csv")
-    with (tmp_path / "a.csv").open() as stream:
-        assert stream.readline().strip() == HEADER
-        stream.seek(0)
-        table = list(csv.DictReader(stream))
-    assert len(table) == 4000
-    assert [row["robot"] for row in table[:3]] == ["r1", "r2", "r1"]
-    record = Record.open(finished_run / "record.mcap")
-    row = table[2 * 1500 + 1]
-    assert float(row["t_s"]) == 3.0
-    assert float(row["x_m"]) == record.plant["r2"]["x_m"][1500]
-    assert float(row["tau_left_N_m"]) == record.controller["r2"]["tau_left_N_m"][1500]
-
-
-def test_npz_and_csv_hold_the_same(finished_run: Path, tmp_path: Path) -> None:
-    export(finished_run, tmp_path / "a.csv")
-    export(finished_run, tmp_path / "a.npz")
-    arrays = np.load(tmp_path / "a.npz")
-    assert tuple(arrays) == COLUMNS
-    with (tmp_path / "a.csv").open() as stream:
-        table = list(csv.DictReader(stream))
-    for name in COLUMNS:
-        column = [row[name] for row in table]
-        expected = column if name == "robot" else list(map(float, column))
-        assert arrays[name].tolist() == expected
-
-
-def test_another_ending_is_refused(finished_run: Path, tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"must be \.csv or \.npz"):
-        export(finished_run, tmp_path / "a.xlsx")
 
 
 def test_a_run_is_identical_to_itself(finished_run: Path, capsys) -> None:

@@ -1,11 +1,16 @@
 """Numbers of a run."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from configs.errors import ScenarioError
+from configs.loading import load
 from configs.sections import Expect
-from fleetloop.summary import check_expectations, settle_s
+from fleetloop.figures import all_figures
+from fleetloop.record.reader import Record
+from fleetloop.summary import RunStats, Summary, check_expectations, settle_s, summarise
 
 T = np.arange(0.0, 10.0, 0.1)
 
@@ -30,3 +35,57 @@ def test_never_outside_is_zero_and_outside_at_the_end_is_never() -> None:
 def test_an_expectation_of_a_signal_that_is_not_recorded_lists_those_that_are() -> None:
     with pytest.raises(ScenarioError, match=r"expect\.0\.signal = 'x_error'.*s_spread.*x_e_m"):
         check_expectations([Expect(signal="x_error", max_abs=1.0)])
+
+
+def uneven(run: Path, *expect: Expect) -> Summary:
+    scenario = load("two_robots").model_copy(update={"expect": expect})
+    return summarise(Record.open(run / "record.mcap"), scenario, RunStats("lockstep"))
+
+
+def test_every_robot_is_judged_by_all_its_own_rows(uneven_run: Path, finished_run: Path) -> None:
+    summary = uneven(uneven_run)
+    assert summary["ticks"] == 2000
+    assert {robot: values["ticks"] for robot, values in summary["robots"].items()} == {
+        "r1": 2000,
+        "r2": 1200,
+    }
+    assert summary["robots"]["r1"] == uneven(finished_run)["robots"]["r1"]
+    assert summary["robots"]["r2"] != uneven(finished_run)["robots"]["r2"]
+
+
+def test_an_expectation_needs_rows_of_every_robot_that_it_is_about(uneven_run: Path) -> None:
+    late = {"signal": "x_e_m", "from_s": 3.0}
+    fine, broken = {"max_abs": 1e3}, {"max_abs": 1e-12}
+    held = [
+        item["held"]
+        for item in uneven(
+            uneven_run,
+            Expect(**late, **fine),
+            Expect(**late, **broken),
+            Expect(**late, **fine, robots=("r1",)),
+            Expect(**late, **fine, robots=("r2",)),
+            Expect(signal="x_e_m", from_s=2.0, **fine),
+            Expect(signal="x_m", from_s=3.0, **fine),
+            Expect(signal="s_spread", from_s=3.0, **fine),
+        )["expectations"]
+    ]
+    assert held == [None, False, True, None, True, True, None]
+
+
+def test_figures_show_every_robot_up_to_its_own_end(uneven_run: Path) -> None:
+    record = Record.open(uneven_run / "record.mcap")
+    figures = {item.name: item.figure for item in all_figures(record, load("two_robots"))}
+    lines = {line.get_label(): line for line in figures["path_variables"].axes[0].lines}
+    assert lines["r1"].get_xdata()[-1] == record.controller["r1"]["t_s"][-1]
+    assert lines["r2"].get_xdata()[-1] == record.controller["r2"]["t_s"][-1]
+    (edge,) = figures["fig8_parameter_errors"].axes[0].lines[:1]
+    assert edge.get_xdata()[-1] == record.controller["r2"]["t_s"][-1]
+
+
+def test_figures_bear_a_robot_without_any_row(uneven_run: Path) -> None:
+    record = Record.open(uneven_run / "record.mcap")
+    record.plant["r2"], record.controller["r2"] = (
+        record.plant["r2"][:0],
+        record.controller["r2"][:0],
+    )
+    assert len(all_figures(record, load("two_robots"))) == 9

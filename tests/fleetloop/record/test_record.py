@@ -61,6 +61,35 @@ def test_the_file_does_not_depend_on_the_order_of_arrival(tmp_path: Path) -> Non
     assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
 
 
+def test_a_source_that_ends_early_holds_nobody_back(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with RecordWriter(path, ROBOTS, "", PERIOD_NS) as writer:
+        writer.add("r2", "controller", 0, rows("r2", "controller", 0, 100).tobytes())
+        writer.end("r2", "controller")
+        sizes = []
+        for first in range(0, 4 * CHUNK_TICKS, CHUNK_TICKS):
+            for robot, source in (("r1", "plant"), ("r2", "plant"), ("r1", "controller")):
+                writer.add(robot, source, first, rows(robot, source, first, CHUNK_TICKS).tobytes())
+            sizes.append(path.stat().st_size)
+        with pytest.raises(InfrastructureError, match="rows of controller r2 at tick 100, after"):
+            writer.add("r2", "controller", 100, rows("r2", "controller", 100, 1).tobytes())
+    assert np.all(np.diff(sizes) > 10_000)
+    record = Record.open(path)
+    assert len(record.controller["r2"]) == 100
+    assert all(len(r) == 2048 for r in (*record.plant.values(), record.controller["r1"]))
+
+
+def test_when_a_source_says_that_it_ended_does_not_show_in_the_file(tmp_path: Path) -> None:
+    for name, early in (("a.mcap", True), ("b.mcap", False)):
+        with RecordWriter(tmp_path / name, ROBOTS, "", PERIOD_NS) as writer:
+            writer.add("r1", "plant", 0, rows("r1", "plant", 0, 700).tobytes())
+            if early:
+                writer.end("r1", "plant")
+            for robot, source in (("r2", "plant"), ("r1", "controller"), ("r2", "controller")):
+                writer.add(robot, source, 0, rows(robot, source, 0, 1500).tobytes())
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
+
+
 def test_the_stock_reader_and_a_ros_2_decoder_open_it(tmp_path: Path) -> None:
     write(tmp_path / "a.mcap", 700)
     with (tmp_path / "a.mcap").open("rb") as stream:
