@@ -4,20 +4,65 @@ import copy
 import difflib
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 
 from configs.cross_checks import Problem
+from configs.errors import Complaint, ScenarioError
+from configs.patterns import WORDS
 from configs.scenario import Scenario
 
 MISSING = "(missing)"
 _NOTHING = object()
+_KEY = "[key]"  # pydantic's mark for what is wrong with a key rather than its value
+
+_WORDS = {
+    "missing": "must be given",
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be {ge:g} or more",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be {le:g} or less",
+    "finite_number": "must be a finite number",
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "int_parsing_size": "is too large",
+    "bool_type": "must be true or false",
+    "string_type": "must be a text",
+    "path_type": "must be a text, the path of a file",
+    "string_too_short": "must not be empty",
+    "string_too_long": "must have {max_length} characters or fewer",
+    "literal_error": "must be {expected}",
+    "tuple_type": "must be a list",
+    "too_short": "must have {min_length} entries or more",
+    "too_long": "must have {max_length} entries or fewer",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+}
+_ROUNDS = 8
+_STAND_INS: dict[object, object] = {
+    "schema": 1,
+    "name": "unnamed",
+    "pose": {"x_m": 0.0, "y_m": 0.0},
+    "x_m": 0.0,
+    "y_m": 0.0,
+    "signal": "s",
+}
+"""For required keys that are missing or wrong, so that the rest can be checked as well."""
 
 
-def line(name: str, problem: Problem) -> str:
+def shown(complaint: Complaint) -> str:
     """One line for people."""
-    return f"{name}: {problem.key} = {_shown(problem.value)}: {problem.right}"
+    where, key, value, right = complaint
+    return f"{where}: {key} = {_shown(value)}: {right}" if key else f"{where}: {right}"
+
+
+def refusal(complaints: Sequence[Complaint]) -> ScenarioError:
+    """All that is wrong as one error, a line each."""
+    lines = dict.fromkeys(shown(complaint) for complaint in complaints)
+    return ScenarioError("\n".join(lines), complaints)
 
 
 def complaints(
@@ -27,25 +72,61 @@ def complaints(
     return [_problem(dict(item), data, model) for item in error.errors(include_url=False)]
 
 
-def salvage(error: ValidationError, data: dict[str, Any]) -> Scenario | None:
-    """The scenario without what is wrong in it, so that the rest can be checked as well."""
+class Salvage(NamedTuple):
+    """What can be made of a scenario with errors, so that the rest can be checked as well."""
+
+    scenario: Scenario
+    lost: tuple[str, ...]  # keys that were dropped: what a check says of them isn't to be believed
+
+    def believes(self, problem: Problem) -> bool:
+        """Whether a problem is the file's, not one of what was put in for lost keys."""
+        text = f"{problem.key} {problem.right}"
+        return not any(key in text for key in self.lost)
+
+
+def salvage(error: ValidationError, data: dict[str, Any]) -> Salvage | None:
+    """The scenario without what is wrong in it; None if too much is."""
     rest = copy.deepcopy(data)
-    for item in error.errors(include_url=False):
-        _remove(rest, item["loc"])
-    try:
-        return Scenario.model_validate(rest)
-    except ValidationError:
-        return None
+    lost: set[str] = set()
+    found: ValidationError | None = error
+    for _ in range(_ROUNDS):
+        if found is None:
+            break
+        for item in found.errors(include_url=False):
+            lost |= _repair(rest, item)
+        try:
+            return Salvage(Scenario.model_validate(rest), tuple(lost))
+        except ValidationError as more:
+            found = more
+    return None
 
 
-def _remove(data: Any, loc: Sequence[int | str]) -> None:
-    holder = data
+def _repair(data: dict[str, Any], item: Mapping[str, Any]) -> set[str]:
+    """Drop or replace what one error is about; return the keys whose meaning is lost."""
+    loc = item["loc"]
+    holders: list[Any] = [data]
+    keys: list[int | str] = []
     for part in loc[:-1]:
-        inner = _get(holder, part)
-        # A discriminated union puts its tag into the location; it is no key of the file.
-        holder = holder if inner is _NOTHING else inner
-    if isinstance(holder, dict) and loc:
-        holder.pop(loc[-1], None)
+        inner = _get(holders[-1], part)
+        if inner is not _NOTHING:  # else the tag of a union, which is no key of the file
+            holders.append(inner)
+            keys.append(part)
+    last, holder = loc[-1], holders[-1]
+    if item["type"] == "missing" and last in _STAND_INS and isinstance(holder, dict):
+        number = keys[-1] if keys and isinstance(keys[-1], int) else ""
+        stand_in = _STAND_INS[last]
+        holder[last] = f"{stand_in}{number}" if last == "name" else copy.deepcopy(stand_in)
+        return {str(_STAND_INS["name"])} if last == "name" else set()
+    if last != _KEY and isinstance(holder, dict) and last in holder:
+        del holder[last]
+        return {".".join(str(part) for part in [*keys, last])}
+    if keys and isinstance(holders[-2], dict):
+        del holders[-2][keys[-1]]
+        return {".".join(map(str, keys))}
+    if len(keys) > 1 and isinstance(keys[-1], int) and isinstance(holders[-3], dict):
+        del holders[-3][keys[-2]]
+        return {".".join(map(str, keys[:-1]))}
+    return set()
 
 
 def _get(holder: object, part: int | str) -> Any:
@@ -63,11 +144,11 @@ def _problem(item: dict[str, Any], data: dict[str, Any], model: type[BaseModel])
     for n, part in enumerate(loc):
         inner = _get(holder, part)
         last = n == len(loc) - 1
-        if inner is _NOTHING and not last:
+        if inner is _NOTHING and not (last and isinstance(holder, dict | list)):
             continue  # the tag of a union
         if isinstance(part, int) and isinstance(inner, dict) and "name" in inner:
             names.append(str(inner["name"]))
-        elif part != "schema_":
+        elif part not in ("schema_", _KEY):
             names.append(str(part))
         holder = inner
     if item["type"] == "extra_forbidden":
@@ -125,11 +206,12 @@ def _known_keys(loc: Sequence[int | str], model: type[BaseModel]) -> list[str]:
 
 
 def _right(item: Mapping[str, Any]) -> str:
-    if item["type"] == "missing":
-        return "must be given"
-    text = str(item["msg"]).removeprefix("Value error, ")
-    text = text.removeprefix("Input ").removeprefix("String ")
-    return text.replace("should", "must", 1)
+    kind, about = item["type"], item.get("ctx", {})
+    if kind == "value_error":
+        return str(about["error"])
+    if kind == "string_pattern_mismatch":
+        return WORDS.get(about["pattern"], f"must match {about['pattern']}")
+    return _WORDS.get(kind, "is of the wrong kind").format(**about)
 
 
 def _shown(value: object) -> str:

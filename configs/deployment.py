@@ -15,16 +15,17 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from configs import patterns
 from configs.brief import OURS, Settings, TlsFiles
-from configs.complaints import MISSING, complaints, line
+from configs.complaints import MISSING, complaints, refusal
 from configs.cross_checks import Problem
-from configs.errors import ScenarioError
+from configs.errors import Complaint, ScenarioError
 from configs.scenario import Scenario
 from configs.sections import Name, Section
 from configs.users import read_users
 
 PLANT, RECORDER = "plant", "recorder"
-Endpoint = Annotated[str, Field(pattern=r"^(tcp|tls)/.+:\d+$")]
+Endpoint = Annotated[str, Field(pattern=patterns.ENDPOINT)]
 
 
 def agent_role(robot: str) -> str:
@@ -72,7 +73,7 @@ class NetworkSection(Section):
     listen: Endpoint | None = Field(
         None, description="where the router listens, for example on all addresses; else endpoint"
     )
-    run: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$")] | None = Field(
+    run: Annotated[str, Field(pattern=patterns.RUN)] | None = Field(
         None, description="the run's name in every key; the scenario's if not given"
     )
     users: Path | None = Field(
@@ -161,10 +162,10 @@ def check_deployment(
     try:
         deployment = Deployment.model_validate(data)
     except ValidationError as error:
-        problems = complaints(error, data, Deployment)
-        raise ScenarioError("\n".join(dict.fromkeys(line(name, p) for p in problems))) from error
+        found = complaints(error, data, Deployment)
+        raise refusal([Complaint(name, *problem) for problem in found]) from error
     if found := _problems(deployment, scenario):
-        raise ScenarioError("\n".join(line(name, problem) for problem in found))
+        raise refusal([Complaint(name, *problem) for problem in found])
     return _beside(deployment, folder)
 
 

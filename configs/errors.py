@@ -5,6 +5,18 @@ Exit statuses of every command: 0 held, 1 an expectation failed (or a difference
 traceback.
 """
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
+
+class Complaint(NamedTuple):
+    """One thing wrong with a file or an option."""
+
+    where: str  # the file, or the option as it was given
+    key: str  # as in the file, robots by name; "" if it is about all of it
+    value: object
+    right: str  # what would be right
+
 
 class FleetloopError(Exception):
     """An error that a user can cause or mend; its text is the whole message."""
@@ -16,6 +28,11 @@ class ScenarioError(FleetloopError):
     """A file or an option says something that can't be run; nothing was started."""
 
     exit_code = 2
+
+    def __init__(self, text: str, complaints: Sequence[Complaint] = ()) -> None:
+        super().__init__(text)
+        self.complaints = tuple(complaints)
+        """The same for machines; empty if it is one sentence."""
 
 
 class InfrastructureError(FleetloopError):

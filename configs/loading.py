@@ -14,9 +14,10 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
-from configs.complaints import complaints, line, salvage
+from configs.complaints import complaints, refusal, salvage
 from configs.cross_checks import Problem, cross_problems
-from configs.errors import ScenarioError
+from configs.errors import Complaint, ScenarioError
+from configs.overrides import Override
 from configs.scenario import Scenario
 
 _NOT_SCENARIOS = {"starter"}
@@ -29,8 +30,8 @@ def shipped() -> tuple[str, ...]:
     return tuple(sorted({name.removesuffix(".toml") for name in names} - _NOT_SCENARIOS))
 
 
-def load(source: str | Path, overrides: Sequence[str] = ()) -> Scenario:
-    """Load a scenario by path or shipped name, with `key=value` overrides.
+def load(source: str | Path, overrides: Sequence[str | Override] = ()) -> Scenario:
+    """Load a scenario by path or shipped name, with overrides (texts as `--set` takes them).
 
     Raises:
         ScenarioError: no such scenario, or all that is wrong with it, a line each.
@@ -38,7 +39,7 @@ def load(source: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     return loads(*_read(str(source)), overrides)
 
 
-def loads(name: str, text: str, overrides: Sequence[str] = ()) -> Scenario:
+def loads(name: str, text: str, overrides: Sequence[str | Override] = ()) -> Scenario:
     """Load a scenario from TOML text; `name` stands for the file in messages.
 
     Raises:
@@ -48,9 +49,16 @@ def loads(name: str, text: str, overrides: Sequence[str] = ()) -> Scenario:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{name}: not a TOML file: {error}") from error
+    found: list[Complaint] = []
+    applied: list[Override] = []
     for override in overrides:
-        _override(data, override)
-    return _check(name, data)
+        one = Override.from_set(override) if isinstance(override, str) else override
+        done = one if isinstance(one, Complaint) else one.apply(data)
+        if isinstance(done, Complaint):
+            found.append(done)
+        else:
+            applied.append(done)
+    return _check(name, data, applied, found)
 
 
 def to_toml(scenario: Scenario) -> str:
@@ -86,55 +94,27 @@ def _read(source: str) -> tuple[str, str]:
 # --- check ----------------------------------------------------------------------------------------
 
 
-def _check(name: str, data: dict[str, Any]) -> Scenario:
-    problems: list[Problem] = []
+def _check(
+    name: str, data: dict[str, Any], overrides: Sequence[Override], found: list[Complaint]
+) -> Scenario:
     scenario: Scenario | None = None
     try:
         scenario = Scenario.model_validate(data)
+        problems = cross_problems(scenario)
     except ValidationError as error:
-        problems += complaints(error, data)
-        scenario = salvage(error, data)
-    if scenario is not None:
-        problems += cross_problems(scenario)
-    if problems or scenario is None:
-        raise ScenarioError("\n".join(dict.fromkeys(line(name, problem) for problem in problems)))
+        problems = complaints(error, data)
+        if (rest := salvage(error, data)) is not None:
+            problems += filter(rest.believes, cross_problems(rest.scenario))
+    found += [_blamed(name, problem, overrides) for problem in problems]
+    if found or scenario is None:
+        raise refusal(found)
     return scenario
 
 
-# --- overrides ------------------------------------------------------------------------------------
-
-
-def _override(data: dict[str, Any], override: str) -> None:
-    key, equals, text = override.partition("=")
-    parts = key.strip().split(".")
-    if not equals or not all(parts):
-        raise ScenarioError(f"--set {override}: must read key=value, for example coordination.p=3")
-    try:
-        value = tomllib.loads(f"value = {text.strip()}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text.strip()
-    holder: Any = data
-    for part in parts[:-1]:
-        holder = _step_into(holder, part, override)
-    if isinstance(holder, dict):
-        holder[parts[-1]] = value
-    elif isinstance(holder, list) and parts[-1].isdigit() and int(parts[-1]) < len(holder):
-        holder[int(parts[-1])] = value
-    else:
-        raise ScenarioError(f"--set {override}: {parts[-1]} names nothing there")
-
-
-def _step_into(holder: Any, part: str, override: str) -> Any:
-    if isinstance(holder, dict):
-        return holder.setdefault(part, {})
-    if isinstance(holder, list):
-        for item in holder:
-            if isinstance(item, dict) and item.get("name") == part:
-                return item
-        if part.isdigit() and int(part) < len(holder):
-            return holder[int(part)]
-        names = [
-            str(item.get("name", n)) for n, item in enumerate(holder) if isinstance(item, dict)
-        ]
-        raise ScenarioError(f"--set {override}: no {part!r} there; known: {', '.join(names)}")
-    raise ScenarioError(f"--set {override}: {part} is no table")
+def _blamed(name: str, problem: Problem, overrides: Sequence[Override]) -> Complaint:
+    """A problem with whom it is to be blamed on: the last option that set the key, or the file."""
+    for override in reversed(overrides):
+        if override.is_about(problem.key):
+            key = "" if problem.key == override.key else problem.key
+            return Complaint(override.option, key, problem.value, problem.right)
+    return Complaint(name, *problem)

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
+from configs import patterns
+
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=32)]
+Name = Annotated[str, Field(pattern=patterns.NAME, max_length=32)]
 Node = Annotated[int, Field(ge=0, le=62)]
 Point = Annotated[tuple[Finite, Finite], Field(strict=False)]
 Eight = Annotated[
@@ -326,7 +328,7 @@ class Drive(Section):
     temperature_period_s: NotNegative = 0.0
     bus_voltage_period_s: NotNegative = 0.0
     powers_period_s: NotNegative = 0.0
-    firmware: Annotated[str, Field(pattern=r"^0\.6\.[0-9]{1,2}$")] = Field(
+    firmware: Annotated[str, Field(pattern=patterns.FIRMWARE)] = Field(
         "0.6.10", description="from 0.6.11 on, writing an endpoint is answered"
     )
     boot_s: NotNegative = Field(0.5, description="silent for so long after a reboot")
@@ -370,7 +372,7 @@ class Localisation(Section):
 class Network(Section):
     """The Zenoh router of the run."""
 
-    endpoint: Annotated[str, Field(pattern=r"^(tcp|tls|unixsock-stream)/.+")] | None = Field(
+    endpoint: Annotated[str, Field(pattern=patterns.ROUTER)] | None = Field(
         None, description="where the router listens; a free loopback port if not given"
     )
 

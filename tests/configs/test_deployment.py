@@ -72,7 +72,10 @@ def test_its_files_are_beside_it(tmp_path: Path) -> None:
         ({"roles": ["plant", "recorder", "pilot"]}, 'roles = "pilot": no such role; known: plant'),
         ({"roles": ["plant"], "network": NETWORK}, "must name recorder"),
         ({"roles": ["recorder", "plant"]}, "network = (missing): must be given: agent/r1, agent/"),
-        ({"network": {"endpoint": "10.0.0.1"}}, 'network.endpoint = "10.0.0.1": must match'),
+        (
+            {"network": {"endpoint": "10.0.0.1"}},
+            'network.endpoint = "10.0.0.1": must be tcp/HOST:PORT',
+        ),
         (
             {"robot": {"r1": {"bus": {"interface": "pcan"}}}},
             "robot.r1.bus.channel = (missing): must be given: what the interface pcan opens",

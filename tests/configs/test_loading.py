@@ -1,13 +1,20 @@
 """Scenario files: what is accepted, what is refused and in which words."""
 
+import itertools
 import json
+import re
+import tomllib
+from collections.abc import Iterable, Iterator
 from importlib import resources
+from math import nan
 from pathlib import Path
 
 import pytest
+from scenario_text import changed
 
 from configs.errors import ScenarioError
 from configs.loading import json_schema, load, loads, shipped, to_toml
+from configs.overrides import Override
 
 SMALL = """
 schema = 1
@@ -21,9 +28,9 @@ pose = { x_m = 0.0, y_m = 2.0 }
 """
 
 
-def problems(text: str, *overrides: str) -> list[str]:
+def problems(text: str, *changes: str) -> list[str]:
     with pytest.raises(ScenarioError) as caught:
-        loads("file.toml", text, overrides)
+        loads("file.toml", changed(text, *changes))
     assert caught.value.exit_code == 2
     return str(caught.value).splitlines()
 
@@ -88,7 +95,7 @@ def test_the_schema_in_the_package_is_the_schema_of_the_types() -> None:
         ("drive.iq_period_s=0.0015", "drive.iq_period_s", "whole milliseconds"),
         ("drive.under_voltage_V=40.0", "drive.under_voltage_V", "below drive.over_voltage_V = 30"),
         ("drive.derate_from_C=130.0", "drive.derate_from_C", "below drive.derate_to_C = 120"),
-        ("drive.firmware='0.5.6'", "drive.firmware", "pattern"),
+        ("drive.firmware='0.5.6'", "drive.firmware", "0.6.10"),
         ("graph={edges=['r1 > r2']}", "graph.edges", "r1 -> r2"),
         ("graph={edges=['r1 -> r9']}", "graph.edges", "known: r1, r2"),
         ("graph={edges=['r1 -> r1']}", "graph.edges", "doesn't hear itself"),
@@ -101,7 +108,7 @@ def test_the_schema_in_the_package_is_the_schema_of_the_types() -> None:
         ("expect=[{signal='s'}]", "expect.0", "max_abs, min or max"),
         ("schema=2", "schema", "1"),
         ("duration_s='long'", "duration_s", "number"),
-        ("network.endpoint='udp/x'", "network.endpoint", "pattern"),
+        ("network.endpoint='udp/x'", "network.endpoint", "tcp/HOST:PORT"),
     ],
 )
 def test_one_wrong_value_gives_one_line_with_file_key_and_what_is_right(
@@ -143,8 +150,121 @@ def test_an_override_reaches_robots_by_name_and_keeps_the_rest() -> None:
 
 @pytest.mark.parametrize("override", ["k1", "=3", "robot.r7.pose.x_m=1", "name.x=1"])
 def test_an_override_that_names_nothing_is_refused(override: str) -> None:
-    (line,) = problems(SMALL, override)
+    with pytest.raises(ScenarioError) as caught:
+        loads("file.toml", SMALL, (override,))
+    (line,) = str(caught.value).splitlines()
     assert line.startswith(f"--set {override}: ")
+
+
+def blamed(*overrides: str | Override) -> list[str]:
+    with pytest.raises(ScenarioError) as caught:
+        loads("file.toml", SMALL, overrides)
+    return str(caught.value).splitlines()
+
+
+def test_what_an_option_set_is_blamed_on_the_option_whoever_finds_it() -> None:
+    assert blamed(Override("--seed -3", "seed", -3)) == ["--seed -3: must be 0 or more"]
+    (line,) = blamed("clock.share_period_s=0.0015")
+    assert line.startswith("--set clock.share_period_s=0.0015: must be a whole multiple of")
+    (line,) = blamed("path={kind='circle'}")
+    assert line == "--set path={kind='circle'}: path.radius_m = (missing): must be given"
+    (line,) = blamed("robot.0.v_m_s='fast'")
+    assert line == "--set robot.0.v_m_s='fast': must be a number"
+
+
+def test_options_and_file_are_blamed_each_for_its_own_at_once() -> None:
+    text = changed(SMALL, "control.k1=-1.0")
+    with pytest.raises(ScenarioError) as caught:
+        loads(
+            "file.toml", text, ("robot.r9.s_0=1.0", Override("--duration nan", "duration_s", nan))
+        )
+    assert str(caught.value).splitlines() == [
+        "--set robot.r9.s_0=1.0: no 'r9' there; known: r1, r2",
+        "--duration nan: must be a finite number",
+        "file.toml: control.k1 = -1.0: must be greater than 0",
+    ]
+    assert [complaint.where for complaint in caught.value.complaints][-1] == "file.toml"
+
+
+def test_the_last_option_that_set_a_key_is_blamed() -> None:
+    assert blamed("seed=-1", Override("--seed -2", "seed", -2)) == ["--seed -2: must be 0 or more"]
+
+
+MANY = """
+schema = 1
+name = "Many Wrong"
+duration_s = -1.0
+[clock]
+control_period_s = 0.0
+share_period_s = 0.0005
+[path]
+kind = "circle"
+[drive]
+left_node = 0
+[graph]
+edges = ["r1 -> r9", "r1 to r2"]
+[[robot]]
+name = "r1"
+[[robot]]
+name = "r2"
+pose = { x_m = 0.0, y_m = 2.0 }
+type = "tank"
+[[expect]]
+max_abs = 1.0
+[[expect]]
+signal = "s"
+robots = ["r8"]
+"""
+
+
+def test_all_problems_come_at_once_across_sections_whatever_is_missing() -> None:
+    text = "\n".join(problems(MANY))
+    for key in (
+        "name = ",
+        "duration_s = -1.0",
+        "clock.control_period_s = 0.0",
+        "path.radius_m = (missing)",
+        "drive.left_node = 0",
+        'graph.edges = "r1 -> r9"',
+        'graph.edges = "r1 to r2"',
+        "robot.r1.pose = (missing)",
+        'robot.r2.type = "tank"',
+        "expect.0.signal = (missing)",
+        'expect.1.robots = "r8"',
+        'expect.1 = "s": give max_abs, min or max',
+    ):
+        assert f"file.toml: {key}" in text, text
+    # What would follow from values put in for wrong ones isn't said.
+    assert "share_period_s" not in text
+    assert len(text.splitlines()) == 12
+
+
+WRONG = ["x", -1, float("nan"), {"a": 1}]
+PYDANTIC = re.compile(r"Input|should|valid |pydantic|type=|validator|of the wrong kind")
+
+
+def keys_of(data: object, key: str = "") -> Iterator[str]:
+    items: Iterable[tuple[object, object]] = ()
+    if isinstance(data, dict):
+        items = data.items()
+    elif isinstance(data, list):
+        items = enumerate(data)
+    for part, inner in items:
+        yield f"{key}{part}"
+        yield from keys_of(inner, f"{key}{part}.")
+
+
+def test_whatever_stands_at_a_key_is_refused_in_our_words() -> None:
+    whole = to_toml(load("realistic"))
+    keys = [k for k in keys_of(tomllib.loads(whole)) if not re.match(r"robot\.[1-9]", k)]
+    refused = 0
+    for key, wrong in itertools.product(keys, WRONG):
+        try:
+            loads("f", whole, (Override("here", key, wrong),))
+        except ScenarioError as error:
+            refused += 1
+            assert not PYDANTIC.search(str(error)), str(error)
+    assert refused > 2 * len(keys)
 
 
 def test_a_scenario_can_not_be_changed_after_loading() -> None:

@@ -1,0 +1,85 @@
+"""Keys of a scenario that somebody sets from outside its file, for example on the command line.
+
+Who set a value is blamed for it: what is wrong with it names the option, not the file.
+"""
+
+import tomllib
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from configs.errors import Complaint
+
+
+class Override(NamedTuple):
+    """One key and its value, instead of the file's."""
+
+    option: str  # as it was given, for messages: "--seed -3"
+    key: str  # dotted; members of lists by name or number: "robot.r2.pose.x_m"
+    value: object
+
+    @classmethod
+    def from_set(cls, text: str) -> "Override | Complaint":
+        """What `--set KEY=VALUE` says; a value that isn't TOML is a text."""
+        option = f"--set {text}"
+        key, equals, value = text.partition("=")
+        parts = [part.strip() for part in key.split(".")]
+        if not equals or not all(parts):
+            right = "must read key=value, for example coordination.p=3"
+            return Complaint(option, "", text, right)
+        return cls(option, ".".join(parts), _value(value.strip()))
+
+    def is_about(self, key: str) -> bool:
+        """Whether a key of a scenario is the one set here, or inside it."""
+        return f"{key}.".startswith(f"{self.key}.")
+
+    def apply(self, data: dict[str, Any]) -> "Override | Complaint":
+        """Set the key in parsed TOML; return this with its members of lists by name.
+
+        What is wrong, if there is no such place.
+        """
+        *path, last = self.key.split(".")
+        holder: Any = data
+        names = []
+        for part in path:
+            if isinstance(holder, dict):
+                holder = holder.setdefault(part, {})
+                names.append(part)
+            elif isinstance(holder, list):
+                at = _find(holder, part)
+                if at is None:
+                    return self._complain(f"no {part!r} there; known: {', '.join(_names(holder))}")
+                names.append(_names(holder)[at])
+                holder = holder[at]
+            else:
+                return self._complain(f"{part} is in no table")
+        if isinstance(holder, dict):
+            holder[last] = self.value
+        elif isinstance(holder, list) and (at := _find(holder, last)) is not None:
+            holder[at] = self.value
+        else:
+            return self._complain(f"{last} names nothing there")
+        return self._replace(key=".".join([*names, last]))
+
+    def _complain(self, right: str) -> Complaint:
+        return Complaint(self.option, "", self.value, right)
+
+
+def _value(text: str) -> object:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _find(items: Sequence[Any], part: str) -> int | None:
+    for n, item in enumerate(items):
+        if isinstance(item, dict) and item.get("name") == part:
+            return n
+    return int(part) if part.isdigit() and int(part) < len(items) else None
+
+
+def _names(items: Sequence[Any]) -> list[str]:
+    return [
+        str(item.get("name", n)) if isinstance(item, dict) else str(n)
+        for n, item in enumerate(items)
+    ]

@@ -1,0 +1,15 @@
+"""What texts in scenario and deployment files have to look like, as patterns and in words."""
+
+NAME = r"^[a-z][a-z0-9_]*$"
+FIRMWARE = r"^0\.6\.[0-9]{1,2}$"
+ROUTER = r"^(tcp|tls|unixsock-stream)/.+"
+ENDPOINT = r"^(tcp|tls)/.+:\d+$"
+RUN = r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$"
+
+WORDS = {
+    NAME: "must be of lower-case letters, digits and _, with a letter first, for example r1",
+    FIRMWARE: "must be a firmware 0.6.x, for example 0.6.10",
+    ROUTER: "must be tcp/HOST:PORT, tls/HOST:PORT or unixsock-stream/PATH",
+    ENDPOINT: "must be tcp/HOST:PORT or tls/HOST:PORT, for example tcp/192.168.1.2:7447",
+    RUN: "must be of letters, digits and _.+-, with a letter or digit first, for example lab",
+}
