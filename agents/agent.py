@@ -59,9 +59,7 @@ class Agent:
         self._pose_delay = brief.schedule.pose_delay_ticks
         history = POSE_HISTORY_TICKS if brief.schedule.realtime else self._pose_delay
         self._localiser = Localiser(brief.localisation, brief.wheels, history)
-        self._neighbours = Neighbours(
-            brief.hears, brief.coordination, self._h, brief.schedule.share_every * self._h
-        )
+        self._neighbours = Neighbours(brief.hears, brief.coordination, self._h)
         self._coordinator = Coordinator(brief.coordination, self._h, brief.hears_leader)
         start = brief.coordination
         self._coordination = CoordinationState(start.v_hat_0, start.mu_0, start.s_0)

@@ -4,13 +4,16 @@ Data carries its time, and the law uses what the neighbour's value will be in th
 coming period, t_k + h/2:
 
     s_j ← s_j + v̂_j (age + h/2),     age at most `age_limit_s`
-    v̂_j ← v̂_j + v̂_j' (age + h/2),    age at most one share period
+    v̂_j ← v̂_j                        held as received
 
-with v̂_j' the difference quotient of the last two values heard. The first removes the bias of old
-data (v_r per second of age and hop, if it were held); the second makes the hold between two shares
-correct to second order, and is bounded to that, so that delay doesn't turn it into a
-differentiator. A neighbour silent for longer than `silence_limit_s` leaves the sums, and counts
-again when it speaks. Sums run in the order of names, so they don't depend on the order of arrival.
+The first removes the bias of old data (v_r per second of age and hop, if it were held). The second
+makes (38) an average at every share: robot i's next v̂ is a convex combination of its own, of what
+it heard and of v_r, with fixed positive weights. So where the leader reaches every robot, v̂ → v_r
+at any share period, with any delay, on any graph, also on one that changes. Carried on by its
+slope, it would diverge on graphs with cycles that share slowly.
+
+A neighbour silent for longer than `silence_limit_s` leaves the sums, and counts again when it
+speaks. Sums run in the order of names, so they don't depend on the order of arrival.
 """
 
 from collections.abc import Iterable
@@ -35,7 +38,6 @@ class _Neighbour:
     t_ns: int = 0
     s: float = 0.0
     v_hat: float = 0.0
-    slope: float = 0.0
     heard: bool = False
 
 
@@ -47,28 +49,21 @@ class Neighbours:
         "_by_name",
         "_half_s",
         "_in_order",
-        "_share_period_s",
         "_silence_limit_s",
     )
 
-    def __init__(
-        self, names: Iterable[str], limits: Coordination, period_s: float, share_period_s: float
-    ) -> None:
+    def __init__(self, names: Iterable[str], limits: Coordination, period_s: float) -> None:
         self._by_name = {name: _Neighbour() for name in sorted(names)}
         self._in_order = tuple(self._by_name.values())
         self._half_s = 0.5 * period_s
-        self._share_period_s = share_period_s
         self._age_limit_s = limits.age_limit_s
         self._silence_limit_s = limits.silence_limit_s
 
     def hear(self, name: str, t_ns: int, s: float, v_hat: float) -> None:
         """Take what `name` said of time `t_ns`; older than what is known, it is ignored."""
         neighbour = self._by_name[name]
-        if neighbour.heard:
-            elapsed_ns = t_ns - neighbour.t_ns
-            if elapsed_ns <= 0:
-                return
-            neighbour.slope = (v_hat - neighbour.v_hat) / (elapsed_ns * 1e-9)
+        if neighbour.heard and t_ns <= neighbour.t_ns:
+            return
         neighbour.t_ns = t_ns
         neighbour.s = s
         neighbour.v_hat = v_hat
@@ -87,6 +82,5 @@ class Neighbours:
                 age = self._age_limit_s
             n += 1
             sum_s += neighbour.s + neighbour.v_hat * (age + half)
-            ahead = min(self._share_period_s, age)
-            sum_v += neighbour.v_hat + neighbour.slope * (ahead + half)
+            sum_v += neighbour.v_hat
         return _new(Sums, (n, sum_s, sum_v))

@@ -18,7 +18,7 @@ def run(name: str, folder: Path, *overrides: str) -> dict:
 
 
 # Settle of x_e, y_e, θ_e [s]; spread of s: peak [m], settle [s]; final x_e, y_e, θ_e [mm, mrad]:
-# the continuous closed loop, by an independent integration.
+# the continuous closed loop, by an independent integration. Sharing at 50 Hz costs up to 3 %.
 TABLE = {
     "paper": ((2.65, 3.11, 3.61), (1.125, 13.1), (2.1, 1.1, 1.1)),
     "paper_ring": ((2.67, 4.00, 5.07), (0.425, 13.9), (2.2, 1.1, 1.2)),
@@ -33,7 +33,7 @@ def test_the_experiment_settles_as_the_theory_says(name: str, tmp_path: Path) ->
     settles, (peak, settle), finals = TABLE[name]
     summary = run(name, tmp_path / "run")
     worst = summary["worst"]
-    assert list(worst["settle_s"].values()) == pytest.approx(settles, abs=0.1)
+    assert list(worst["settle_s"].values()) == pytest.approx(settles, rel=0.03, abs=0.1)
     assert [1e3 * v for v in worst["final_max"].values()] == pytest.approx(finals, rel=0.2)
     assert summary["s_spread"]["peak"] == pytest.approx(peak, rel=0.02)
     assert summary["s_spread"]["settle_s"] == pytest.approx(settle, rel=0.02)
