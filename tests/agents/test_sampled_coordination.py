@@ -1,4 +1,4 @@
-"""Coordination with values held between shares: its exact map from one share to the next, on graphs.
+"""Coordination with values held between shares: its exact map from share to share, on graphs.
 
 The map of one robot is measured on `Neighbours` and `Coordinator`, which are linear in what they
 are given: the responses to unit states and to unit values heard are its columns. The map of a fleet
@@ -91,7 +91,7 @@ def test_the_speed_estimates_converge_on_every_graph_at_every_share_period(robot
 def test_path_variables_agree_on_every_graph_that_is_positive(robots: int) -> None:
     # p² ≥ 4 q d_max: sampled or not, each s is drawn to an average of what is heard.
     adjacency, leader = rooted_graphs(robots)
-    positive = P**2 >= 4 * Q * adjacency.sum(axis=2).max(axis=1)
+    positive = 4 * Q * adjacency.sum(axis=2).max(axis=1) <= P**2
     for period_s in PERIODS_S:
         maps = fleets(adjacency[positive], leader[positive], round(period_s / H_S))
         sizes = np.sort(np.abs(np.linalg.eigvals(maps[:, robots:, robots:])), axis=1)
