@@ -21,7 +21,7 @@ from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.writer import Source
 from plant.buses import IdealBus
 from plant.emulation import Emulation, emulations
-from plant.unit import Unit, unit_of
+from plant.unit import Unit, diverged_robots, unit_of
 from plant.wire_bus import WireBus
 
 PROGRESS_EVERY_TICKS = 256
@@ -184,12 +184,13 @@ class InProcessRun:
 
     @property
     def stopped_robots(self) -> dict[str, str]:
-        """Robots that stopped themselves, and why."""
-        return {
+        """Robots that stopped themselves or whose motion diverged, and why."""
+        stopped = {
             agent.brief.robot: agent.guard.stopped_because
             for agent in self._agents
             if agent.guard.stopped_because
         }
+        return stopped | diverged_robots(self._units, self._schedule.period_ns)
 
     @property
     def notices(self) -> dict[str, list[str]]:

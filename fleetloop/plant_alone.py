@@ -23,6 +23,7 @@ from typing import Any
 from bridge.can_bus import places
 from bridge.can_bus.ends import DriveEnd
 from bridge.can_bus.hub import Hub
+from bridge.messages import Progress
 from bridge.process import Stop, go_realtime, name_process, settled_memory
 from bridge.telemetry import PLANT_ROW, PLANT_SIGNALS, RowBuffer
 from configs.brief import NetworkLink, PlantBrief, Settings
@@ -37,7 +38,7 @@ from fleetloop.terminal import note, say
 from plant.__main__ import PLANT_PRIORITY, join
 from plant.__main__ import run as plant_of_a_run
 from plant.realtime import RealtimeLoop
-from plant.unit import Unit, unit_of
+from plant.unit import Unit, diverged_robots, unit_of
 
 FOREVER_TICKS = 1 << 53
 GO_AHEAD_NS = 1_000_000
@@ -59,10 +60,26 @@ class Options:
 
 
 class _Nowhere:
-    """Poses and progress have no listener here."""
+    """Poses have no listener here."""
 
     def put(self, payload: object) -> None:
         """Forget it."""
+
+
+class _Watch:
+    """Says which robot's motion diverged, as soon as it is seen."""
+
+    def __init__(self, units: Sequence[Unit], period_ns: int) -> None:
+        self._units = units
+        self._period_ns = period_ns
+        self._told: set[str] = set()
+
+    def look(self, _: Progress | None = None) -> None:
+        """Say what is new."""
+        for robot, why in diverged_robots(self._units, self._period_ns).items():
+            if robot not in self._told:
+                self._told.add(robot)
+                note(f"STOPPED {robot}: {why}; its drives are disarmed for good")
 
 
 def run_plant(source: str, options: Options) -> int:
@@ -165,14 +182,16 @@ def _run(
 ) -> None:
     units = [unit_of(robot) for robot in brief.robots]
     nowhere = _Nowhere()
+    watch = _Watch(units, brief.schedule.period_ns)
     rows = [RowBuffer(PLANT_ROW, lambda *_: None) for _ in units]
-    loop = RealtimeLoop(brief, units, end, hub, [nowhere] * len(units), rows, nowhere.put, {})
+    loop = RealtimeLoop(brief, units, end, hub, [nowhere] * len(units), rows, watch.look, {})
     refused = go_realtime(PLANT_PRIORITY)
     if options.serve_stdin:
         threading.Thread(target=_serve_stdin, args=(units, loop, stop), daemon=True).start()
     _say_ready(brief, buses, as_json=options.as_json)
     with settled_memory():
         loop.run(time.monotonic_ns() + GO_AHEAD_NS, stop)
+    watch.look()
     for bus, trouble in end.troubles().items():
         note(f"BUS {bus}: {trouble}")
     frames = ", ".join(f"{bus} {count}" for bus, count in loop.counters.frames.items())

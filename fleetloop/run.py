@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from bridge.messages import Progress
+from bridge.messages import Progress, Report
 from bridge.process import Stop
 from configs.brief import NetworkLink
 from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
@@ -190,20 +190,25 @@ def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
         if process == "plant":
             stats.overruns = int(report.number("overruns"))
             stats.frames_per_bus = {
-                name.removeprefix("frames."): int(report.number(name))
-                for name in report.values
-                if name.startswith("frames.")
+                bus: int(count) for bus, count in _under("frames.", report).items()
             }
-            stats.bus_troubles = {
-                name.removeprefix("trouble."): str(text)
-                for name, text in report.values.items()
-                if name.startswith("trouble.")
-            }
+            stats.bus_troubles = _under("trouble.", report)
         if stopped := report.values.get("stopped"):
             stats.stopped_robots[process.removeprefix("agent/")] = str(stopped)
         if notices := report.values.get("notices"):
             stats.notices[process.removeprefix("agent/")] = str(notices).split("\n")
+    if (plant := outcome.reports.get("plant")) is not None:
+        stats.stopped_robots |= _under("stopped.", plant)  # the cause of what its controller says
     return stats
+
+
+def _under(prefix: str, report: Report) -> dict[str, str]:
+    """What a report says under names that begin alike, by the rest of the name."""
+    return {
+        name.removeprefix(prefix): str(value)
+        for name, value in report.values.items()
+        if name.startswith(prefix)
+    }
 
 
 def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options) -> int:

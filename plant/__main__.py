@@ -29,7 +29,7 @@ from configs.brief import PlantBrief, Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError
 from plant.loop import Counters, LockstepLoop, bus_frames
 from plant.realtime import RealtimeLoop
-from plant.unit import unit_of
+from plant.unit import diverged_robots, unit_of
 from plant.witness import Witness
 
 PLANT_PRIORITY = 45
@@ -151,6 +151,10 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
             "cpu_ns": cpu_ns() - began_ns,
             "refused": ", ".join(refused),
             **bus_frames(counters),
+            **{
+                f"stopped.{robot}": why
+                for robot, why in diverged_robots(units, brief.schedule.period_ns).items()
+            },
             **{f"trouble.{bus}": text for bus, text in end.troubles().items()},
             **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
         }

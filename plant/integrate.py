@@ -6,7 +6,7 @@ that are linear in (v, ω), so they come from the same stages.
 
 from math import cos, sin
 
-from configs.errors import InfrastructureError
+from plant.divergence import FARTHEST
 from plant.robot import Robot, State
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
@@ -14,11 +14,10 @@ _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot 
 
 def rk4(
     robot: Robot, state: State, tau_right: float, tau_left: float, t_s: float, step_s: float
-) -> State:
+) -> State | None:
     """State after `step_s` from scenario time `t_s`, under held torques [N·m].
 
-    Raises:
-        InfrastructureError: the motion has left what numbers can hold: a loop that diverged.
+    None if the motion diverged: it would leave the bounds of `plant.divergence`.
     """
     try:
         x, y, theta, v, omega, right_angle, left_angle = state
@@ -43,23 +42,21 @@ def rk4(
         travel = sixth * (v + 2.0 * (v2 + v3) + v4)
         turn = sixth * (omega + 2.0 * (omega2 + omega3) + omega4)
         rolled, turned = travel * robot.inv_r, turn * robot.b * robot.inv_r
-        after = (
-            x
-            + sixth
-            * (v * cos(theta) + 2.0 * (v2 * cos(theta2) + v3 * cos(theta3)) + v4 * cos(theta4)),
-            y
-            + sixth
-            * (v * sin(theta) + 2.0 * (v2 * sin(theta2) + v3 * sin(theta3)) + v4 * sin(theta4)),
-            theta + turn,
-            v + sixth * (a1 + 2.0 * (a2 + a3) + a4),
-            omega + sixth * (w1 + 2.0 * (w2 + w3) + w4),
-            right_angle + rolled + turned,
-            left_angle + rolled - turned,
+        x += sixth * (
+            v * cos(theta) + 2.0 * (v2 * cos(theta2) + v3 * cos(theta3)) + v4 * cos(theta4)
         )
-    except (ValueError, OverflowError) as error:
-        raise InfrastructureError(
-            f"t = {t_s:.3f} s: a robot's motion has diverged, v = {state.v:.3g} m/s,"
-            f" ω = {state.omega:.3g} rad/s: do its gains suit the rate and the delay of its loop?"
-            " `fleetloop check` says more"
-        ) from error
-    return _new(State, after)
+        y += sixth * (
+            v * sin(theta) + 2.0 * (v2 * sin(theta2) + v3 * sin(theta3)) + v4 * sin(theta4)
+        )
+        theta += turn
+        v += sixth * (a1 + 2.0 * (a2 + a3) + a4)
+        omega += sixth * (w1 + 2.0 * (w2 + w3) + w4)
+        right_angle = right_angle + rolled + turned
+        left_angle = left_angle + rolled - turned
+    except ValueError:  # the sine of infinity
+        return None
+    if not abs(v) + robot.b * abs(omega) <= robot.fastest_m_s:
+        return None
+    if not abs(x) + abs(y) + abs(theta) + abs(right_angle) + abs(left_angle) <= FARTHEST:
+        return None
+    return _new(State, (x, y, theta, v, omega, right_angle, left_angle))

@@ -36,11 +36,10 @@ from math import exp, expm1, inf, isfinite, sqrt
 from random import Random
 
 from configs.brief import MotorModel
+from plant.divergence import FASTEST_WHEEL_RAD_S
 from plant.supply import Supply
 
 _MODULATION = sqrt(3.0) / 2.0
-_FASTEST_RAD_S = 1e6
-"""No wheel turns faster; above it powers would overflow."""
 
 
 class MotorFault(Enum):
@@ -132,8 +131,8 @@ class Motor:
         """Mean torque at the wheel [N·m] over `dt_s`, for a demand and a speed at its start."""
         if dt_s != self._dt_s:
             self._discretise(dt_s)
-        if not -_FASTEST_RAD_S <= speed_rad_s <= _FASTEST_RAD_S:
-            speed_rad_s = _clamped(speed_rad_s, _FASTEST_RAD_S)
+        if not -FASTEST_WHEEL_RAD_S <= speed_rad_s <= FASTEST_WHEEL_RAD_S:
+            speed_rad_s = _clamped(speed_rad_s, FASTEST_WHEEL_RAD_S)
         asked = self._current_for(demand_N_m, speed_rad_s)
         if asked == self._asked_A and not self._pending:
             off = self.current_A - asked

@@ -19,6 +19,7 @@ from math import cos, sin
 from typing import NamedTuple
 
 from configs.brief import Body, Disturbance
+from plant.divergence import FASTEST_WHEEL_RAD_S
 
 Accelerations = Callable[[float, float, float, float], tuple[float, float]]
 
@@ -51,6 +52,8 @@ class Robot:
         m11 = scale * (mass * b * b + inertia) + body.wheel_axle_inertia_kg_m2
         m12 = scale * (mass * b * b - inertia)
         self.r, self.b, self.inv_r = r, b, 1.0 / r
+        self.fastest_m_s = r * FASTEST_WHEEL_RAD_S
+        """No wheel's rim moves faster."""
         self.c = r * r * body.body_mass_kg * a / (2.0 * b)
         self.mbar_1, self.mbar_2 = m11 + m12, m11 - m12
         right, left = body.damping_right_N_m_s, body.damping_left_N_m_s

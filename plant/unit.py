@@ -11,12 +11,13 @@ Drives, motors and encoders are at the motor shaft, the body and what is recorde
     RealUnit    motors, supply and encoders of `plant.powertrain`
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from bridge.drives import DRIVES, DriveNode
 from bridge.drives.feeling import Feeling
 from bridge.frame import Frame
 from configs.brief import PowertrainModel, RobotBrief
+from plant.divergence import Divergence
 from plant.encoder import PER_RADIAN
 from plant.integrate import rk4
 from plant.powertrain import powertrain
@@ -41,6 +42,7 @@ class Unit:
         "_torque_left",
         "_torque_right",
         "brief",
+        "divergence",
         "drives",
         "moved_ns",
         "state",
@@ -53,6 +55,8 @@ class Unit:
         self._right = node(brief.drive, brief.right_node, brief.drive.serial_number)
         self._left = node(brief.drive, brief.left_node, brief.drive.serial_number + 1)
         self.drives: tuple[DriveNode, DriveNode] = (self._right, self._left)
+        self.divergence: Divergence | None = None
+        """Why the body stands still for good, None if it doesn't."""
         self.moved_ns = 0
         """Bus time up to which the body has moved, for who moves it from event to event."""
         mounting = brief.mounting
@@ -107,12 +111,15 @@ class Unit:
         left = self._left.torque_demand(period_s) * self._gear_left
         self._torque_right = self._demand_right = right
         self._torque_left = self._demand_left = left
-        if substeps == 1:
-            self.state = rk4(self._body, state, right, left, t_s, period_s)
+        if self.divergence is not None:
             return
         step = period_s / substeps
         for n in range(substeps):
-            state = rk4(self._body, state, right, left, t_s + n * step, step)
+            after = rk4(self._body, state, right, left, t_s + n * step, step)
+            if after is None:
+                state = self._stop(state, Divergence(t_s, state.v, state.omega, right, left))
+                break
+            state = after
         self.state = state
 
     def move(self, to_ns: int, zero_ns: int, step_ns: int) -> None:
@@ -127,6 +134,13 @@ class Unit:
         if to_ns > self.moved_ns:
             self.moved_ns = to_ns
             self.feed()
+
+    def _stop(self, sound: State, divergence: Divergence) -> State:
+        """The motion diverged: the state at rest where it was sound at last."""
+        self.divergence = divergence
+        self._right.lose_estimate()
+        self._left.lose_estimate()
+        return sound._replace(v=0.0, omega=0.0)
 
     def row(self, t_s: float) -> tuple[float, ...]:
         """The signals of `bridge.telemetry.PLANT_SIGNALS` at this instant."""
@@ -176,7 +190,11 @@ class RealUnit(Unit):
             right_speed, left_speed = body.wheel_speeds(state.v, state.omega)
             shafts = train.step(demands, (right_speed * gear_r, left_speed * gear_l), step)
             torques = shafts[0] * gear_r, shafts[1] * gear_l
-            state = rk4(body, state, *torques, t_s + n * step, step)
+            if self.divergence is None:
+                after = rk4(body, state, *torques, t_s + n * step, step)
+                if after is None:
+                    after = self._stop(state, Divergence(t_s, state.v, state.omega, *torques))
+                state = after
             right.feed(*train.right_encoder.step(state.right_angle * gear_r, step))
             left.feed(*train.left_encoder.step(state.left_angle * gear_l, step))
         self.state = state
@@ -202,3 +220,12 @@ class RealUnit(Unit):
 def unit_of(brief: RobotBrief) -> Unit:
     """The emulation of a robot as its brief wants it."""
     return Unit(brief) if brief.powertrain is None else RealUnit(brief, brief.powertrain)
+
+
+def diverged_robots(units: Iterable[Unit], period_ns: int) -> dict[str, str]:
+    """Robots whose motion diverged: the tick that did it, and how."""
+    return {
+        unit.brief.robot: f"tick {round(found.t_s * 1e9) // period_ns}: {found}"
+        for unit in units
+        if (found := unit.divergence) is not None
+    }

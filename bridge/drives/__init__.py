@@ -72,6 +72,9 @@ class DriveNode(Protocol):
     def feed(self, revolutions: float, rev_s: float) -> None:
         """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
 
+    def lose_estimate(self) -> None:
+        """The encoder's estimate is gone for good: disarm with that error, which nothing clears."""
+
     def due(self, now_ns: int) -> Sequence[Frame]:
         """Frames due until this instant, the newest of each; the drive supervises itself first."""
 

@@ -34,6 +34,21 @@ def test_processes_and_one_process_leave_the_same_record_bit_for_bit(
     assert (a / "record.mcap").read_bytes() == (b / "record.mcap").read_bytes()
 
 
+def test_a_robot_that_diverges_is_named_and_the_other_goes_on_in_either_mode(
+    tmp_path: Path, capsys
+) -> None:
+    args = ("two_robots", "--duration", "0.5", "--set", "robot.r1.v_m_s=1e6")
+    with running(tmp_path / "a", *args, bus_time_s=0.1) as run:
+        status, out = run.end()
+    assert completed(tmp_path / "b", *args, "--in-process")[0] == status == 1, out
+    assert print_comparison(tmp_path / "a", tmp_path / "b", as_json=False) == 0
+    assert "identical: 250 ticks of 2 robots" in capsys.readouterr().out
+    assert run.summary()["verdict"] == "failed"
+    stopped = run.summary()["stopped_robots"]
+    assert list(stopped) == ["r1"]
+    assert stopped["r1"].startswith("tick 0: its motion diverged: v = 1e+06 m/s, ω = ")
+
+
 def test_four_robots_are_at_least_six_processes_under_two_gibibytes(tmp_path: Path) -> None:
     with running(tmp_path / "a", "paper", "--duration", "2") as run:
         names = run.names()

@@ -84,6 +84,21 @@ def test_a_client_that_falls_silent_is_disarmed_by_the_watchdog(fleetloop_plant)
     assert plant.poses()["r1"].torque_right_N_m == 0.0
 
 
+def test_an_absurd_set_point_ends_the_motion_of_its_robot_alone() -> None:
+    with EmulatedPlant("two_robots", overrides=["drive.watchdog_s=0.0"]) as plant:
+        with can.Bus(**plant.buses["r1"]) as one, can.Bus(**plant.buses["r2"]) as other:
+            send(one, 0x007, bytes([8, 0, 0, 0]))
+            send(one, 0x00E, bytes.fromhex("ffff7f7f"))
+            beats = [m.data for m in messages(one, 0.5) if m.arbitration_id == 0x001]
+            assert len(messages(other, 0.2)) > 100
+        assert beats[-1][:5] == bytes([8, 0, 0, 0, 1])  # MISSING_ESTIMATE, idle
+        assert plant.poses()["r1"].v_m_s == 0.0
+        said = plant.stop()
+    assert "STOPPED r1: tick " in said
+    assert "under wheel torques of 3.4e+38 and 0 N·m" in said
+    assert "r2" not in said.replace("frames: r1", "")
+
+
 def send(bus: can.BusABC, identifier: int, data: bytes) -> None:
     """Send a data frame."""
     bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))

@@ -40,6 +40,7 @@ class Axis:
 
     __slots__ = (
         "_conditions",
+        "_lasting",
         "_offset",
         "_plain",
         "_silence_ns",
@@ -66,13 +67,14 @@ class Axis:
     def __init__(self, model: DriveModel, serial: int) -> None:
         self.model = model
         self.serial = serial
+        self._lasting = AxisError(0)  # what nothing clears
 
     def power_up(self, parameters: Parameters) -> None:
         """Idle, without errors, with these parameters."""
         self.parameters = parameters
         self.controller = Controller(parameters)
         self.state = AxisState.IDLE
-        self.errors = self.disarm_reason = AxisError(0)
+        self.errors, self.disarm_reason = self._lasting, AxisError(0)
         self.result = Result.SUCCESS
         self.input_torque = self.demand = 0.0
         self.position = self.velocity = self._offset = 0.0
@@ -109,6 +111,11 @@ class Axis:
         """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
         self.position = revolutions + self._offset
         self.velocity = rev_s
+
+    def lose_estimate(self) -> None:
+        """The encoder's estimate is gone for good: disarm with that error, which nothing clears."""
+        self._lasting = AxisError.MISSING_ESTIMATE
+        self.disarm(self._lasting)
 
     def feel(self, feeling: Feeling) -> None:
         """Take what the drive measures; derate, and disarm if that says so."""
@@ -185,7 +192,8 @@ class Axis:
 
     def clear_errors(self) -> None:
         """Forget errors but those whose cause is still measured."""
-        self.errors, self.disarm_reason = AxisError(self._conditions), AxisError(0)
+        self.errors = AxisError(self._conditions) | self._lasting
+        self.disarm_reason = AxisError(0)
 
     def _check_motion(self) -> None:
         model = self.model

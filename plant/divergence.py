@@ -1,0 +1,33 @@
+"""A body whose motion diverged: where the plant says so, and what it says.
+
+    |v| + b |ω| ≤ r ν_max                      no wheel turns faster than `FASTEST_WHEEL_RAD_S`  (1)
+    |x| + |y| + |θ| + |φ_R| + |φ_L| ≤ `FARTHEST`                        [m] and [rad] together  (2)
+
+The integration holds each of its steps against (1) and (2); what isn't a number is outside as well.
+From then on the body stands still where it was last within them. Its drives have no estimate of
+their encoders any more: they disarm with that error, which nothing clears, so whoever controls the
+robot stops it. Robots beside it notice nothing.
+"""
+
+from typing import NamedTuple
+
+FASTEST_WHEEL_RAD_S = 1e6
+FARTHEST = 1e9
+"""A float still tells a tenth of a micrometre apart there, and an encoder its counts."""
+
+
+class Divergence(NamedTuple):
+    """When the motion of a body left its bounds, and what it was doing before."""
+
+    t_s: float  # scenario time
+    v: float  # [m/s]
+    omega: float  # [rad/s]
+    right: float  # torque at the wheel [N·m]
+    left: float
+
+    def __str__(self) -> str:
+        """For people."""
+        return (
+            f"its motion diverged: v = {self.v:.3g} m/s, ω = {self.omega:.3g} rad/s under wheel"
+            f" torques of {self.right:.3g} and {self.left:.3g} N·m"
+        )
