@@ -83,3 +83,7 @@ def _names(items: Sequence[Any]) -> list[str]:
         str(item.get("name", n)) if isinstance(item, dict) else str(n)
         for n, item in enumerate(items)
     ]
+
+
+Overrides = tuple[Override | str, ...]
+"""Several; a text is what `--set` takes."""

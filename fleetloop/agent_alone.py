@@ -14,6 +14,7 @@ from configs.briefing import agent_brief
 from configs.deployment import agent_role, load_deployment
 from configs.errors import InfrastructureError, ScenarioError
 from configs.loading import load
+from configs.overrides import Overrides
 from fleetloop import placing
 from fleetloop.signals import stop_on_signals
 from fleetloop.terminal import note
@@ -21,7 +22,7 @@ from fleetloop.terminal import note
 ENDED, INTERRUPTED = 0, 130
 
 
-def run_agent(source: str, robot: str, deployment_file: Path, overrides: tuple[str, ...]) -> int:
+def run_agent(source: str, robot: str, deployment_file: Path, overrides: Overrides) -> int:
     """Run one controller until its run ends; return the exit status.
 
     Raises:
@@ -35,7 +36,7 @@ def run_agent(source: str, robot: str, deployment_file: Path, overrides: tuple[s
     if scenario.clock.mode != "realtime":
         raise ScenarioError(
             f'{source}: clock.mode = "{scenario.clock.mode}": a controller on its own keeps the'
-            ' wall clock; it must be "realtime" (--set clock.mode=realtime)'
+            ' wall clock; it must be "realtime" (--clock realtime)'
         )
     deployment = load_deployment(deployment_file, scenario)
     role = agent_role(robot)

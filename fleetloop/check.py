@@ -1,6 +1,7 @@
 """`fleetloop check`: what can be said of a scenario before it runs."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -9,33 +10,39 @@ from rich.table import Table
 
 from configs.briefing import robot_briefs
 from configs.deployment import Deployment, agent_role, load_deployment
+from configs.errors import Complaint, ScenarioError
 from configs.loading import json_schema, load, shipped
+from configs.overrides import Overrides
 from configs.scenario import Scenario
 from configs.stability import Finding, findings
 from fleetloop.bus_load import bus_findings
 from fleetloop.summary import check_expectations
 from fleetloop.terminal import say
 
-FINE, UNSOUND = 0, 1
+FINE, UNSOUND, WRONG = 0, 1, 2
 _MARKS = {"ok": "[green]ok[/]", "warning": "[yellow]warning[/]", "error": "[red]error[/]"}
 
 
 def check_scenario(
-    source: str, overrides: tuple[str, ...], *, deployment: Path | None = None, as_json: bool
+    source: str, overrides: Overrides, *, deployment: Path | None = None, as_json: bool
 ) -> int:
     """Check a scenario, print the findings; exit status 1 if one of them is an error.
+
+    With `as_json` what is wrong with the file itself is JSON as well; the exit status is then 2.
 
     Raises:
         ScenarioError: the file itself is wrong, or its deployment.
     """
-    scenario = load(source, overrides)
-    check_expectations(scenario.expect)
-    found = [*findings(scenario), *bus_findings(scenario, robot_briefs(scenario))]
-    if deployment is not None:
-        found += place_findings(scenario, load_deployment(deployment, scenario))
+    try:
+        scenario, found = _find(source, overrides, deployment)
+    except ScenarioError as error:
+        if not as_json:
+            raise
+        say(_json(problems=_problems(error)))
+        return WRONG
     unsound = any(finding.level == "error" for finding in found)
     if as_json:
-        say(json.dumps({"sound": not unsound, "findings": [asdict(f) for f in found]}, indent=2))
+        say(_json(findings=found))
         return UNSOUND if unsound else FINE
     graph = scenario.topology
     table = Table(
@@ -51,6 +58,42 @@ def check_scenario(
     return UNSOUND if unsound else FINE
 
 
+def _find(
+    source: str, overrides: Overrides, deployment: Path | None
+) -> tuple[Scenario, list[Finding]]:
+    scenario = load(source, overrides)
+    check_expectations(scenario.expect)
+    found = [*findings(scenario), *bus_findings(scenario, robot_briefs(scenario))]
+    if deployment is not None:
+        found += place_findings(scenario, load_deployment(deployment, scenario))
+    return scenario, found
+
+
+def _problems(error: ScenarioError) -> list[dict[str, object]]:
+    """What is wrong with a file or an option, for machines."""
+    if error.complaints:
+        return [
+            {**complaint._asdict(), "value": _json_value(complaint.value)}
+            for complaint in error.complaints
+        ]
+    return [Complaint("", "", None, text)._asdict() for text in str(error).splitlines()]
+
+
+def _json_value(value: object) -> object:
+    """As it is, if JSON has it; nan and infinity it has not."""
+    try:
+        return json.loads(json.dumps(value, allow_nan=False))
+    except (TypeError, ValueError):
+        return str(value)
+
+
+def _json(*, findings: Sequence[Finding] = (), problems: Sequence[dict[str, object]] = ()) -> str:
+    sound = not problems and all(finding.level != "error" for finding in findings)
+    listed = [asdict(finding) for finding in findings]
+    whole = {"sound": sound, "problems": list(problems), "findings": listed}
+    return json.dumps(whole, indent=2, ensure_ascii=False)
+
+
 def place_findings(scenario: Scenario, deployment: Deployment) -> list[Finding]:
     """Where each robot's controller, bus and drives are."""
     found = []
@@ -63,8 +106,12 @@ def place_findings(scenario: Scenario, deployment: Deployment) -> list[Finding]:
     return found
 
 
-def list_scenarios() -> None:
+def list_scenarios(*, as_json: bool) -> None:
     """Print the shipped scenarios."""
+    if as_json:
+        each = [{"name": name, "description": load(name).description} for name in shipped()]
+        say(json.dumps({"shipped": each}, indent=2, ensure_ascii=False))
+        return
     table = Table(box=None, show_header=False, padding=(0, 1))
     for name in shipped():
         table.add_row(name, load(name).description)

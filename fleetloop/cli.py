@@ -8,12 +8,15 @@ import os
 import signal
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from configs.errors import FleetloopError
+from configs.errors import FleetloopError, ScenarioError
 from fleetloop.can.app import app as can_app
+
+if TYPE_CHECKING:
+    from configs.overrides import Overrides
 
 app = typer.Typer(
     name="fleetloop",
@@ -21,19 +24,37 @@ app = typer.Typer(
     " Zenoh between them, a python-can bus to emulated drives.",
     epilog="Start with: fleetloop run paper",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
 app.add_typer(can_app, name="can")
+
+
+def _shipped(incomplete: str) -> list[str]:
+    """Names of shipped scenarios that begin so, for the shell; files it completes itself."""
+    from configs.loading import shipped
+
+    return [name for name in shipped() if name.startswith(incomplete)]
+
 
 ScenarioArg = Annotated[
     str,
     typer.Argument(
         metavar="SCENARIO",
         help="A scenario file, or the name of a shipped one (fleetloop check lists them).",
+        autocompletion=_shipped,
     ),
 ]
+ClockOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="lockstep|realtime",
+        help="Instead of the file's clock.mode: fast and the same bit for bit, or by the wall"
+        " clock.",
+    ),
+]
+SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Seed, instead of the file's.")]
 RunArg = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its record.mcap.")]
 SetOption = Annotated[
     list[str] | None,
@@ -73,21 +94,12 @@ def run(
             help="Hold the run to this multiple of real time; 0: as fast as the machine allows.",
         ),
     ] = 0.0,
-    clock: Annotated[
-        str | None,
-        typer.Option(
-            metavar="lockstep|realtime",
-            help="Instead of the file's clock.mode: fast and the same bit for bit, or by the wall"
-            " clock.",
-        ),
-    ] = None,
+    clock: ClockOption = None,
     duration: Annotated[
         float | None,
         typer.Option(metavar="SECONDS", help="Scenario time to run, instead of the file's."),
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(metavar="N", help="Seed, instead of the file's.")
-    ] = None,
+    seed: SeedOption = None,
     overrides: SetOption = None,
     deployment: DeploymentOption = None,
     out: Annotated[
@@ -113,17 +125,10 @@ def run(
     """Run a scenario, record everything, check its expectations, print and save the results."""
     from fleetloop.run import Options, run_scenario
 
-    changes = list(overrides or [])
-    if clock is not None:
-        changes.append(f"clock.mode={clock!r}")
-    if duration is not None:
-        changes.append(f"duration_s={duration}")
-    if seed is not None:
-        changes.append(f"seed={seed}")
     options = Options(
         in_process=in_process,
         speed=speed,
-        overrides=tuple(changes),
+        overrides=_changes(overrides, clock=clock, seed=seed, duration=duration),
         out=out,
         as_json=as_json,
         figures=figures,
@@ -141,12 +146,16 @@ def agent(
         Path,
         typer.Option("--deployment", metavar="FILE", help="Its CAN bus, the router, credentials."),
     ],
+    clock: ClockOption = None,
+    seed: SeedOption = None,
     overrides: SetOption = None,
 ) -> None:
     """Run one robot's controller on its own, as on the robot: its CAN bus, a router elsewhere."""
     from fleetloop.agent_alone import run_agent
 
-    raise typer.Exit(run_agent(scenario, robot, deployment, tuple(overrides or [])))
+    _refuse_lockstep(clock)
+    changes = _changes(overrides, clock=clock, seed=seed)
+    raise typer.Exit(run_agent(scenario, robot, deployment, changes))
 
 
 @app.command()
@@ -159,6 +168,8 @@ def plant(
     duration: Annotated[
         float | None, typer.Option(metavar="SECONDS", help="End after this time; else with Ctrl-C.")
     ] = None,
+    clock: ClockOption = None,
+    seed: SeedOption = None,
     overrides: SetOption = None,
     deployment: DeploymentOption = None,
     as_json: Annotated[
@@ -179,11 +190,12 @@ def plant(
     """Emulate drives and physics alone, in real time, for your own CAN host code."""
     from fleetloop.plant_alone import Options, run_plant
 
+    _refuse_lockstep(clock)
     options = Options(
         robots=tuple(filter(None, robots.split(","))),
         duration_s=duration,
         deployment=deployment,
-        overrides=tuple(overrides or []),
+        overrides=_changes(overrides, clock=clock, seed=seed),
         as_json=as_json,
         serve_stdin=stdin,
         join=join,
@@ -213,10 +225,10 @@ def check(
     if schema:
         print_schema()
     elif scenario is None:
-        list_scenarios()
+        list_scenarios(as_json=as_json)
     else:
         raise typer.Exit(
-            check_scenario(scenario, tuple(overrides or []), deployment=deployment, as_json=as_json)
+            check_scenario(scenario, _changes(overrides), deployment=deployment, as_json=as_json)
         )
 
 
@@ -291,6 +303,60 @@ def init(
     from fleetloop.init import write_starter
 
     write_starter(file)
+
+
+def _changes(
+    overrides: list[str] | None,
+    *,
+    clock: str | None = None,
+    seed: int | None = None,
+    duration: float | None = None,
+) -> "Overrides":
+    """What options say differently from the file; each is to blame for what it says."""
+    from configs.overrides import Override
+
+    said = (
+        ("--clock", "clock.mode", clock),
+        ("--duration", "duration_s", duration),
+        ("--seed", "seed", seed),
+    )
+    named = [
+        Override(f"{flag} {value:g}" if isinstance(value, float) else f"{flag} {value}", key, value)
+        for flag, key, value in said
+        if value is not None
+    ]
+    return (*(overrides or ()), *named)
+
+
+def _refuse_lockstep(clock: str | None) -> None:
+    """For what runs on its own, beside somebody else's clock."""
+    if clock not in (None, "realtime"):
+        raise ScenarioError(
+            f"--clock {clock}: what runs on its own keeps the wall clock; it must be realtime"
+        )
+
+
+def _print_version(wanted: bool) -> None:
+    if not wanted:
+        return
+    import platform
+    from importlib.metadata import version
+
+    others = ", ".join(f"{name} {version(name)}" for name in ("eclipse-zenoh", "python-can"))
+    typer.echo(f"fleetloop {version('fleetloop')} (Python {platform.python_version()}, {others})")
+    raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print versions and end."
+        ),
+    ] = False,
+) -> None:
+    pass
 
 
 def main() -> None:

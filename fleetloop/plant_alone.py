@@ -31,6 +31,7 @@ from configs.briefing import plant_brief
 from configs.deployment import PLANT, Deployment, load_deployment
 from configs.errors import ScenarioError
 from configs.loading import load
+from configs.overrides import Override, Overrides
 from configs.scenario import Scenario
 from fleetloop import placing
 from fleetloop.signals import stop_on_signals
@@ -43,6 +44,7 @@ from plant.unit import Unit, diverged_robots, unit_of
 FOREVER_TICKS = 1 << 53
 GO_AHEAD_NS = 1_000_000
 INTERRUPTED = 130
+_WALL_CLOCK = Override("a plant on its own", "clock.mode", "realtime")
 _ROW_NAMES = [signal.name for signal in PLANT_SIGNALS]
 
 
@@ -53,7 +55,7 @@ class Options:
     robots: tuple[str, ...] = ()
     duration_s: float | None = None
     deployment: Path | None = None
-    overrides: tuple[str, ...] = ()
+    overrides: Overrides = ()
     as_json: bool = False
     serve_stdin: bool = False
     join: bool = False
@@ -89,7 +91,7 @@ def run_plant(source: str, options: Options) -> int:
         ScenarioError: scenario, robot or deployment is wrong; nothing was opened.
         InfrastructureError: a bus can't be opened.
     """
-    scenario = load(source, (*options.overrides, 'clock.mode="realtime"'))
+    scenario = load(source, (*options.overrides, _WALL_CLOCK))
     deployment = Deployment()
     if options.deployment is not None:
         deployment = load_deployment(options.deployment, scenario)

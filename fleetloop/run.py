@@ -13,8 +13,9 @@ from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
 from configs.deployment import Deployment, load_deployment
 from configs.errors import InfrastructureError, ScenarioError
 from configs.loading import load, to_toml
+from configs.overrides import Overrides
 from configs.scenario import Scenario
-from fleetloop import placing, run_folder
+from fleetloop import placing, run_folder, wall_time
 from fleetloop.launch import Outcome, ProcessRun
 from fleetloop.lockstep import InProcessRun
 from fleetloop.record.background import BackgroundWriter
@@ -23,7 +24,7 @@ from fleetloop.record.run_record import RunRecord
 from fleetloop.results import print_results
 from fleetloop.signals import stop_on_signals
 from fleetloop.summary import RunStats, check_expectations, summarise, to_json
-from fleetloop.terminal import RunProgress, say
+from fleetloop.terminal import RunProgress, note, say
 
 EXIT_CODES = {"held": 0, "failed": 1, "aborted": 3, "interrupted": 130}
 
@@ -34,7 +35,7 @@ class Options:
 
     in_process: bool = False
     speed: float = 0.0
-    overrides: tuple[str, ...] = ()
+    overrides: Overrides = ()
     out: Path | None = None
     as_json: bool = False
     figures: bool = True
@@ -66,6 +67,8 @@ def run_scenario(source: str, options: Options) -> int:
     check_expectations(scenario.expect)
     deployment = _deployment(scenario, options)
     placing.guests(scenario, deployment)  # what is wrong with credentials comes before the run
+    if long := wall_time.warning(scenario, speed=options.speed, in_process=options.in_process):
+        note(long)
     started = datetime.now(UTC).astimezone()
     folder = run_folder.create(scenario.name, options.out, now=started)
     run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))

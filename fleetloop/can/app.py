@@ -9,6 +9,7 @@ app = typer.Typer(
     help="Look at, feed, join and offer the CAN buses of runs that are up. BUS is a bus (r1), or"
     " run and bus (20261123-101500-paper/r1) if several runs have it.",
     no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode="rich",
 )
 

@@ -4,13 +4,14 @@ import json
 import os
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
 from configs.loading import load, shipped
 
-VERBS = ("run", "check", "report", "export", "diff", "init", "can")
+VERBS = ("run", "agent", "plant", "check", "report", "export", "diff", "init", "can")
 
 
 def fleetloop(*args: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -37,6 +38,49 @@ def test_every_verb_has_help(verb: str, tmp_path: Path) -> None:
     done = fleetloop(verb, "--help", cwd=tmp_path)
     assert done.returncode == 0
     assert "Usage" in done.stdout
+
+
+def test_h_is_help_and_the_version_is_told(tmp_path: Path) -> None:
+    assert fleetloop("run", "-h", cwd=tmp_path).stdout.count("--in-process") == 1
+    done = fleetloop("--version", cwd=tmp_path)
+    assert done.stdout.startswith(f"fleetloop {version('fleetloop')} (Python 3.")
+    assert "--show-completion" in fleetloop("-h", cwd=tmp_path).stdout
+
+
+def test_a_shell_completes_the_names_of_shipped_scenarios(tmp_path: Path) -> None:
+    # What click's completion script for bash asks the program.
+    asked = {
+        "_FLEETLOOP_COMPLETE": "complete_bash",
+        "COMP_WORDS": "fleetloop run paper_",
+        "COMP_CWORD": "2",
+    }
+    script = Path(sys.executable).with_name("fleetloop")
+    done = subprocess.run(
+        [script], env=os.environ | asked, cwd=tmp_path, capture_output=True, text=True, timeout=60
+    )
+    assert done.stdout.split() == [name for name in shipped() if name.startswith("paper_")]
+
+
+def test_check_says_what_is_wrong_in_json_too(tmp_path: Path) -> None:
+    done = fleetloop("check", "paper", "--json", "--set", "control.k1=nan", cwd=tmp_path)
+    assert done.returncode == 2
+    said = json.loads(done.stdout, parse_constant=pytest.fail)
+    assert said["sound"] is False
+    assert said["findings"] == []
+    (problem,) = said["problems"]
+    assert problem["where"] == "--set control.k1=nan"
+    assert problem["right"] == "must be a finite number"
+    done = fleetloop("check", "nowhere.toml", "--json", cwd=tmp_path)
+    assert "no such file" in json.loads(done.stdout)["problems"][0]["right"]
+    listed = json.loads(fleetloop("check", "--json", cwd=tmp_path).stdout)["shipped"]
+    assert [one["name"] for one in listed] == list(shipped())
+
+
+def test_what_runs_on_its_own_refuses_another_clock(tmp_path: Path) -> None:
+    for verb in (["plant", "two_robots"], ["agent", "two_robots", "r1", "--deployment=x"]):
+        done = fleetloop(*verb, "--clock", "lockstep", cwd=tmp_path)
+        assert done.returncode == 2
+        assert done.stderr.startswith("fleetloop: --clock lockstep: ")
 
 
 def test_check_without_a_name_lists_the_shipped_scenarios(tmp_path: Path) -> None:
@@ -75,8 +119,8 @@ def test_a_bad_scenario_ends_with_2_one_line_per_problem_and_starts_nothing(tmp_
     assert done.returncode == 2
     lines = done.stderr.splitlines()
     assert len(lines) == 2
-    assert "control.k1 = -1: must be greater than 0" in done.stderr
-    assert "nonsense = 1: unknown key" in done.stderr
+    assert "--set control.k1=-1: must be greater than 0" in done.stderr
+    assert "--set nonsense=1: unknown key" in done.stderr
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
 
@@ -137,7 +181,7 @@ def test_real_time_needs_processes(tmp_path: Path) -> None:
     assert (done.returncode, "real time has one speed" in done.stderr) == (2, True)
     done = fleetloop("run", "two_robots", "--clock", "sundial", cwd=tmp_path)
     assert done.returncode == 2
-    assert "clock.mode" in done.stderr
+    assert done.stderr == "fleetloop: --clock sundial: must be 'lockstep' or 'realtime'\n"
 
 
 def test_reports_of_nothing_end_with_2(tmp_path: Path) -> None:
