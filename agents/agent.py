@@ -12,7 +12,8 @@
     any        the closing tick, or told to stop                  DONE       torque 0, idle (estop)
 
 A fault is a drive that drops out or falls silent, two senders of a drive's telemetry, a bus that
-can't be sent on, a pose that is too old, sensors that disagree, or a torque that isn't finite. It
+can't be sent on, a pose that is too old, sensors that disagree, or a law, a path or a path variable
+that is no number any more: it diverged, and the last that was one is kept for the neighbours. It
 takes the torque from both wheels in the same tick: the frames that report a change of phase out of
 DRIVING are already torque 0. An obstacle is a fault that is still there, less what a host may clear
 by itself; an error that appears before tick 0 and is a person's to clear isn't cleared again. After
@@ -24,7 +25,7 @@ a message; it never reads a clock.
 """
 
 from collections.abc import Sequence
-from math import hypot, inf
+from math import hypot, inf, isfinite, nan
 
 from agents.coordination import CoordinationState, Coordinator
 from agents.guard import WHOLE, Guard, Passed, Phase
@@ -32,12 +33,16 @@ from agents.laws import LAWS, LawState, Sense
 from agents.limits import EncoderCheck, held_still
 from agents.localisation import Localiser
 from agents.neighbours import Neighbours
-from agents.paths import robot_path
+from agents.paths import Reference, robot_path
 from bridge.frame import Frame
 from bridge.messages import LeaderSpeed, PathState, PoseFix
-from bridge.telemetry import RowBuffer
+from bridge.telemetry import LAW_SIGNALS, RowBuffer
 from configs.brief import AgentBrief
 
+DIVERGED = (ArithmeticError, ValueError)
+"""What arithmetic raises where it ends: overflow, division by zero, the sine of infinity."""
+_NOWHERE = Reference(nan, nan, nan, nan, nan)
+_NO_SIGNALS = (nan,) * len(LAW_SIGNALS)
 POSE_HISTORY_TICKS = 64
 """In real time, a fix may be this old: the odometry since is known."""
 
@@ -65,6 +70,7 @@ class Agent:
         self._coordination = CoordinationState(start.v_hat_0, start.mu_0, start.s_0)
         self.heard_since = self._drives.heard_since
         """Whether both encoder frames came after a bus time [ns]."""
+        self._astray = False  # the path variable would be no number
         self._leader: LeaderSpeed | None = None
         self._start_fix: PoseFix | None = None
         self._fixes: dict[int, PoseFix] = {}  # by tick, until due
@@ -182,8 +188,11 @@ class Agent:
 
     def _fix(self, tick: int, fix: PoseFix, ago: int, carried: Sense) -> Sense:
         """Use a fix of some ticks ago; `carried` is where the ones before have been carried on."""
+        try:
+            sense = self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad, ago)
+        except DIVERGED:  # it is not of this world: like none at all
+            return carried
         self._guard.note_pose(tick - ago)
-        sense = self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad, ago)
         if self._pose_mismatch_m < inf:
             apart_m = hypot(sense.x - carried.x, sense.y - carried.y)
             far = apart_m > self._pose_mismatch_m
@@ -193,14 +202,21 @@ class Agent:
         return sense
 
     def _control(self, tick: int, sense: Sense) -> Sequence[Frame]:
-        """Steps 1 to 11 of the law at one tick."""
+        """Steps 1 to 11 of the law at one tick; where it diverges the robot stops."""
         t_ns = tick * self._schedule.period_ns
         v_hat, mu, s = coordination = self._coordination
         s_dot = mu + v_hat
-        reference = self._path(s)
-        out = self._law(self._law_state, sense, reference, s_dot)
         guard = self._guard
-        frames = guard.act(tick, out[0], out[1])
+        try:
+            reference = self._path(s)
+            out = self._law(self._law_state, sense, reference, s_dot)
+        except DIVERGED as error:
+            reference, signals = _NOWHERE, _NO_SIGNALS
+            trouble = f"the law diverged at s = {s:.4g} m: {error}"
+            frames = guard.act(tick, nan, nan, trouble)
+        else:
+            signals = out[3]
+            frames = guard.act(tick, out[0], out[1])
         passed = guard.passed
         if passed is WHOLE:
             self._law_state = out.state
@@ -210,12 +226,23 @@ class Agent:
             self._law_state = None
         n, sum_s, sum_v = self._neighbours.sums(t_ns)
         v_r = self._leader.at(t_ns) if self._leader is not None else 0.0
-        self._coordination = self._coordinator.advance(coordination, n, sum_s, sum_v, v_r)
+        self._go_on(self._coordinator.advance(coordination, n, sum_s, sum_v, v_r))
         x_d, y_d, theta_d, _, _ = reference
         used = (t_ns * 1e-9, *sense, s, s_dot, mu, v_hat, n, x_d, y_d, theta_d)
         measured = (*self._drives.sent, self.late_s, self.round_trip_s)
-        self._rows.add(tick, (*used, *out[3], *measured))
+        self._rows.add(tick, (*used, *signals, *measured))
         return frames
+
+    def _go_on(self, after: CoordinationState) -> None:
+        """Take the next path variable; one that is no number stays, and the robot stops."""
+        v_hat, mu, s = after
+        sound = isfinite(v_hat + mu + s)
+        if sound:
+            self._coordination = after
+        if sound is self._astray:
+            self._astray = not sound
+            trouble = None if sound else "its path variable diverged: it would not be finite"
+            self._guard.note_doubt("path variable", trouble)
 
     def leave(self) -> Sequence[Frame]:
         """Disarm for good: told to stop before the closing tick."""

@@ -12,6 +12,7 @@ the robot's motion at all.
     v̂ [m/s]   μ [m/s]   s [m]   p [1/s]   q [1/s²]   h_i ∈ {0, 1}
 """
 
+from math import isfinite, nan
 from typing import NamedTuple
 
 from configs.brief import Coordination
@@ -73,9 +74,14 @@ class Coordinator:
 
 
 def matrix_exponential(a: Matrix) -> Matrix:
-    """exp(a) by scaling and squaring of its Taylor series; for small matrices."""
+    """exp(a) by scaling and squaring of its Taylor series; for small matrices.
+
+    Not a number anywhere if an entry of `a` isn't finite.
+    """
     size = len(a)
     norm = max(sum(abs(x) for x in row) for row in a)
+    if not isfinite(norm):
+        return [[nan] * size] * size
     squarings = 0
     while norm > 0.125:
         norm /= 2.0

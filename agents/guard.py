@@ -149,8 +149,11 @@ class Guard:
 
     # --- from tick 0 on --------------------------------------------------------------------------
 
-    def act(self, tick: int, right: float, left: float) -> Sequence[Frame]:
-        """The frames of a tick at which the law asks for these torques [N·m]; see `passed`."""
+    def act(self, tick: int, right: float, left: float, trouble: str = "") -> Sequence[Frame]:
+        """The frames of a tick at which the law asks for these torques [N·m]; see `passed`.
+
+        `trouble` says why it asks for none that are finite, if more is known than that.
+        """
         drives, now_ns = self.drives, self._bus_time_ns(tick)
         self.passed = Passed.NOTHING
         if self.phase is not _DRIVING:
@@ -159,7 +162,7 @@ class Guard:
         if fault is None and (tick > self._pose_until or self._doubts or self.bus_fault):
             fault = self._own_fault(tick)
         if fault is None and not isfinite(right + left):
-            fault = "the law asks for a torque that is not finite"
+            fault = trouble or "the law asks for a torque that is not finite"
         if fault is not None:
             return self._stop(tick, fault)
         self.passed = WHOLE

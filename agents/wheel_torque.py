@@ -35,8 +35,8 @@ class Projection(NamedTuple):
     @classmethod
     def of(cls, sigma_max: float, margin: float) -> "Projection":
         """Bounds from σ_M and k."""
-        span = margin**2 + 2.0 * margin * sigma_max
-        return cls(sigma_max, sigma_max**2, span, sigma_max + margin)
+        span = margin * margin + 2.0 * margin * sigma_max
+        return cls(sigma_max, sigma_max * sigma_max, span, sigma_max + margin)
 
 
 def project(drive: float, estimate: float, bounds: Projection) -> float:

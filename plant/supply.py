@@ -98,7 +98,7 @@ class Supply:
         return max(sqrt(max(charge, 0.0)), self._open_circuit_V)
 
     def _collapse(self, power: float) -> float:
-        most = self._open_circuit_V**2 / (4.0 * self._model.resistance_ohm)
+        most = self._open_circuit_V * self._open_circuit_V / (4.0 * self._model.resistance_ohm)
         fall = most / power
         self.shortage_W = power - most * fall * (2.0 - fall)
         return 0.5 * self._open_circuit_V * fall

@@ -173,7 +173,7 @@ class RealUnit(Unit):
 
     def _shaft_inertia(self, gear_ratio: float) -> float:
         """What a motor turns at least, seen at its shaft [kg·m²]."""
-        return min(self._body.mbar_1, self._body.mbar_2) / gear_ratio**2
+        return min(self._body.mbar_1, self._body.mbar_2) / (gear_ratio * gear_ratio)
 
     def feed(self) -> None:
         """The encoders have told their drives already, at every step."""
