@@ -7,6 +7,8 @@
 Controllers have different phases, so that they don't all wake at one instant. The controller never
 waits for feedback: a *miss* is a tick whose torques had no feedback when the next tick was due. A
 tick that could not be kept is computed late, without sending, so that the path variable keeps time.
+What the bus gathered while the controller waited for its run is dropped, and judged is what comes
+from then on. Its own frames, where the interface hands them back, are nobody else's.
 What an interface's errors do is in `agents.bus_health`.
 """
 
@@ -23,13 +25,17 @@ from agents.bus_health import BusHealth
 from agents.guard import Phase
 from agents.loop import give
 from bridge.barrier import Hellos
-from bridge.can_bus.convert import can_id_of, to_message
+from bridge.can_bus.convert import can_id_of, to_frame, to_message
+from bridge.can_bus.echo import Echoes, hands_back
 from bridge.clock import monotonic_of
 from bridge.frame import ERR, Frame
 from bridge.link import Link, Publisher
 from bridge.messages import Go
 from bridge.process import Stop
 from configs.errors import InfrastructureError
+
+BACKLOG_S = 1.0
+"""Longest time for dropping what the bus gathered; no interface keeps more than this takes."""
 
 
 @dataclass(slots=True)
@@ -59,6 +65,7 @@ class RealtimeLoop:
         self._path = path
         self._hellos = hellos
         self._health = BusHealth(agent.brief.robot, agent.brief.host.bus_error_limit_ns)
+        self._echoes = Echoes() if hands_back(agent.brief.bus) else None
         self._power_up_ns = 0
         self._sent_ns = 0  # when torques were sent that have no feedback yet; 0: there are none
         self.counters = Counters()
@@ -67,6 +74,7 @@ class RealtimeLoop:
         """Say hello until the launcher says when tick 0 is; None when told to stop."""
         deadline = time.monotonic() + self._schedule.start_deadline_s
         while not stop.requested:
+            self._drop_backlog()
             self._hellos.say()
             arrival = self._link.receive(0.02)
             while arrival is not None:
@@ -95,6 +103,7 @@ class RealtimeLoop:
         period_ns, phase_ns = schedule.period_ns, agent.brief.phase_ns
         self._power_up_ns = epoch_ns - schedule.countdown_ticks * period_ns
         tick = -schedule.countdown_ticks
+        self._drop_backlog()
         while agent.phase is not Phase.DONE:
             due_ns = epoch_ns + tick * period_ns + phase_ns
             self._read_until(due_ns)
@@ -118,11 +127,23 @@ class RealtimeLoop:
         with suppress(can.CanError, OSError):
             self._bus.recv(0.0)  # what was gathered goes out
 
+    def _drop_backlog(self) -> None:
+        """Read what came while nobody read: taken for news, it would be a second drive's.
+
+        A bus that fails says so again when it is used.
+        """
+        deadline = time.monotonic() + BACKLOG_S
+        with suppress(can.CanError, OSError):
+            while self._bus.recv(0.0) is not None and time.monotonic() < deadline:
+                pass
+
     def _send(self, frames: Sequence[Frame], tick: int) -> None:
         send, health = self._bus.send, self._health
         try:
             for can_id, data in frames:
                 send(to_message(can_id, data))
+                if self._echoes is not None:
+                    self._echoes.sent(Frame(can_id, data), time.monotonic())
         except (can.CanError, OSError) as error:
             self._bear(error)
             self._agent.guard.note_unsent(tick)
@@ -162,6 +183,8 @@ class RealtimeLoop:
             can_id = can_id_of(message)
             if can_id & ERR:
                 self.counters.error_frames += 1
+                continue
+            if self._echoes is not None and self._echoes.is_echo(to_frame(message), came_ns * 1e-9):
                 continue
             agent.hear(can_id, message.data, bus_ns)
             if self._sent_ns and agent.heard_since(self._sent_ns - self._power_up_ns):

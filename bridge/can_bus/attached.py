@@ -3,7 +3,8 @@
 The emulated drives are one more node on a SocketCAN interface, behind a USB adapter, in a multicast
 group. The bus's own clock counts: frames go out when they are delivered and are heard when they
 came; bus time in `deliver` is not carried. What can't be sent is dropped and counted: the next one
-is newer. Error frames and FD frames are counted and not heard.
+is newer. Error frames and FD frames are counted and not heard; the drives' own frames, where the
+interface hands them back, are neither.
 
     bus state   on                                                  to
     up          a failed send or receive (link down, adapter gone)  failing, an outage
@@ -22,6 +23,7 @@ from collections.abc import Mapping, Sequence
 import can
 
 from bridge.can_bus.convert import to_frame, to_message
+from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.opening import open_bus
 from bridge.frame import Frame
 from configs.brief import Settings
@@ -58,6 +60,7 @@ class _Attachment:
         "bus",
         "counters",
         "deaf",
+        "echoes",
         "failing_since_s",
         "fd",
         "name",
@@ -71,6 +74,7 @@ class _Attachment:
     def __init__(self, name: str, settings: Settings) -> None:
         self.name = name
         self.settings = settings
+        self.echoes = Echoes() if hands_back(settings) else None
         self.bus: can.BusABC | None = None
         self.fd: int | None = None
         self.taken: list[Frame] = []
@@ -107,11 +111,13 @@ class AttachedBuses:
     def deliver(self, name: str, stamp_ns: int, frames: Sequence[Frame]) -> None:  # noqa: ARG002
         """Send frames of the drives, in order; what can't be sent is dropped and counted."""
         attachment = self._all[name]
-        bus = attachment.bus
+        bus, echoes = attachment.bus, attachment.echoes
         for n, (can_id, data) in enumerate(frames):
             try:
                 if bus is not None:
                     bus.send(to_message(can_id, data))
+                    if echoes is not None:
+                        echoes.sent(Frame(can_id, data), time.monotonic())
             except _FAILURES as error:
                 self._note_failure(attachment, error)
                 bus = None
@@ -228,11 +234,14 @@ class AttachedBuses:
             if message.is_fd:
                 counters.garbage += 1
                 continue
+            frame = to_frame(message)
+            if attachment.echoes is not None and attachment.echoes.is_echo(frame, time.monotonic()):
+                continue
             counters.from_clients += 1
             if attachment.failing_since_s is not None:
                 self._note_recovery(attachment)
             if len(taken) < BACKLOG:
-                taken.append(to_frame(message))
+                taken.append(frame)
             else:
                 counters.dropped += 1
 

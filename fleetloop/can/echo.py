@@ -1,8 +1,6 @@
 """Tells what a gateway's far bus hands back from what others say there.
 
-Some interfaces (udp_multicast) return a node's own frames as received ones. For each frame sent,
-one equal frame that comes within `ECHO_S` is dropped; a neighbour's equal frame then stands for
-the echo that comes later, so the count is right whichever comes first.
+Echoes of an interface that hands back what is sent are told by `bridge.can_bus.echo`, and dropped.
 
 A second gateway between the same two buses would send every frame round for ever. It shows in that
 almost all that comes had been sent before, at most `MEMORY_S` ago: `SHARE` of at least `LEAST`
@@ -11,22 +9,13 @@ frames within a second.
 
 from collections import deque
 
+from bridge.can_bus.echo import Echoes
 from bridge.frame import Frame
 
-ECHO_S = 1.0
 MEMORY_S = 10.0
 WINDOW_S = 1.0
 LEAST = 200
 SHARE = 0.8
-
-
-class _Sent:
-    __slots__ = ("last_s", "remembered", "unreturned")
-
-    def __init__(self) -> None:
-        self.last_s = float("-inf")
-        self.remembered = 0
-        self.unreturned = 0
 
 
 class EchoGuard:
@@ -36,8 +25,8 @@ class EchoGuard:
 
     def __init__(self, *, echoes: bool) -> None:
         self.storm = False
-        self._echoes = echoes
-        self._sent: dict[Frame, _Sent] = {}
+        self._echoes = Echoes() if echoes else None
+        self._sent: dict[Frame, int] = {}  # how often within `MEMORY_S`
         self._order: deque[tuple[float, Frame]] = deque()
         self._window_s = float("-inf")
         self._came = 0
@@ -46,25 +35,17 @@ class EchoGuard:
     def sent(self, frame: Frame, now_s: float) -> None:
         """A frame goes out."""
         self._forget(now_s)
-        entry = self._sent.get(frame)
-        if entry is None:
-            entry = self._sent[frame] = _Sent()
-        if now_s - entry.last_s > ECHO_S:
-            entry.unreturned = 0
-        entry.last_s = now_s
-        entry.remembered += 1
-        entry.unreturned += 1
+        self._sent[frame] = self._sent.get(frame, 0) + 1
+        if self._echoes is not None:
+            self._echoes.sent(frame, now_s)
         self._order.append((now_s, frame))
 
     def is_echo(self, frame: Frame, now_s: float) -> bool:
         """Whether a frame that came is one's own, and not to be passed on."""
         self._forget(now_s)
-        entry = self._sent.get(frame)
-        recent = entry is not None and now_s - entry.last_s <= ECHO_S
-        if self._echoes and entry is not None and recent and entry.unreturned:
-            entry.unreturned -= 1
+        if self._echoes is not None and self._echoes.is_echo(frame, now_s):
             return True
-        self._watch(now_s, familiar=entry is not None)
+        self._watch(now_s, familiar=frame in self._sent)
         return False
 
     def _watch(self, now_s: float, *, familiar: bool) -> None:
@@ -79,7 +60,6 @@ class EchoGuard:
         order = self._order
         while order and now_s - order[0][0] > MEMORY_S:
             _, frame = order.popleft()
-            entry = self._sent[frame]
-            entry.remembered -= 1
-            if not entry.remembered:
+            self._sent[frame] -= 1
+            if not self._sent[frame]:
                 del self._sent[frame]

@@ -5,10 +5,8 @@ from typing import Any, Self
 
 import can
 
+from bridge.can_bus.echo import hands_back
 from configs.errors import InfrastructureError, ScenarioError
-
-ECHOING = frozenset({"udp_multicast"})
-"""Interfaces that hand back what is sent to them as if somebody else had sent it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +42,9 @@ class FarBus:
             options[key] = _value(value)
         if bitrate is not None:
             options["bitrate"] = bitrate
-        echoes = interface in ECHOING if echo == "auto" else echo == "yes"
+        echoes = echo == "yes"
+        if echo == "auto":
+            echoes = hands_back((("interface", interface), *options.items()))
         return cls(interface, channel, options, echoes)
 
     @property

@@ -1,4 +1,4 @@
-"""What errors of a CAN interface do in real time: the table in `agents.bus_health`."""
+"""What a CAN interface does to a controller in real time: errors, echoes, what it gathered."""
 
 import errno
 from collections import deque
@@ -87,6 +87,8 @@ class Wire(can.BusABC):
         self.inbox: deque[Frame] = deque()
         self.log: list[tuple[int, Frame]] = []
         self.plan: dict[int, Exception | None] = {}  # by bus time
+        self.others: dict[int, list[Frame]] = {}  # what somebody else sends, by bus time
+        self.echoes = False
 
     @property
     def bus_ns(self) -> int:
@@ -95,6 +97,8 @@ class Wire(can.BusABC):
     def _live(self) -> None:
         for at_ns in [at_ns for at_ns in self.plan if at_ns <= self.bus_ns]:
             self.error, self.told = self.plan.pop(at_ns), False
+        for at_ns in [at_ns for at_ns in self.others if at_ns <= self.bus_ns]:
+            self.inbox.extend(self.others.pop(at_ns))
         for axis in self.bench.axes:
             frames = axis.due(self.bus_ns)
             if self.error is None:
@@ -106,6 +110,8 @@ class Wire(can.BusABC):
             raise self.error
         frame = to_frame(msg)
         self.log.append((self.bus_ns, frame))
+        if self.echoes:
+            self.inbox.append(frame)
         for axis in self.bench.axes:
             axis.hear(frame, self.bus_ns)
 
@@ -136,14 +142,17 @@ class PoseLink:
 class Rig:
     """A controller's loop in real time on a wire, by a clock of its own."""
 
-    def __init__(self, monkeypatch, *overrides: str, duration_s: float = 3.0, ours=False) -> None:
+    def __init__(
+        self, monkeypatch, *overrides: str, duration_s: float = 3.0, ours=False, **changes
+    ) -> None:
         self.clock = Clock()
         monkeypatch.setattr(agents.realtime, "time", self.clock)
         self.bench = Bench("r1", *overrides, f"duration_s={duration_s}")
         if not ours:
             host = self.bench.agent.brief.host
             host = replace(host, bus_error_limit_ns=2 * S)
-            self.bench = Bench("r1", *overrides, f"duration_s={duration_s}", host=host)
+            changes = {"host": host, **changes}
+            self.bench = Bench("r1", *overrides, f"duration_s={duration_s}", **changes)
         schedule = self.bench.schedule
         epoch_ns = self.clock.now_ns + schedule.countdown_ticks * schedule.period_ns
         self.wire = Wire(self.bench, self.clock, epoch_ns - schedule.bus_time_ns(0))
@@ -231,7 +240,36 @@ def test_drives_that_never_speak_end_it_at_tick_0(monkeypatch) -> None:
 
 def test_error_frames_are_counted_and_are_no_drives(monkeypatch) -> None:
     rig = Rig(monkeypatch, *REARM, duration_s=0.2)
-    rig.wire.inbox.extend([Frame(ERR | 0x004, bytes(8)), Frame(ERR | 0x002, bytes(8))])
+    rig.wire.others = {S // 10: [Frame(ERR | 0x004, bytes(8)), Frame(ERR | 0x002, bytes(8))]}
     rig.run()
     assert rig.loop.counters.error_frames == 2
     assert rig.events == []
+
+
+def test_what_the_bus_gathered_while_the_controller_waited_is_no_second_drive(monkeypatch) -> None:
+    rig = Rig(monkeypatch, *REARM, duration_s=1.5)
+    both = [Frame(0x001, bytes(8)), Frame(0x021, bytes(8))]
+    for _ in range(10):
+        rig.wire.inbox += both  # heartbeats, encoder frames
+        rig.wire.inbox += [Frame(0x009, bytes(8)), Frame(0x029, bytes(8))] * 100
+    rig.run()
+    assert rig.events == []
+
+
+@pytest.mark.parametrize(
+    "bus",
+    [
+        (("channel", "239.74.163.6"), ("interface", "udp_multicast")),
+        (("channel", "can0"), ("interface", "socketcan"), ("receive_own_messages", True)),
+    ],
+)
+def test_own_commands_that_an_interface_hands_back_are_not_somebody_elses(monkeypatch, bus) -> None:
+    rig = Rig(monkeypatch, *REARM, duration_s=0.3, bus=bus)
+    rig.wire.echoes = True
+    rig.run()
+    assert rig.bench.agent.guard.notices() == []
+    rig = Rig(monkeypatch, *REARM, duration_s=0.3, bus=bus)
+    rig.wire.echoes = True
+    rig.wire.others = {S // 10: [Frame(0x00E, bytes(4))] * 3}
+    rig.run()
+    assert rig.bench.agent.guard.notices() == ["right drive (node 0): 3 commands of somebody else"]

@@ -193,3 +193,17 @@ def test_both_ends_are_one_for_the_plant(breakable) -> None:
     finally:
         end.close("over")
         places.remove_run_folder(folder)
+
+
+def test_what_the_interface_hands_back_of_the_drives_own_frames_is_not_heard() -> None:
+    settings = (*VIRTUAL, ("receive_own_messages", True))
+    end = AttachedBuses({"r1": settings})
+    try:
+        with can.Bus(interface="virtual", channel="attached") as host:
+            end.deliver("r1", 0, FRAMES)
+            host.send(can.Message(arbitration_id=0x00E, data=bytes(4), is_extended_id=False))
+            end.serve(0.5)
+        assert end.take("r1") == [Frame(0x00E, bytes(4))]
+        assert end.counters("r1").from_clients == 1
+    finally:
+        end.close("")

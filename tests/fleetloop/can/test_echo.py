@@ -4,8 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge.can_bus.echo import ECHO_S
 from bridge.frame import Frame
-from fleetloop.can.echo import ECHO_S, LEAST, EchoGuard
+from fleetloop.can.echo import LEAST, EchoGuard
 
 A, B = Frame(1, b"a"), Frame(2, b"b")
 
