@@ -8,7 +8,8 @@ ruff format --check .
 ruff check .
 mypy
 lint-imports
-pytest "$@"
+# Both take minutes; a hang ends red long before CI's patience does.
+tests/within.sh 40m pytest "$@"
 if [[ $# -eq 0 ]]; then
-    tests/socketcan/in_guest.sh
+    tests/within.sh 30m tests/socketcan/in_guest.sh
 fi

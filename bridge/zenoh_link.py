@@ -3,13 +3,14 @@
 Client mode, multicast and gossip off, so that nobody can talk past the router; shared memory off;
 reliable, blocking, real-time priority: nothing is dropped. Express, nothing waits for a batch.
 Subscribers run on Zenoh's network thread and only queue. Every session is closed in a `with`: one
-that isn't can keep its process from ending.
+that isn't can keep its process from ending. Every session is kept until the process ends (`_keep`).
 
 Each session keeps few threads: a message that wakes one instead of five costs half as much. In a
 router what hears and what says stay apart, so that somebody who doesn't read can't stop the rest.
 """
 
 import contextlib
+import ctypes
 import json
 import os
 import re
@@ -19,7 +20,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
 
 import zenoh
 from zenoh.handlers import Callback, FifoChannel
@@ -40,6 +41,7 @@ _YIELDS = 20
 _PAUSE_S, _LONGEST_PAUSE_S = 50e-6, 2e-3
 _ONE_THREAD = "(app: (worker_threads: 1), net: {0}, acc: {0}, rx: {0}, tx: {1})"
 _APP, _OWN = "(handover: app)", "(worker_threads: 1)"
+_Kept = TypeVar("_Kept")
 
 
 class ZenohLink:
@@ -130,20 +132,22 @@ class ZenohLink:
     """A session of this process did not close in time: the process must end without its leave."""
 
     def close(self) -> None:
-        """Close the session and all that it declared, within `CLOSE_S`.
+        """Close the session and with it all that it declared, within `CLOSE_S`.
 
         A session that still has something for a peer that was killed while it did not read can hang
-        in its close.
+        in its close, and so could dropping what it declared before it is closed.
         """
+        if not self._session.is_closed():
+            closer = threading.Thread(target=self._session.close, daemon=True)
+            closer.start()
+            closer.join(CLOSE_S)
+            if closer.is_alive():
+                ZenohLink.stuck = True
+                _keep(self._declared)
+                _keep(self._tokens)
+                return
         self._declared.clear()
         self._tokens.clear()
-        if self._session.is_closed():
-            return
-        closer = threading.Thread(target=self._session.close, daemon=True)
-        closer.start()
-        closer.join(CLOSE_S)
-        if closer.is_alive():
-            ZenohLink.stuck = True
 
     def __enter__(self) -> Self:
         return self
@@ -352,18 +356,31 @@ def _set(config: zenoh.Config, path: str, value: object) -> None:
 
 
 def _open_bounded(config: zenoh.Config, timeout_s: float, failure: str) -> zenoh.Session:
-    """Open in a thread of its own: a peer that accepts and never answers would hang it."""
+    """Open in a thread of its own: a peer that accepts and never answers would hang it.
+
+    A session that opens after all when nobody waits for it any more is closed.
+    """
     result: list[zenoh.Session | Exception] = []
+    lock = threading.Lock()
+    waiting = True
 
     def open_session() -> None:
         try:
-            result.append(zenoh.open(config))
+            opened: zenoh.Session | Exception = _keep(zenoh.open(config))
         except zenoh.ZError as error:
-            result.append(error)
+            opened = error
+        with lock:
+            if waiting:
+                result.append(opened)
+                return
+        if not isinstance(opened, Exception):
+            opened.close()
 
     opener = threading.Thread(target=open_session, daemon=True)
     opener.start()
     opener.join(timeout_s)
+    with lock:
+        waiting = False
     if not result:
         raise InfrastructureError(failure)
     session = result[0]
@@ -371,6 +388,19 @@ def _open_bounded(config: zenoh.Config, timeout_s: float, failure: str) -> zenoh
         reason = re.sub(r" at /\S+:\d+\.", "", str(session))  # places in Zenoh's own source
         raise InfrastructureError(f"{failure} ({reason})")
     return session
+
+
+def _keep(thing: _Kept) -> _Kept:
+    """Never deallocate it: no list or module may own it, for those end before the process does.
+
+    To deallocate a session, open or closed, is to wait with the GIL held for a task of Zenoh's,
+    and Zenoh's only thread may wait for the GIL at that moment to call another session back: every
+    thread of the process would stop for ever. Whatever drops the last reference does it, a garbage
+    collection of an old exception's traceback in any thread too. A session that was closed costs
+    20 kB.
+    """
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(thing))
+    return thing
 
 
 def _free_port() -> int:

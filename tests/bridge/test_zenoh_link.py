@@ -1,0 +1,75 @@
+"""Sessions: how they are opened, and that whatever becomes of them never stops their process."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+DROPS = """
+import gc, itertools, sys, threading
+from pathlib import Path
+from bridge import access, keys
+from bridge.zenoh_link import open_client, open_router
+from configs.brief import NetworkLink
+
+folder = Path(sys.argv[1])
+plan = access.plan("test", ("r1",), {"r1": ()}, ("r1",))
+passing = access.plan("other", ("r1",), {"r1": ()}, ("r1",))
+heard = itertools.count()
+over = threading.Event()
+
+def fails():
+    with open_router(None, passing, folder) as link:
+        link.subscribe(keys.report("other", "plant"), "report")
+        raise RuntimeError("with the session in its traceback")
+
+def opens_and_closes():
+    try:
+        fails()
+    except RuntimeError as error:
+        error.itself = error  # only the garbage collector frees it, in whatever thread
+
+with open_router(None, plan, folder) as lasting:
+    lasting.each(keys.path("test", "r1"), lambda _: next(heard))
+    user = access.agent_user("r1")
+    login = NetworkLink("test", lasting.endpoint, user, plan.passwords[user])
+    with open_client(login, 10.0) as client:
+        mouth = client.publisher(keys.path("test", "r1"))
+        def say():
+            while not over.is_set():
+                mouth.put(b"x")
+        speaker = threading.Thread(target=say)
+        speaker.start()
+        try:
+            for n in range(30):
+                with open_router(None, passing, folder):
+                    pass
+                opens_and_closes()
+                collector = threading.Thread(target=gc.collect)
+                collector.start()
+                collector.join()
+        finally:
+            over.set()
+            speaker.join()
+print("heard" if next(heard) else "silence")
+"""
+
+
+def ends(program: str, *args: str, within_s: float = 60.0) -> str:
+    """What a program of its own prints until it ends well; the bound is not one of its own."""
+    done = subprocess.run(
+        [sys.executable, "-c", program, *args],
+        timeout=within_s,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.system
+def test_sixty_routers_come_and_go_while_another_session_calls_python(tmp_path: Path) -> None:
+    assert ends(DROPS, str(tmp_path)) == "heard\n"
