@@ -6,19 +6,15 @@ carries; to the run it is as real as any.
 
 import secrets
 import threading
-import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from snippets import snippets
 from system.processes import Run
 from system.test_elsewhere import free_port, multicast_goes_nowhere
 
-from bridge import keys
-from bridge.clock import monotonic_of
-from bridge.messages import Go, PoseFix
-from bridge.zenoh_link import open_client
-from configs.brief import NetworkLink
 from fleetloop.record.reader import Record
 from fleetloop.testing import EmulatedPlant
 
@@ -31,29 +27,25 @@ PERIOD_NS = 10_000_000
 
 
 class Localisation:
-    """What a motion-capture system's program does: says a robot's pose until told to stop."""
+    """A motion-capture system's program, as the page prints it, until told to stop."""
 
-    def __init__(self, network: NetworkLink, robot: str, plant: EmulatedPlant) -> None:
+    def __init__(self, endpoint: str, password: str, plant: EmulatedPlant) -> None:
         self._stop = threading.Event()
-        self._args = network, robot, plant
-        self._thread = threading.Thread(target=self._run)
+        self._plant = plant
+        (printed,) = (s.text for s in snippets("python") if "motion_capture()" in s.text)
+        names = {
+            "endpoint": endpoint,
+            "password": password,
+            "period_ns": PERIOD_NS,
+            "motion_capture": self._poses,
+        }
+        self._thread = threading.Thread(target=exec, args=(printed.replace('"r1"', '"r2"'), names))
         self._thread.start()
 
-    def _run(self) -> None:
-        network, robot, plant = self._args
-        with open_client(network, 20.0) as link:
-            link.subscribe(keys.go(network.run), "go")
-            pose = link.publisher(keys.pose(network.run, robot))
-            tick, epoch_ns = -1, None
-            while not self._stop.wait(0.01):
-                while (arrival := link.receive(0.0)) is not None:
-                    go = Go.decode(arrival.payload)
-                    epoch_ns = monotonic_of(go.epoch_ns) if go is not None else epoch_ns
-                state = plant.poses()[robot]
-                if epoch_ns is not None:
-                    tick = (time.monotonic_ns() - epoch_ns) // PERIOD_NS
-                fix = PoseFix(tick, tick * PERIOD_NS, state.x_m, state.y_m, state.theta_rad)
-                pose.put(fix.encode())
+    def _poses(self) -> Iterator[tuple[float, float, float]]:
+        while not self._stop.wait(0.01):
+            state = self._plant.poses()["r2"]
+            yield state.x_m, state.y_m, state.theta_rad
 
     def stop(self) -> None:
         self._stop.set()
@@ -73,8 +65,7 @@ def test_a_real_robot_and_an_emulated_one_keep_their_formation(tmp_path: Path) -
     )
     with EmulatedPlant("two_robots_100hz", robots=["r2"], deployment=emulated) as hardware:
         run = Run(tmp_path / "run", "two_robots_100hz", "--deployment", str(where))
-        network = NetworkLink("lab", f"tcp/127.0.0.1:{port}", "localisation", password)
-        localisation = Localisation(network, "r2", hardware)
+        localisation = Localisation(f"tcp/127.0.0.1:{port}", password, hardware)
         try:
             status, out = run.end()
         finally:

@@ -1,0 +1,51 @@
+"""Every scenario, deployment and command in README and docs is one that Fleetloop takes."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import click
+import pytest
+import typer
+from snippets import Snippet, commands, snippets
+
+from configs.deployment import check_deployment
+from configs.loading import load, loads
+from fleetloop.cli import app
+
+HEAD = 'schema = 1\nname = "shown"\n'
+FLEET = "".join(
+    f'[[robot]]\nname = "r{n}"\npose = {{ x_m = 0.0, y_m = {n}.0 }}\n' for n in (1, 2, 3)
+)
+PLACES = {"roles", "network", "robot"}
+
+
+@pytest.mark.parametrize("snippet", snippets("toml"), ids=lambda s: s.where)
+def test_files_that_are_shown_are_taken(snippet: Snippet, tmp_path: Path) -> None:
+    data = tomllib.loads(snippet.text)
+    if data.keys() & PLACES:
+        for name in re.findall(r'"([\w./-]+\.(?:pem|key))"', snippet.text):
+            (tmp_path / name).touch()
+        check_deployment("shown", data, load("two_robots_100hz"), tmp_path)
+    else:
+        loads("shown", HEAD + snippet.text + FLEET)
+
+
+def test_commands_that_are_shown_are_understood() -> None:
+    root = typer.main.get_command(app)
+    seen = 0
+    for where, words in commands():
+        command: click.Command = root
+        name, *rest = words
+        while isinstance(command, click.Group) and rest:
+            known = command.commands
+            assert rest[0] in known, f"{where}: {' '.join(words)}: no such verb"
+            command, name, rest = known[rest[0]], rest[0], rest[1:]
+        # Verbs named in passing come without their arguments.
+        if rest:
+            try:
+                command.make_context(name, list(rest))
+            except click.UsageError as error:
+                pytest.fail(f"{where}: {' '.join(words)}: {error.format_message()}")
+        seen += 1
+    assert seen > 30
