@@ -58,6 +58,7 @@ class Outcome:
 
     ended: str = "completed"  # "completed", "interrupted", "aborted"
     reason: str = ""
+    timed: bool = True  # the reason says when
     ticks: int = 0
     wall_s: float = 0.0
     startup_s: float = 0.0
@@ -255,7 +256,7 @@ class ProcessRun:
             child = self._child(name)
             tick, when = self._seen.get(name, (0, now))
             if child is not None and now - when > limit_s and not child.ended():
-                text = f"{name}: no progress for {now - when:.1f} s after tick {tick}"
+                text = f"{name}: no progress for {now - when:.1f} s after {max(tick, 0)} ticks"
                 return Failure(GAVE_UP, name, text)
         return None
 
@@ -290,8 +291,7 @@ class ProcessRun:
             outcome.ended, outcome.reason = "interrupted", stop.reason
         elif failure is not None:
             outcome.ended, outcome.reason = "aborted", failure.text
-            if failure.unexpected:
-                outcome.reason += f", at tick {outcome.ticks} or soon after"
+            outcome.timed = not failure.unexpected
         recorder = self._children[-1]
         actors = self._children[:-1]
         if failure is not None and failure.name == recorder.name:

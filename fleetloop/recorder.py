@@ -106,7 +106,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         values = {"undecodable": recorder.undecodable, "cpu_ns": cpu_ns() - began_ns}
         report.put(Report(values).encode())
         stop.await_release()
-    return f"{brief.path} is complete up to tick {recorder.ticks}"
+    return f"{brief.path} has {recorder.ticks} ticks"
 
 
 if __name__ == "__main__":

@@ -165,6 +165,7 @@ def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
         mode="realtime" if realtime else "lockstep",
         ended=outcome.ended,
         reason=outcome.reason,
+        timed=outcome.timed,
         wall_s=outcome.wall_s,
         startup_s=outcome.startup_s,
         teardown_s=outcome.teardown_s,

@@ -32,6 +32,7 @@ class RunStats:
     started: str = ""  # wall clock, ISO 8601
     ended: str = "completed"  # "completed", "interrupted", "aborted"
     reason: str = ""
+    timed: bool = True  # the reason says when
     wall_s: float = 0.0
     startup_s: float = 0.0
     teardown_s: float = 0.0
@@ -76,7 +77,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
     simulated_s = ticks * scenario.clock.control_period_s
     return {
         "verdict": verdict,
-        "reason": stats.reason,
+        "reason": stats.reason if stats.timed else f"{stats.reason}, after {ticks} ticks",
         "scenario": scenario.name,
         "mode": stats.mode,
         "started": stats.started,

@@ -59,7 +59,7 @@ def run(brief: PlantBrief, stop: Stop) -> str:
     finally:
         # The launcher does it too, unless it was killed.
         places.remove_run_folder(Path(brief.runtime_folder))
-    return f"ended after tick {counters.ticks}"
+    return f"ended after {counters.ticks} ticks"
 
 
 def join(hub: Hub, attached: Sequence[tuple[str, Settings]]) -> DriveEnd:

@@ -211,7 +211,7 @@ def test_the_plant_may_be_elsewhere_too(tmp_path) -> None:
             plant.kill()
     assert status == 0, out
     assert plant.returncode == 0, said
-    assert "ended after tick 200" in said
+    assert "ended after 200 ticks" in said
     assert run.summary()["ticks"] == 200
 
 
