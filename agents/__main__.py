@@ -137,6 +137,7 @@ class _Wired(NamedTuple):
                 "notices": "\n".join(self.agent.guard.notices()),
                 "refused": ", ".join(refused),
                 "failure": failure,
+                "early": "" if self.agent.closed else early,
                 "cpu_ns": cpu_ns() - began_ns,
             }
             self.report.put(Report(values).encode())

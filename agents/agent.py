@@ -36,8 +36,9 @@ from agents.neighbours import Neighbours
 from agents.paths import Reference, robot_path
 from bridge.frame import Frame
 from bridge.messages import LeaderSpeed, PathState, PoseFix
-from bridge.telemetry import LAW_SIGNALS, RowBuffer
+from bridge.telemetry import RowBuffer
 from configs.brief import AgentBrief
+from configs.signals import LAW_SIGNALS
 
 DIVERGED = (ArithmeticError, ValueError)
 """What arithmetic raises where it ends: overflow, division by zero, the sine of infinity."""
@@ -80,6 +81,8 @@ class Agent:
         self._encoders = EncoderCheck(brief.host.encoder_mismatch_limit_rad, self._h)
         fused = brief.localisation == "fused"
         self._pose_mismatch_m = brief.host.pose_mismatch_limit_m if fused else inf
+        self.closed = False
+        """Whether the closing tick has come."""
         self.late_s = self.round_trip_s = 0.0
         """What the loop measured of the clock at this tick, for the record."""
         self.hear = self._drives.hear
@@ -161,6 +164,7 @@ class Agent:
         elif self._schedule.owes(tick):
             sense = self._take_due(tick, sense)
         if tick >= self._schedule.ticks:
+            self.closed = True
             return self._guard.leave()
         if not self._guard.begun:
             self._guard.begin(tick)

@@ -44,7 +44,7 @@ class LawOutput(NamedTuple):
     tau_right: float  # [N·m]
     tau_left: float  # [N·m]
     state: LawState  # at the next tick
-    signals: tuple[float, ...]  # those of `bridge.telemetry.LAW_SIGNALS`, in that order
+    signals: tuple[float, ...]  # those of `configs.signals.LAW_SIGNALS`, in that order
 
 
 Law = Callable[[LawState | None, Sense, Reference, float], LawOutput]

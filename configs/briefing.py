@@ -57,7 +57,7 @@ def schedule(scenario: Scenario, speed: float = 0.0, *, profile: bool = False) -
     delay_s = scenario.localisation.delay_s
     return Schedule(
         period_ns=round(h * 1e9),
-        ticks=round(scenario.duration_s / h),
+        ticks=round(scenario.ends_at_s / h),
         countdown_ticks=round(clock.countdown_s / h),
         share_every=round(clock.share_period_s / h),
         localise_every=round(clock.localisation_period_s / h),

@@ -1,10 +1,14 @@
 """What relates the sections of a scenario to each other; all problems at once, none raised."""
 
+import difflib
 import itertools
 from collections.abc import Iterator
+from math import ceil, floor, inf
 from typing import NamedTuple
 
 from configs.scenario import ETSRO, Scenario
+from configs.sections import Expect
+from configs.signals import expectable
 from configs.topology import parse_edge
 
 MAX_NODE = 62
@@ -70,6 +74,8 @@ def _periods(scenario: Scenario) -> Iterator[Problem]:
         "clock.countdown_s": clock.countdown_s,
         "duration_s": scenario.duration_s,
     }
+    if scenario.until_s is not None:
+        multiples["until_s"] = scenario.until_s
     if scenario.localisation.delay_s is not None:
         multiples["localisation.delay_s"] = scenario.localisation.delay_s
     for key, value in multiples.items():
@@ -179,15 +185,50 @@ def _host(scenario: Scenario) -> Iterator[Problem]:
 
 
 def _expects(scenario: Scenario) -> Iterator[Problem]:
+    known = expectable()
     for n, expect in enumerate(scenario.expect):
         where = f"expect.{n}"
+        if expect.signal not in known:
+            close = difflib.get_close_matches(expect.signal, known, 1, cutoff=0.5)
+            hint = f"; did you mean {close[0]}?" if close else ""
+            right = f"no such signal{hint} (known: {', '.join(known)})"
+            yield Problem(f"{where}.signal", expect.signal, right)
         for robot in expect.robots or ():
             if robot not in scenario.names:
                 yield Problem(f"{where}.robots", robot, _known(scenario))
-        if expect.max_abs is None and expect.min is None and expect.max is None:
-            yield Problem(where, expect.signal, "give max_abs, min or max")
-        if expect.to_s is not None and expect.from_s >= expect.to_s:
-            yield Problem(f"{where}.from_s", expect.from_s, f"must be below to_s = {expect.to_s:g}")
+        yield from _bounds(where, expect)
+        yield from _window(where, expect, scenario)
+
+
+def _bounds(where: str, expect: Expect) -> Iterator[Problem]:
+    if expect.max_abs is None and expect.min is None and expect.max is None:
+        yield Problem(where, expect.signal, "give max_abs, min or max")
+    most = inf if expect.max is None else expect.max
+    least = -inf if expect.min is None else expect.min
+    widest = inf if expect.max_abs is None else expect.max_abs
+    if least > most:
+        yield Problem(f"{where}.min", least, f"must be at most max = {most:g}: nothing is both")
+    elif least > widest:
+        yield Problem(f"{where}.min", least, f"must be at most max_abs = {widest:g}")
+    elif most < -widest:
+        yield Problem(f"{where}.max", most, f"must be at least -max_abs = {-widest:g}")
+
+
+def _window(where: str, expect: Expect, scenario: Scenario) -> Iterator[Problem]:
+    """A window has a tick in it, and the scenario reaches it; a run may end before, on demand."""
+    end_s, period_s = max(scenario.duration_s, scenario.ends_at_s), scenario.clock.control_period_s
+    last_s = end_s - period_s if expect.to_s is None else expect.to_s
+    if expect.to_s is not None and expect.from_s >= expect.to_s:
+        yield Problem(f"{where}.from_s", expect.from_s, f"must be below to_s = {expect.to_s:g}")
+    elif expect.from_s >= end_s:
+        right = f"the run ends before: must be below duration_s = {end_s:g}"
+        yield Problem(f"{where}.from_s", expect.from_s, right)
+    elif ceil(expect.from_s / period_s - 1e-6) > floor(last_s / period_s + 1e-6):
+        right = f"no tick from there to {last_s:g} s: they are {period_s:g} s apart"
+        yield Problem(f"{where}.from_s", expect.from_s, right)
+    if expect.to_s is not None and expect.to_s > end_s:
+        right = f"the run ends before: at most duration_s = {end_s:g}, or leave it out: to the end"
+        yield Problem(f"{where}.to_s", expect.to_s, right)
 
 
 def _edges(scenario: Scenario) -> Iterator[Problem]:

@@ -45,6 +45,11 @@ class Scenario(Section):
     name: Name
     description: str = ""
     duration_s: Positive = 30.0
+    until_s: Positive | None = Field(
+        None,
+        description="end this run here, not at duration_s, as --duration does: what is expected"
+        " later stays unchecked",
+    )
     seed: Annotated[int, Field(ge=0)] = 1
     clock: Clock = Clock()
     path: PathShape = Cosine(kind="cosine", start_m=(-3.5, 0.0))
@@ -65,6 +70,11 @@ class Scenario(Section):
     robot_types: dict[Name, Body] = Field(default_factory=dict)
     robot: Annotated[tuple[Robot, ...], Field(min_length=1, max_length=256, strict=False)]
     expect: Annotated[tuple[Expect, ...], Field(strict=False)] = ()
+
+    @property
+    def ends_at_s(self) -> float:
+        """Scenario time at which the run ends."""
+        return self.duration_s if self.until_s is None else self.until_s
 
     @property
     def names(self) -> tuple[str, ...]:

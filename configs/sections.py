@@ -378,7 +378,7 @@ class Network(Section):
 
 
 class Expect(Section):
-    """What has to hold, or the run ends with exit status 1."""
+    """What has to hold at every tick of a window, or the run ends with exit status 1."""
 
     signal: str = Field(description="a recorded signal, or s_spread")
     robots: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(

@@ -16,7 +16,6 @@ from configs.overrides import Overrides
 from configs.scenario import Scenario
 from configs.stability import Finding, findings
 from fleetloop.bus_load import bus_findings
-from fleetloop.summary import check_expectations
 from fleetloop.terminal import say
 
 FINE, UNSOUND, WRONG = 0, 1, 2
@@ -62,7 +61,6 @@ def _find(
     source: str, overrides: Overrides, deployment: Path | None
 ) -> tuple[Scenario, list[Finding]]:
     scenario = load(source, overrides)
-    check_expectations(scenario.expect)
     found = [*findings(scenario), *bus_findings(scenario, robot_briefs(scenario))]
     if deployment is not None:
         found += place_findings(scenario, load_deployment(deployment, scenario))

@@ -1,7 +1,7 @@
 """The command line: `fleetloop VERB ...`. Arguments only; each verb's work is in its own module.
 
-Exit status: 0 held, 1 an expectation failed or two runs differ, 2 usage or scenario,
-3 infrastructure (named), 130 interrupted.
+Exit status: 0 held, 1 an expectation failed or was not reached or two runs differ, 2 usage or
+scenario, 3 infrastructure (named), 130 interrupted.
 """
 
 import os
@@ -121,6 +121,14 @@ def run(
     figures: Annotated[
         bool, typer.Option("--report/--no-report", help="Make report.html and the figures.")
     ] = True,
+    allow_unchecked: Annotated[
+        bool,
+        typer.Option(
+            "--allow-unchecked",
+            help="Exit with 0 also if expectations were not reached, as with a --duration that ends"
+            " before their time.",
+        ),
+    ] = False,
 ) -> None:
     """Run a scenario, record everything, check its expectations, print and save the results."""
     from fleetloop.run import Options, run_scenario
@@ -134,6 +142,7 @@ def run(
         figures=figures,
         profile=profile,
         deployment=deployment,
+        allow_unchecked=allow_unchecked,
     )
     raise typer.Exit(run_scenario(scenario, options))
 
@@ -236,10 +245,9 @@ def check(
 def report(run: RunArg) -> None:
     """Make report.html and the figures of a run again from its record."""
     from fleetloop.report import write_report
-    from fleetloop.terminal import say
+    from fleetloop.results import print_report
 
-    page = write_report(run)
-    say(f"report   {page}\nfigures  {page.parent / 'figures'}")
+    print_report(write_report(run))
 
 
 @app.command()
@@ -317,7 +325,7 @@ def _changes(
 
     said = (
         ("--clock", "clock.mode", clock),
-        ("--duration", "duration_s", duration),
+        ("--duration", "until_s", duration),
         ("--seed", "seed", seed),
     )
     named = [

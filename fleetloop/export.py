@@ -2,7 +2,7 @@
 
     t_s      scenario time of the tick [s]
     robot    its name
-    ...      signals by their names in the record (`bridge.telemetry`), units in the names
+    ...      signals by their names in the record (`configs.signals`), units in the names
 
 Every robot has all its own rows, however early another ended; rows go by tick, then robot. Pose and
 speeds are the plant's truth (heading not wrapped); the rest is what the controller used and
@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bridge.telemetry import AGENT_SIGNALS, PLANT_SIGNALS
 from configs.errors import InfrastructureError, ScenarioError
+from configs.signals import AGENT_SIGNALS, PLANT_SIGNALS
 from fleetloop.record.reader import Record
 from fleetloop.run_folder import record_of
 

@@ -25,7 +25,7 @@ from bridge.can_bus.ends import DriveEnd
 from bridge.can_bus.hub import Hub
 from bridge.messages import Progress
 from bridge.process import Stop, go_realtime, name_process, settled_memory
-from bridge.telemetry import PLANT_ROW, PLANT_SIGNALS, RowBuffer
+from bridge.telemetry import PLANT_ROW, RowBuffer
 from configs.brief import NetworkLink, PlantBrief, Settings
 from configs.briefing import plant_brief
 from configs.deployment import PLANT, Deployment, load_deployment
@@ -33,6 +33,7 @@ from configs.errors import ScenarioError
 from configs.loading import load
 from configs.overrides import Override, Overrides
 from configs.scenario import Scenario
+from configs.signals import PLANT_SIGNALS
 from fleetloop import placing
 from fleetloop.signals import stop_on_signals
 from fleetloop.terminal import note, say

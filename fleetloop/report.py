@@ -86,7 +86,7 @@ def _page(
         subtitle=escape(scenario.description),
         verdict=escape(summary["verdict"]),
         reason=escape(summary["reason"]),
-        robots=_table(robot_header(), robot_rows(summary)),
+        robots=_table(robot_header(summary), robot_rows(summary)),
         spread=escape(spread_line(summary)),
         expectations=_table(
             ("", "expectation"), ((mark(item), claim(item)) for item in summary["expectations"])

@@ -11,7 +11,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from bridge.profile import PARTS
-from fleetloop.summary import ERRORS, Summary
+from fleetloop.summary import ERRORS, FINAL_S, Summary
+from fleetloop.terminal import say
 
 _MARKS = {True: "held", False: "FAILED", None: "not reached"}
 HOLDS_PERCENT = 2.0
@@ -29,7 +30,7 @@ def print_results(summary: Summary, folder: Path) -> None:
     if summary["robots"]:
         title = f"{summary['scenario']}: path following, {summary['mode']}"
         table = Table(title=title, box=box.SIMPLE_HEAD, pad_edge=False)
-        first, *others = robot_header(break_lines=True)
+        first, *others = robot_header(summary, break_lines=True)
         table.add_column(first, no_wrap=True)
         for header in others:
             table.add_column(escape(header), justify="right", no_wrap=True)
@@ -57,9 +58,11 @@ def print_results(summary: Summary, folder: Path) -> None:
     reason = f": {summary['reason']}" if summary["reason"] else ""
     line(f"verdict  {summary['verdict']}{reason}", "bold")
     line(f"run      {folder}")
-    if (folder / "report.html").exists():
-        line(f"report   {folder / 'report.html'}")
-        line(f"figures  {folder / 'figures'}")
+
+
+def print_report(page: Path) -> None:
+    """Say where the page of a run is, and its figures."""
+    say(f"report   {page}\nfigures  {page.parent / 'figures'}")
 
 
 def _profile(profile: dict[str, dict[str, float]]) -> Table:
@@ -79,11 +82,12 @@ def _profile(profile: dict[str, dict[str, float]]) -> Table:
     return table
 
 
-def robot_header(*, break_lines: bool = False) -> list[str]:
+def robot_header(summary: Summary, *, break_lines: bool = False) -> list[str]:
     """Headers of `robot_rows`."""
     gap = "\n" if break_lines else " "
     settled = [f"{_SYMBOLS[name][0]}{gap}settled" for name in ERRORS]
-    final = [f"{_SYMBOLS[name][0]} [{_SYMBOLS[name][1]}]{gap}final" for name in ERRORS]
+    when = f"last {_final_s(summary):g} s"
+    final = [f"{_SYMBOLS[name][0]} [{_SYMBOLS[name][1]}]{gap}{when}" for name in ERRORS]
     return ["robot", *settled, *final, f"τ [N·m]{gap}peak"]
 
 
@@ -102,8 +106,13 @@ def spread_line(summary: Summary) -> str:
         return ""
     return (
         f"spread of s: peak {spread['peak']:.4f} m, settled {_time(spread['settle_s'])},"
-        f" final {spread['final']:.2e} m"
+        f" at most {spread['final']:.2e} m in the last {_final_s(summary):g} s"
     )
+
+
+def _final_s(summary: Summary) -> float:
+    """How much of a run, at its end, its final values are of [s]."""
+    return min(FINAL_S, round(float(summary["simulated_s"]), 3))
 
 
 def trouble_lines(summary: Summary) -> Iterator[str]:
@@ -147,9 +156,11 @@ def claim(expect: dict[str, Any]) -> str:
     bounds = [f"{k} {expect[k]:g}" for k in ("max_abs", "min", "max") if k in expect]
     until = f" to {expect['to_s']:g} s" if "to_s" in expect else ""
     found = expect["found"]
-    shown = "nothing: the run ended before"
+    shown = "nothing"
     if found is not None:
         shown = ", ".join(f"{k} {found[k]:.3g}" for k in ("max_abs", "min", "max") if k in expect)
+    if expect["held"] is None:
+        shown += f"; seen to {expect['seen_to_s']:.6g} s only"
     robots = f" of {', '.join(expect['robots'])}" if "robots" in expect else ""
     return (
         f"{expect['signal']}{robots} from {expect['from_s']:g} s{until}:"

@@ -16,17 +16,18 @@ from configs.loading import load, to_toml
 from configs.overrides import Overrides
 from configs.scenario import Scenario
 from fleetloop import placing, run_folder, wall_time
+from fleetloop.expectations import out_of_reach
 from fleetloop.launch import Outcome, ProcessRun
 from fleetloop.lockstep import InProcessRun
 from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.reader import Record
 from fleetloop.record.run_record import RunRecord
-from fleetloop.results import print_results
+from fleetloop.results import print_report, print_results
 from fleetloop.signals import stop_on_signals
-from fleetloop.summary import RunStats, check_expectations, summarise, to_json
+from fleetloop.summary import RunStats, Summary, summarise, to_json
 from fleetloop.terminal import RunProgress, note, say
 
-EXIT_CODES = {"held": 0, "failed": 1, "aborted": 3, "interrupted": 130}
+EXIT_CODES = {"held": 0, "failed": 1, "not checked": 1, "aborted": 3, "interrupted": 130}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +42,7 @@ class Options:
     figures: bool = True
     profile: bool = False
     deployment: Path | None = None
+    allow_unchecked: bool = False
 
 
 def run_scenario(source: str, options: Options) -> int:
@@ -64,17 +66,18 @@ def run_scenario(source: str, options: Options) -> int:
         raise ScenarioError(
             f"--deployment {options.deployment}: --in-process has no buses and no network to place"
         )
-    check_expectations(scenario.expect)
     deployment = _deployment(scenario, options)
     placing.guests(scenario, deployment)  # what is wrong with credentials comes before the run
     if long := wall_time.warning(scenario, speed=options.speed, in_process=options.in_process):
         note(long)
+    for line in out_of_reach(scenario):
+        note(f"{scenario.name}: {line}")
     started = datetime.now(UTC).astimezone()
     folder = run_folder.create(scenario.name, options.out, now=started)
     run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
     with (
         stop_on_signals() as stop,
-        RunProgress(scenario.name, scenario.duration_s, quiet=options.as_json) as progress,
+        RunProgress(scenario.name, scenario.ends_at_s, quiet=options.as_json) as progress,
     ):
 
         def on_progress(state: Progress) -> None:
@@ -197,6 +200,8 @@ def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
                 bus: int(count) for bus, count in _under("frames.", report).items()
             }
             stats.bus_troubles = _under("trouble.", report)
+        if early := report.values.get("early"):
+            stats.left_early[process.removeprefix("agent/")] = str(early)
         if stopped := report.values.get("stopped"):
             stats.stopped_robots[process.removeprefix("agent/")] = str(stopped)
         if notices := report.values.get("notices"):
@@ -224,10 +229,6 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options)
     unsaved: InfrastructureError | None = None
     try:
         run_folder.write(folder / run_folder.SUMMARY, to_json(summary))
-        if options.figures and summary["ticks"]:
-            from fleetloop.report import write_report
-
-            write_report(folder)
     except InfrastructureError as error:
         unsaved = error  # results first
     if options.as_json:
@@ -236,4 +237,17 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options)
         print_results(summary, folder)
     if unsaved is not None:
         raise unsaved
+    if options.figures and summary["ticks"]:
+        from fleetloop.report import write_report
+
+        page = write_report(folder)
+        if not options.as_json:
+            print_report(page)
+    return exit_status(summary, allow_unchecked=options.allow_unchecked)
+
+
+def exit_status(summary: Summary, *, allow_unchecked: bool) -> int:
+    """The exit status of a run; what nobody expected can't be missed."""
+    if summary["verdict"] == "not checked" and not summary["cut_short"]:
+        return 0 if allow_unchecked or not summary["expectations"] else EXIT_CODES["not checked"]
     return EXIT_CODES[summary["verdict"]]

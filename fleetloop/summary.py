@@ -2,24 +2,23 @@
 
 import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-from bridge.telemetry import AGENT_SIGNALS, PLANT_SIGNALS
-from configs.errors import ScenarioError
+from configs.briefing import leader_brief
 from configs.scenario import Scenario
-from configs.sections import Expect
+from fleetloop import expectations
+from fleetloop.expectations import judge, spread, why_not_checked
 from fleetloop.record.reader import Record
 
 SETTLE_BAND = 0.05
 """An error has settled when it stays within this: [m], [rad]."""
 FINAL_S = 5.0
-"""Final values are taken over this last part of a run."""
-SPREAD = "s_spread"
+"""What is called final is the greatest of this last part of a robot's rows, or of all of them."""
 ERRORS = ("x_e_m", "y_e_m", "theta_e_rad")
 _PACKAGES = ("fleetloop", "eclipse-zenoh", "python-can", "numpy", "msgpack", "mcap", "pydantic")
 
@@ -42,6 +41,7 @@ class RunStats:
     stopped_robots: dict[str, str] = field(default_factory=dict)
     notices: dict[str, list[str]] = field(default_factory=dict)
     bus_troubles: dict[str, str] = field(default_factory=dict)
+    left_early: dict[str, str] = field(default_factory=dict)  # robots told to stop, by whom
     cpu_s: dict[str, float] = field(default_factory=dict)
     realtime: dict[str, dict[str, int]] = field(default_factory=dict)
     refused: set[str] = field(default_factory=set)
@@ -52,36 +52,30 @@ Summary = dict[str, Any]
 """summary.json as it is written."""
 
 
-def check_expectations(expectations: Sequence[Expect]) -> None:
-    """Refuse a signal that isn't recorded.
-
-    Raises:
-        ScenarioError: naming the signals that are.
-    """
-    known = sorted({s.name for s in (*PLANT_SIGNALS, *AGENT_SIGNALS)} | {SPREAD})
-    for n, expect in enumerate(expectations):
-        if expect.signal not in known:
-            raise ScenarioError(
-                f"expect.{n}.signal = {expect.signal!r}: no such signal; known: {', '.join(known)}"
-            )
-
-
 def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
     """The summary of a run, complete or not; of every robot all its own rows."""
     controllers = {robot: rows for robot, rows in record.controller.items() if len(rows)}
     ticks = max((len(rows) for rows in controllers.values()), default=0)
-    expectations = [_expectation(expect, record) for expect in scenario.expect]
-    held = all(item["held"] is not False for item in expectations) and not stats.stopped_robots
-    verdict = stats.ended if stats.ended != "completed" else "held" if held else "failed"
-    robots = {robot: _robot(rows) for robot, rows in controllers.items()}
-    simulated_s = ticks * scenario.clock.control_period_s
+    expected = [judge(expect, record, scenario) for expect in scenario.expect]
+    cut_short = _cut_short(record, scenario, stats)
+    verdict = stats.ended
+    reason = stats.reason if stats.timed else f"{stats.reason}, after {ticks} ticks"
+    if verdict == "completed":
+        stopped = bool(stats.stopped_robots)
+        verdict = expectations.verdict(expected, stopped=stopped, cut_short=bool(cut_short))
+        if verdict == "not checked":
+            reason = why_not_checked(expected, cut_short)
+    speed = leader_speed(scenario)
+    robots = {robot: _robot(rows, speed) for robot, rows in controllers.items()}
+    simulated_s = round(ticks * scenario.clock.control_period_s, 9)
     return {
         "verdict": verdict,
-        "reason": stats.reason if stats.timed else f"{stats.reason}, after {ticks} ticks",
+        "reason": reason,
         "scenario": scenario.name,
         "mode": stats.mode,
         "started": stats.started,
         "ticks": ticks,
+        "simulated_s": simulated_s,
         "wall_s": round(stats.wall_s, 4),
         "real_time_factor": round(simulated_s / stats.wall_s, 3) if stats.wall_s > 0 else None,
         "startup_s": round(stats.startup_s, 3),
@@ -89,7 +83,8 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         "robots": robots,
         "worst": _worst(list(robots.values())),
         "s_spread": _spread_of(record.controller),
-        "expectations": expectations,
+        "expectations": expected,
+        "cut_short": cut_short,
         "stopped_robots": stats.stopped_robots,
         "notices": stats.notices,
         "overruns": stats.overruns,
@@ -118,27 +113,46 @@ def settle_s(t: np.ndarray, values: np.ndarray, band: float = SETTLE_BAND) -> fl
     return float(t[outside[-1]]) if outside[-1] < len(values) - 1 else None
 
 
-def spread(controllers: dict[str, np.ndarray]) -> np.ndarray:
-    """max_i s_i − min_i s_i at every tick at which all of them have a row."""
-    ticks = min(len(rows) for rows in controllers.values())
-    s = np.stack([rows["s"][:ticks] for rows in controllers.values()])
-    difference: np.ndarray = s.max(axis=0) - s.min(axis=0)
-    return difference
-
-
 def _final(t: np.ndarray) -> slice:
     return slice(int(np.searchsorted(t, t[-1] - FINAL_S, side="right")), None)
 
 
-def _robot(rows: np.ndarray) -> dict[str, Any]:
+def leader_speed(scenario: Scenario) -> Callable[[np.ndarray], np.ndarray]:
+    """v_r over scenario time [ns] → [m/s], as the leader says it."""
+    steps = leader_brief(scenario).speed_steps
+    since, speeds = np.array([step[0] for step in steps]), np.array([step[1] for step in steps])
+
+    def at(t_ns: np.ndarray) -> np.ndarray:
+        found: np.ndarray = speeds[np.maximum(np.searchsorted(since, t_ns, side="right") - 1, 0)]
+        return found
+
+    return at
+
+
+def _cut_short(record: Record, scenario: Scenario, stats: RunStats) -> dict[str, str]:
+    """Robots that were followed up to a time before the end of a completed run, and why."""
+    if stats.ended != "completed":
+        return {}
+    ends_at_s, period_s = scenario.ends_at_s, scenario.clock.control_period_s
+    short = {}
+    for robot in scenario.names:
+        ticks = min(len(record.plant[robot]), len(record.controller[robot]))
+        if ticks < round(ends_at_s / period_s):
+            why = stats.left_early.get(robot) or "no rows after that"
+            short[robot] = f"cut short at {ticks * period_s:g} s of {ends_at_s:g} s: {why}"
+    return short
+
+
+def _robot(rows: np.ndarray, speed: Callable[[np.ndarray], np.ndarray]) -> dict[str, Any]:
     t, last = rows["t_s"], _final(rows["t_s"])
     torque = max(_peak(rows["tau_right_N_m"]), _peak(rows["tau_left_N_m"]))
     return {
         "ticks": len(rows),
         "settle_s": {name: settle_s(t, rows[name]) for name in ERRORS},
         "final_max": {name: _peak(rows[name][last]) for name in ERRORS},
+        "final_from_s": float(t[last][0]),
         "peak_torque_N_m": torque,
-        "settle_s_dot_s": settle_s(t, rows["s_dot"] - rows["s_dot"][-1]),
+        "settle_s_dot_s": settle_s(t, rows["s_dot"] - speed(np.rint(t * 1e9).astype(np.int64))),
     }
 
 
@@ -166,6 +180,7 @@ def _spread_of(controllers: dict[str, np.ndarray]) -> dict[str, float | None] | 
         "peak": float(values.max()),
         "settle_s": settle_s(t, values),
         "final": float(values[_final(t)].max()),
+        "final_from_s": float(t[_final(t)][0]),
     }
 
 
@@ -218,28 +233,3 @@ def _percentiles(seconds: np.ndarray) -> dict[str, float]:
         name: round(float(v), 1)
         for name, v in zip(("p50", "p99", "p99.9", "max"), points, strict=True)
     }
-
-
-def _expectation(expect: Expect, record: Record) -> dict[str, Any]:
-    robots = expect.robots or record.robots
-    signals = {signal.name for signal in PLANT_SIGNALS}
-    source = record.plant if expect.signal in signals - {"t_s"} else record.controller
-    if expect.signal == SPREAD:
-        values = spread({robot: record.controller[robot] for robot in robots})
-        series = [(record.controller[robots[0]]["t_s"][: len(values)], values)]
-    else:
-        series = [(source[r]["t_s"], source[r][expect.signal]) for r in robots]
-    end = expect.to_s if expect.to_s is not None else np.inf
-    found_of = [v[(t >= expect.from_s) & (t <= end)] for t, v in series]
-    values = np.concatenate(found_of)
-    result: dict[str, Any] = expect.model_dump(mode="json", exclude_none=True)
-    if not len(values):
-        return result | {"held": None, "found": None}  # the run ended before
-    found = {"max_abs": _peak(values), "min": float(values.min()), "max": float(values.max())}
-    held = bool(np.isfinite(values).all())
-    held &= expect.max_abs is None or found["max_abs"] <= expect.max_abs
-    held &= expect.min is None or found["min"] >= expect.min
-    held &= expect.max is None or found["max"] <= expect.max
-    # A robot that ended before has not held it; another's violation stands.
-    reached = all(len(part) > 0 for part in found_of)
-    return result | {"held": held if reached or not held else None, "found": found}

@@ -18,15 +18,15 @@ def warning(scenario: Scenario, *, speed: float, in_process: bool) -> str | None
     days = wall_s / DAY_S
     at = f" at {speed:g} × real time" if speed else ""
     return (
-        f"{scenario.name}: {scenario.duration_s:g} s of scenario time will take about"
+        f"{scenario.name}: {scenario.ends_at_s:g} s of scenario time will take about"
         f" {days:.3g} days{at}; Ctrl-C ends it and keeps what is recorded until then"
     )
 
 
 def _expected_s(scenario: Scenario, *, speed: float, in_process: bool) -> float:
     if scenario.clock.mode == "realtime":
-        return scenario.duration_s
-    ticks = scenario.duration_s / scenario.clock.control_period_s
+        return scenario.ends_at_s
+    ticks = scenario.ends_at_s / scenario.clock.control_period_s
     each_s = _IN_PROCESS_S if in_process else _OVER_PROCESSES_S
     fastest_s = ticks * len(scenario.robot) * each_s
-    return max(fastest_s, scenario.duration_s / speed) if speed else fastest_s
+    return max(fastest_s, scenario.ends_at_s / speed) if speed else fastest_s

@@ -143,7 +143,7 @@ class Unit:
         return sound._replace(v=0.0, omega=0.0)
 
     def row(self, t_s: float) -> tuple[float, ...]:
-        """The signals of `bridge.telemetry.PLANT_SIGNALS` at this instant."""
+        """The signals of `configs.signals.PLANT_SIGNALS` at this instant."""
         x, y, theta, v, omega, _, _ = self.state
         return (
             t_s,

@@ -6,8 +6,8 @@ Its rows in the record have the pose that was said last, and no number for what 
 from math import nan
 
 from bridge.messages import PoseFix
-from bridge.telemetry import PLANT_SIGNALS
 from configs.brief import Pose
+from configs.signals import PLANT_SIGNALS
 
 _UNKNOWN = (nan,) * (len(PLANT_SIGNALS) - 4)
 
@@ -26,5 +26,5 @@ class Witness:
         self._pose = fix.x_m, fix.y_m, fix.theta_rad
 
     def row(self, t_s: float) -> tuple[float, ...]:
-        """The signals of `bridge.telemetry.PLANT_SIGNALS` at this instant."""
+        """The signals of `configs.signals.PLANT_SIGNALS` at this instant."""
         return (t_s, *self._pose, *_UNKNOWN)

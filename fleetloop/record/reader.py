@@ -18,7 +18,7 @@ from fleetloop.record.schema import Kind
 class Record:
     """A run's record: per robot and source a structured array, one element per tick.
 
-    Fields are `tick` and the signals of `bridge.telemetry` by name.
+    Fields are `tick` and the signals of `configs.signals` by name.
     """
 
     path: Path

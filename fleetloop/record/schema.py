@@ -16,7 +16,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from bridge.telemetry import AGENT_SIGNALS, PLANT_SIGNALS, Signal
+from configs.signals import AGENT_SIGNALS, PLANT_SIGNALS, Signal
 
 POSE_PERIOD_NS = 20_000_000
 _MESSAGE = 0x05  # MCAP's opcode

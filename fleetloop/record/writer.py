@@ -13,8 +13,8 @@ from typing import Literal, Self
 
 import numpy as np
 
-from bridge.telemetry import AGENT_SIGNALS, PLANT_SIGNALS
 from configs.errors import InfrastructureError
+from configs.signals import AGENT_SIGNALS, PLANT_SIGNALS
 from fleetloop.record.mcap_file import McapFile
 from fleetloop.record.schema import Kind, channel_id, pose_messages, row_messages
 

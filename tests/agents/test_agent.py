@@ -8,9 +8,10 @@ from agents.guard import Phase
 from bridge.drives.odrive.frames import Command, identifier
 from bridge.frame import Frame
 from bridge.messages import LeaderSpeed, PathState, PoseFix
-from bridge.telemetry import AGENT_ROW, AGENT_SIGNALS, RowBuffer
+from bridge.telemetry import AGENT_ROW, RowBuffer
 from configs.briefing import agent_brief
 from configs.errors import InfrastructureError
+from configs.signals import AGENT_SIGNALS
 
 COLUMNS = [signal.name for signal in AGENT_SIGNALS]
 

@@ -7,10 +7,10 @@ import pytest
 
 from agents.laws import LAWS, Sense
 from agents.paths import robot_path
-from bridge.telemetry import LAW_SIGNALS
 from configs.brief import NetworkLink, WorldOffset
 from configs.briefing import agent_brief, plant_brief, reference_path
 from configs.loading import load
+from configs.signals import LAW_SIGNALS
 from plant.integrate import rk4
 from plant.robot import Robot, State
 

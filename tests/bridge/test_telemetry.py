@@ -1,6 +1,7 @@
 """Rows and blocks of telemetry."""
 
-from bridge.telemetry import AGENT_SIGNALS, BLOCK_TICKS, PLANT_ROW, PLANT_SIGNALS, RowBuffer
+from bridge.telemetry import BLOCK_TICKS, PLANT_ROW, RowBuffer
+from configs.signals import AGENT_SIGNALS, PLANT_SIGNALS
 
 
 def test_signal_names_are_unique_and_have_units() -> None:

@@ -106,6 +106,20 @@ def test_the_schema_in_the_package_is_the_schema_of_the_types() -> None:
         ("robot.r2.type='tank'", "robot.r2.type", "known: etsro"),
         ("expect=[{signal='s', robots=['r7'], max=1.0}]", "expect.0.robots", "known: r1, r2"),
         ("expect=[{signal='s'}]", "expect.0", "max_abs, min or max"),
+        ("expect=[{signal='x_error', max=1.0}]", "expect.0.signal", "did you mean x_e_m?"),
+        ("expect=[{signal='speed', max=1.0}]", "expect.0.signal", "s_spread"),
+        ("expect=[{signal='s', min=2.0, max=1.0}]", "expect.0.min", "at most max = 1"),
+        ("expect=[{signal='s', min=2.0, max_abs=1.0}]", "expect.0.min", "at most max_abs = 1"),
+        ("expect=[{signal='s', max=-2.0, max_abs=1.0}]", "expect.0.max", "at least -max_abs = -1"),
+        ("expect=[{signal='s', max=1.0, from_s=30.0}]", "expect.0.from_s", "duration_s = 30"),
+        ("expect=[{signal='s', max=1.0, to_s=30.5}]", "expect.0.to_s", "leave it out"),
+        ("expect=[{signal='s', max=1.0, from_s=3.0, to_s=2.0}]", "expect.0.from_s", "to_s = 2"),
+        (
+            "expect=[{signal='s', max=1.0, from_s=3.0001, to_s=3.0009}]",
+            "expect.0.from_s",
+            "no tick",
+        ),
+        ("until_s=0.0005", "until_s", "whole multiple"),
         ("schema=2", "schema", "1"),
         ("duration_s='long'", "duration_s", "number"),
         ("network.endpoint='udp/x'", "network.endpoint", "tcp/HOST:PORT"),
@@ -121,12 +135,32 @@ def test_one_wrong_value_gives_one_line_with_file_key_and_what_is_right(
 
 def test_all_problems_of_a_file_come_at_once() -> None:
     lines = problems(
-        SMALL, "control.k1=-1.0", "coordination.pp=1.0", "robot.r2.type='tank'", "duration_s=0"
+        SMALL,
+        "control.k1=-1.0",
+        "coordination.pp=1.0",
+        "robot.r2.type='tank'",
+        "seed=-1",
+        "expect=[{signal='speed', max=1.0, from_s=31.0}]",
     )
     text = "\n".join(lines)
-    assert len(lines) == 4
-    for key in ("control.k1", "coordination.pp", "robot.r2.type", "duration_s"):
+    assert len(lines) == 6
+    for key in (
+        "control.k1",
+        "coordination.pp",
+        "robot.r2.type",
+        "seed",
+        "expect.0.signal",
+        "expect.0.from_s",
+    ):
         assert f"file.toml: {key} = " in text
+
+
+def test_a_run_may_end_before_its_windows_or_after_its_scenario() -> None:
+    late = "expect=[{signal='s', max=1.0, from_s=20.0, to_s=25.0}]"
+    short = loads("f", SMALL, (late, "until_s=5.0"))
+    assert (short.duration_s, short.ends_at_s) == (30.0, 5.0)
+    assert loads("again", to_toml(short)) == short
+    assert loads("f", SMALL, (late, "duration_s=2.0", "until_s=26.0")).ends_at_s == 26.0
 
 
 def test_an_unknown_scenario_names_those_that_are_shipped() -> None:

@@ -147,6 +147,35 @@ def test_an_expectation_that_fails_ends_with_1(tmp_path: Path) -> None:
     assert "FAILED" in done.stdout
 
 
+IN_PROCESS = ("--in-process", "--no-report", "--out=x")
+ENDS_BEFORE = "--duration=0.5"
+
+
+@pytest.mark.parametrize(
+    ("args", "status", "verdict"),
+    [
+        ((), 0, "held"),
+        ((ENDS_BEFORE,), 1, "not checked"),
+        ((ENDS_BEFORE, "--allow-unchecked"), 0, "not checked"),
+        (("--duration=0.1", "--set=expect=[]"), 0, "not checked"),
+    ],
+    ids=["whole", "too short", "allowed", "nothing expected"],
+)
+def test_what_was_not_reached_is_not_held(
+    args: tuple[str, ...], status: int, verdict: str, tmp_path: Path
+) -> None:
+    done = fleetloop("run", "two_robots", *IN_PROCESS, *args, cwd=tmp_path)
+    assert done.returncode == status, done.stdout + done.stderr
+    assert f"verdict  {verdict}" in done.stdout
+    assert json.loads((tmp_path / "x" / "summary.json").read_text())["verdict"] == verdict
+    if ENDS_BEFORE in args:
+        assert "not reached" in done.stdout
+        # Said before anything runs, and again by a run of the scenario that it left.
+        assert "the run ends at 0.5 s" in done.stderr
+        again = fleetloop("run", "x/scenario.toml", *IN_PROCESS[:2], "--out=y", cwd=tmp_path)
+        assert (again.returncode, "verdict  not checked" in again.stdout) == (1, True)
+
+
 def test_a_folder_in_use_and_a_folder_that_can_not_be_made_are_named(tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "file").touch()
@@ -164,6 +193,7 @@ def test_json_of_a_run_is_its_summary_and_nothing_else(tmp_path: Path) -> None:
         "--json",
         "--no-report",
         "--duration=0.5",
+        "--allow-unchecked",
         "--out=x",
         cwd=tmp_path,
     )

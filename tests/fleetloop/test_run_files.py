@@ -33,7 +33,9 @@ def test_the_summary_holds_what_is_promised(finished_run: Path) -> None:
             }
         )
         assert robot["peak_torque_N_m"] > 0
-    assert set(summary["s_spread"]) == {"peak", "settle_s", "final"}
+    assert set(summary["s_spread"]) == {"peak", "settle_s", "final", "final_from_s"}
+    # The last five seconds of a run of four are all of them.
+    assert summary["s_spread"]["final_from_s"] == 0.0
     assert summary["overruns"] == 0
     # Two encoder and two torque frames per tick from tick 0 on, heartbeats, and the arming.
     assert 8000 < summary["frames_per_bus"]["r1"] < 9000

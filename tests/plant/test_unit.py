@@ -7,10 +7,10 @@ import pytest
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import Command, identifier
 from bridge.frame import Frame
-from bridge.telemetry import PLANT_SIGNALS
 from configs.brief import NetworkLink
 from configs.briefing import plant_brief
 from configs.loading import load
+from configs.signals import PLANT_SIGNALS
 from plant.unit import Unit, unit_of
 
 COLUMNS = [signal.name for signal in PLANT_SIGNALS]

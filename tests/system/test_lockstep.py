@@ -50,7 +50,7 @@ def test_a_robot_that_diverges_is_named_and_the_other_goes_on_in_either_mode(
 
 
 def test_four_robots_are_at_least_six_processes_under_two_gibibytes(tmp_path: Path) -> None:
-    with running(tmp_path / "a", "paper", "--duration", "2") as run:
+    with running(tmp_path / "a", "paper", "--duration", "2", "--allow-unchecked") as run:
         names = run.names()
         family = [run.launcher, *(run.child(name) for name in names)]
         memory = sum(process.memory_info().rss for process in family)
@@ -67,7 +67,7 @@ def test_four_robots_are_at_least_six_processes_under_two_gibibytes(tmp_path: Pa
 
 
 def test_a_run_held_to_a_speed_takes_its_time(tmp_path: Path) -> None:
-    args = ("two_robots", "--duration", "1", "--speed", "1")
+    args = ("two_robots", "--duration", "1", "--allow-unchecked", "--speed", "1")
     with running(tmp_path / "a", *args, bus_time_s=0.3) as run:
         status, out = run.end()
     assert status == 0, out

@@ -41,12 +41,22 @@ def test_the_experiment_settles_as_the_theory_says(name: str, tmp_path: Path) ->
         assert summary["s_spread"]["peak"] == pytest.approx(1.136, abs=0.02)
 
 
-@pytest.mark.parametrize("name", ["two_robots", "figure_eight", "spline_gate", "twelve"])
+ON_PATH = 'expect=[{signal="y_e_m", from_s=10.0, max_abs=0.05}]'
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("two_robots", ("seed=2",)),
+        ("figure_eight", ("until_s=31.0",)),
+        ("spline_gate", ("until_s=12.0",)),
+        ("twelve", ("duration_s=12.0", ON_PATH)),
+    ],
+)
 def test_other_paths_formations_and_graphs_need_nothing_but_a_file(
-    name: str, tmp_path: Path
+    name: str, overrides: tuple[str, ...], tmp_path: Path
 ) -> None:
-    summary = run(name, tmp_path / "run", "duration_s=12.0" if name != "two_robots" else "seed=2")
-    assert summary["verdict"] == "held"
+    assert run(name, tmp_path / "run", *overrides)["verdict"] == "held"
 
 
 def test_an_unequal_damping_and_a_disturbance_are_learned(tmp_path: Path) -> None:

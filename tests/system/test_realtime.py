@@ -12,7 +12,8 @@ pytestmark = pytest.mark.system
 
 
 def test_a_real_time_run_takes_its_time_and_records_every_tick(tmp_path: Path) -> None:
-    with running(tmp_path / "a", "realtime_100hz", "--duration", "4", bus_time_s=1.0) as run:
+    args = ("realtime_100hz", "--duration", "4", "--allow-unchecked")
+    with running(tmp_path / "a", *args, bus_time_s=1.0) as run:
         status, out = run.end()
     assert status == 0, out
     assert "real time: misses" in out
@@ -37,7 +38,7 @@ def test_a_real_time_run_takes_its_time_and_records_every_tick(tmp_path: Path) -
 
 
 def test_lockstep_runs_the_same_scenario_without_the_clock(tmp_path: Path) -> None:
-    args = ("realtime_100hz", "--clock", "lockstep", "--duration", "2")
+    args = ("realtime_100hz", "--clock", "lockstep", "--duration", "2", "--allow-unchecked")
     status, out = completed(tmp_path / "a", *args)
     assert status == 0, out
     rows = Record.open(tmp_path / "a" / "record.mcap").controller["r1"]

@@ -13,6 +13,7 @@ from system.processes import running
 pytestmark = pytest.mark.system
 
 LONG = ("paper", "--duration", "60", "--speed", "1")
+SHORT = ("paper", "--duration", "3", "--allow-unchecked", "--speed", "1")
 
 
 def test_a_python_can_program_sees_well_formed_cansimple_traffic_and_gets_answers(
@@ -48,7 +49,7 @@ def test_requests_of_a_stranger_do_not_change_the_run(tmp_path: Path) -> None:
 
     from fleetloop.diff import print_comparison
 
-    with running(tmp_path / "a", "paper", "--duration", "3", "--speed", "1", bus_time_s=0.3) as run:
+    with running(tmp_path / "a", *SHORT, bus_time_s=0.3) as run:
         with can.Bus(interface="fleetloop", channel="r1") as bus:
             ask = can.Message(
                 arbitration_id=0x014, is_remote_frame=True, dlc=8, is_extended_id=False
@@ -68,7 +69,7 @@ def test_requests_of_a_stranger_do_not_change_the_run(tmp_path: Path) -> None:
 
 def test_the_stock_logger_writes_a_log_that_the_stock_reader_reads(tmp_path: Path) -> None:
     log = tmp_path / "r2.asc"
-    with running(tmp_path / "a", "paper", "--duration", "3", "--speed", "1", bus_time_s=0.3) as run:
+    with running(tmp_path / "a", *SHORT, bus_time_s=0.3) as run:
         command = [sys.executable, "-m", "can.logger", "-i", "fleetloop", "-c", "r2", "-f", log]
         # It ends with its bus, at the end of the run.
         done = subprocess.run(command, capture_output=True, text=True, timeout=60)

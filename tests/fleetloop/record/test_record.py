@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from bridge.telemetry import AGENT_SIGNALS, PLANT_SIGNALS
 from configs.errors import InfrastructureError, ScenarioError
+from configs.signals import AGENT_SIGNALS, PLANT_SIGNALS
 from fleetloop.record.reader import Record
 from fleetloop.record.writer import CHUNK_TICKS, RecordWriter, finish_truncated
 

@@ -1,0 +1,102 @@
+"""What a scenario expects, and whether it was so: only what was seen to its end has held.
+
+held         the window was reached to its end by every robot that it is about, within the bounds
+FAILED       a bound was broken, or a value isn't finite; whatever the rest of the window held
+not reached  neither: some robot's rows end before the window does, or before it begins
+
+verdict      of a run that came to its end
+failed       a robot stopped itself, or an expectation failed
+not checked  else, if an expectation was not reached, a robot was cut short, or nothing is expected
+held         else
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from configs.scenario import Scenario
+from configs.sections import Expect
+from configs.signals import PLANT_SIGNALS, SPREAD
+from fleetloop.record.reader import Record
+
+_OF_PLANT = {signal.name for signal in PLANT_SIGNALS} - {"t_s"}
+
+Judged = dict[str, Any]
+"""An expectation with `held` (None: not reached), `found` and, if not reached, `seen_to_s`."""
+
+
+def spread(controllers: dict[str, np.ndarray]) -> np.ndarray:
+    """max_i s_i − min_i s_i at every tick at which all of them have a row."""
+    ticks = min(len(rows) for rows in controllers.values())
+    s = np.stack([rows["s"][:ticks] for rows in controllers.values()])
+    difference: np.ndarray = s.max(axis=0) - s.min(axis=0)
+    return difference
+
+
+def judge(expect: Expect, record: Record, scenario: Scenario) -> Judged:
+    """Hold an expectation against what was recorded."""
+    end_s = scenario.ends_at_s if expect.to_s is None else expect.to_s
+    series = _series(expect, record)
+    parts = [v[(t >= expect.from_s) & (t <= end_s)] for t, v in series]
+    values = np.concatenate(parts)
+    seen_to_s = min(float(t[-1]) if len(t) else 0.0 for t, _ in series)
+    # The last tick of a window may be up to a period before its end.
+    whole = all(map(len, parts)) and seen_to_s > end_s - 1.01 * scenario.clock.control_period_s
+    judged: Judged = expect.model_dump(mode="json", exclude_none=True)
+    judged |= {"held": None, "found": None}
+    if len(values):
+        found = {"max_abs": float(np.max(np.abs(values)))}
+        found |= {"min": float(values.min()), "max": float(values.max())}
+        held = _within(expect, values, found)
+        judged |= {"held": held if whole or not held else None, "found": found}
+    return judged if judged["held"] is not None else judged | {"seen_to_s": seen_to_s}
+
+
+def verdict(expected: Sequence[Judged], *, stopped: bool, cut_short: bool) -> str:
+    """The verdict of a run that came to its end; see the table above."""
+    if stopped or any(item["held"] is False for item in expected):
+        return "failed"
+    if cut_short or not expected or any(item["held"] is None for item in expected):
+        return "not checked"
+    return "held"
+
+
+def why_not_checked(expected: Sequence[Judged], cut_short: dict[str, str]) -> str:
+    """Why a run that came to its end is not checked."""
+    if cut_short:
+        return "; ".join(f"{robot}: {how}" for robot, how in cut_short.items())
+    if not expected:
+        return "the scenario expects nothing"
+    missed = [item["held"] for item in expected].count(None)
+    return f"{missed} of {len(expected)} expectations not reached"
+
+
+def out_of_reach(scenario: Scenario) -> list[str]:
+    """What a run can't check that ends before its scenario does, a line each."""
+    end_s = scenario.ends_at_s
+    lines = []
+    for expect in scenario.expect:
+        if expect.from_s >= end_s or (expect.to_s is not None and expect.to_s > end_s):
+            until = f" to {expect.to_s:g} s" if expect.to_s is not None else ""
+            window = f"{expect.signal} from {expect.from_s:g} s{until}"
+            lines.append(f"not checked: {window}, the run ends at {end_s:g} s")
+    return lines
+
+
+def _series(expect: Expect, record: Record) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Times and values, one pair per robot; of a spread one for all."""
+    robots = expect.robots or record.robots
+    if expect.signal == SPREAD:
+        values = spread({robot: record.controller[robot] for robot in robots})
+        return [(record.controller[robots[0]]["t_s"][: len(values)], values)]
+    source = record.plant if expect.signal in _OF_PLANT else record.controller
+    return [(source[robot]["t_s"], source[robot][expect.signal]) for robot in robots]
+
+
+def _within(expect: Expect, values: np.ndarray, found: dict[str, float]) -> bool:
+    held = bool(np.isfinite(values).all())
+    held &= expect.max_abs is None or found["max_abs"] <= expect.max_abs
+    held &= expect.min is None or found["min"] >= expect.min
+    held &= expect.max is None or found["max"] <= expect.max
+    return held
