@@ -154,3 +154,26 @@ def slcan(
     from fleetloop.can.slcan import offer
 
     raise typer.Exit(offer(bus, link))
+
+
+@app.command()
+def endpoints(
+    bus: Annotated[
+        str | None,
+        typer.Argument(metavar="[BUS]", help="A bus that is up: its drives say their versions."),
+    ] = None,
+    firmware: Annotated[
+        str | None,
+        typer.Option(
+            "--fw-version", metavar="VERSION", help="Without a bus: of this firmware, e.g. 0.6.11."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FILE", help="Write it there instead of printing it."),
+    ] = None,
+) -> None:
+    """Print the endpoints of the drives in the form of the vendor's flat_endpoints.json."""
+    from fleetloop.can.endpoints import write_endpoints
+
+    raise typer.Exit(write_endpoints(bus, firmware, out))

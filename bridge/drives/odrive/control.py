@@ -3,6 +3,7 @@
     v* = v_s + k_p (x_s − x)                        position mode; v* = v_s in velocity mode    (1)
     v* held to ±v_max                                                                           (2)
     τ = τ_s + k_v (v* − v) + z,   dz/dt = k_i (v* − v)       z decays while τ is limited        (3)
+                                                             and is held to ±z_max
     τ held to (±v_max − v) k_v                      torque mode only                            (4)
     τ held to ±τ_max                                                                            (5)
 
@@ -111,7 +112,9 @@ class Controller:
         elif torque != unlimited:
             self._decay(dt_s, self._integral + torque - unlimited)
         else:
-            self._integral += p.velocity_integrator_gain * error * dt_s
+            most = p.velocity_integrator_limit
+            integral = self._integral + p.velocity_integrator_gain * error * dt_s
+            self._integral = min(max(integral, -most), most)
         return torque
 
     def _decay(self, dt_s: float, edge: float) -> None:

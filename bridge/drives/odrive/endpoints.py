@@ -4,10 +4,10 @@
     TxSdo   u8 0                          u16 endpoint   u8 0   value, zero padded to 8 bytes
 
 The vendor's numbers change with every firmware and come from its `flat_endpoints.json`; ours are
-those of `ENDPOINTS`, stable, and `flat_endpoints` gives them in the form of that file. Firmware
-0.6.11 and later answers a write with what was written, earlier ones answer reads only. Unknown
-endpoints, other opcodes, short frames, writes to what is read-only and values that no drive takes
-are ignored. Writing inputs this way doesn't feed the watchdog.
+those of `ENDPOINTS` and `functions.FUNCTIONS`, stable, and `flat_endpoints` gives them in the form
+of that file. Firmware 0.6.11 and later answers a write with what was written, earlier ones answer
+reads only. Unknown endpoints, other opcodes, short frames, writes to what is read-only and values
+that no drive takes are ignored. Writing inputs this way doesn't feed the watchdog.
 """
 
 import struct
@@ -17,6 +17,7 @@ from typing import NamedTuple
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive import reports
 from bridge.drives.odrive.frames import AxisState, Command
+from bridge.drives.odrive.functions import FUNCTIONS, Value
 from bridge.drives.odrive.machine import Axis
 from bridge.drives.odrive.parameters import FLOAT32_MAX
 
@@ -25,6 +26,7 @@ ANSWERS_WRITES = (0, 6, 11)
 _READ, _WRITE = 0, 1
 _MS_NS = 1_000_000
 _NAMES = {"f": "float", "?": "bool", "B": "uint8", "I": "uint32"}
+_Json = dict[str, object]
 Read = Callable[[Axis], float]
 Write = Callable[[Axis, float, int], bool]
 """Axis, value, bus time; False if it isn't taken."""
@@ -50,6 +52,14 @@ def _parameter(path: str, name: str) -> tuple[str, str, Read, Write]:
         return taken
 
     return path, "f", read, write
+
+
+def _integrator_limit(axis: Axis, value: float, _: int) -> bool:
+    """An infinite limit is none, as drives are delivered."""
+    if not value >= 0.0:
+        return False
+    axis.parameters.velocity_integrator_limit = value
+    return True
 
 
 def _period(name: str, command: Command) -> tuple[str, str, Read, Write]:
@@ -164,16 +174,22 @@ def _rows() -> Iterator[tuple[str, str, Read] | tuple[str, str, Read, Write]]:
     yield _parameter("axis0.trap_traj.config.vel_limit", "trajectory_velocity")
     yield _parameter("axis0.trap_traj.config.accel_limit", "trajectory_accel")
     yield _parameter("axis0.trap_traj.config.decel_limit", "trajectory_decel")
+    yield "hw_version_major", "B", lambda _: reports.HARDWARE[0]
+    yield "hw_version_minor", "B", lambda _: reports.HARDWARE[1]
+    yield "hw_version_variant", "B", lambda _: reports.HARDWARE[2]
+    yield "fw_version_unreleased", "B", lambda _: 0
+    path = f"{at}.config.vel_integrator_limit"
+    yield path, "f", lambda x: x.parameters.velocity_integrator_limit, _integrator_limit
+    yield "config.dc_bus_undervoltage_trip_level", "f", lambda axis: axis.model.under_voltage_V
+    yield "config.dc_bus_overvoltage_trip_level", "f", lambda axis: axis.model.over_voltage_V
 
 
 ENDPOINTS: Mapping[int, Endpoint] = {n: Endpoint(n, *row) for n, row in enumerate(_rows(), 1)}
-"""By number; new ones go to the end, so that numbers stay."""
+"""Values by number; new ones go to the end, so that numbers stay."""
 
 
 def answer(axis: Axis, data: bytes, now_ns: int) -> bytes | None:
-    """What TxSdo says to an RxSdo; None if nothing."""
-    if len(data) < f.SDO.size:
-        return None
+    """What TxSdo says to an RxSdo with a number; None if nothing."""
     opcode, number, _ = f.SDO.unpack_from(data)
     endpoint = ENDPOINTS.get(number)
     if endpoint is None:
@@ -192,19 +208,39 @@ def answer(axis: Axis, data: bytes, now_ns: int) -> bytes | None:
     return (f.SDO.pack(0, number, 0) + _packed(endpoint, axis)).ljust(8, b"\0")
 
 
-def flat_endpoints(firmware: tuple[int, int, int]) -> dict[str, object]:
-    """The table in the form of the vendor's `flat_endpoints.json`, for scripts that read it."""
+def flat_endpoints(
+    firmware: tuple[int, int, int], hardware: tuple[int, int, int] = reports.HARDWARE
+) -> _Json:
+    """The tables in the form of the vendor's `flat_endpoints.json`, for scripts that read it.
+
+    Both versions are those of Get_Version, which such scripts compare.
+    """
+    values: _Json = {
+        endpoint.path: {
+            "id": endpoint.number,
+            "type": _NAMES[endpoint.code],
+            "access": "r" if endpoint.write is None else "rw",
+        }
+        for endpoint in ENDPOINTS.values()
+    }
+    calls: _Json = {
+        function.path: {
+            "id": number,
+            "type": "function",
+            "inputs": _described(function.argument),
+            "outputs": _described(function.result),
+        }
+        for number, function in FUNCTIONS.items()
+    }
     return {
         "fw_version": ".".join(map(str, firmware)),
-        "endpoints": {
-            endpoint.path: {
-                "id": endpoint.number,
-                "type": _NAMES[endpoint.code],
-                "access": "r" if endpoint.write is None else "rw",
-            }
-            for endpoint in ENDPOINTS.values()
-        },
+        "hw_version": ".".join(map(str, hardware)),
+        "endpoints": values | calls,
     }
+
+
+def _described(value: Value | None) -> list[_Json]:
+    return [] if value is None else [{"name": value.name, "type": _NAMES[value.code]}]
 
 
 def _packed(endpoint: Endpoint, axis: Axis) -> bytes:

@@ -5,6 +5,7 @@
     Set_..., Clear  acts; a remote frame is ignored                       `commands`
     Estop           acts, whatever the frame                              `axis`
     RxSdo           reads or writes an endpoint, TxSdo answers            `endpoints`
+                    calls a function                                      `functions`
     Address         asked: says node id and serial number
                     our serial number or 0: takes the node id
                     our node id, somebody else's number: goes to 0x3F
@@ -23,7 +24,7 @@ A message that is late is sent once; its next is due at the next multiple of its
 from collections.abc import Sequence
 from random import Random
 
-from bridge.drives.odrive import endpoints
+from bridge.drives.odrive import endpoints, functions
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.calibration import NEVER
 from bridge.drives.odrive.commands import SETTERS
@@ -95,8 +96,10 @@ class OdriveNode(Axis):
             else:
                 self.set_torque(torque, now_ns)
             return _NONE
-        if can_id & (EFF | ERR) or self._boots_ns != NEVER:
+        if can_id & (EFF | ERR) or now_ns < self._boots_ns != NEVER:
             return _NONE
+        if self._boots_ns != NEVER:
+            self._boot(now_ns)
         return self._hear(frame, now_ns)
 
     def due(self, now_ns: int) -> Sequence[Frame]:
@@ -215,7 +218,7 @@ class OdriveNode(Axis):
 
     def _on_sdo(self, data: bytes, now_ns: int) -> Sequence[Frame]:
         before = dict(self.parameters.period_ns)
-        said = endpoints.answer(self, data, now_ns)
+        said = self._answer(data, now_ns)
         self._cyclic_ns[Command.GET_ENCODER_ESTIMATES] = self._next_encoder_ns
         for command, period_ns in self.parameters.period_ns.items():
             if period_ns and period_ns != before[command]:
@@ -226,11 +229,23 @@ class OdriveNode(Axis):
             return _NONE
         return (self._frame(Command.TX_SDO, said),)
 
+    def _answer(self, data: bytes, now_ns: int) -> bytes | None:
+        """What TxSdo says to an RxSdo; None if nothing."""
+        if len(data) < f.SDO.size:
+            return None
+        if f.SDO.unpack_from(data)[1] in functions.FUNCTIONS:
+            confirms = self.model.firmware >= endpoints.ANSWERS_WRITES
+            return functions.answer(self, data, now_ns, confirms=confirms)
+        return endpoints.answer(self, data, now_ns)
+
     def _on_reboot(self, command: int, data: bytes, now_ns: int) -> None:
         action = f.padded(data, 1)[0] if command == Command.REBOOT else RebootAction.ENTER_DFU_MODE
+        self.ignored += not self.restart(action, now_ns)
+
+    def restart(self, action: int, now_ns: int) -> bool:
+        """What a `RebootAction` does; False if it does nothing, as while the axis isn't idle."""
         if self.state is not AxisState.IDLE or action > RebootAction.ENTER_DFU_MODE:
-            self.ignored += 1
-            return
+            return False
         match action:
             case RebootAction.SAVE_CONFIGURATION:
                 self._saved = self.parameters.copy()
@@ -241,6 +256,7 @@ class OdriveNode(Axis):
         self._answers_ns = NEVER
         if self._boots_ns <= now_ns:
             self._boot(now_ns)
+        return True
 
     def _on_address(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         data = frame.data

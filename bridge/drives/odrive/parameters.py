@@ -5,7 +5,7 @@ stays. The vendor's defaults [firmware 0.5.6 source] come with `DriveModel`.
 """
 
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import inf, isfinite
 from typing import Self
 
 from bridge.drives.odrive.frames import Command, ControlMode, InputMode
@@ -36,6 +36,7 @@ class Parameters:
     trajectory_decel: float  # [rev/s²]
     motor_calibrated: bool
     encoder_calibrated: bool
+    velocity_integrator_limit: float = inf  # [N·m]
     inertia: float = 0.0  # [N·m·s²/rev]
     control_mode: int = ControlMode.TORQUE
     input_mode: int = InputMode.PASSTHROUGH

@@ -3,11 +3,12 @@
 import struct
 
 import pytest
-from odrive_axis import MODEL, MS, NODE, arm, ask_state, axis, beat, floats, tell, torque
+from odrive_axis import MODEL, MS, NODE, arm, ask_state, axis, beat, floats, modes, tell, torque
 
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.endpoints import ENDPOINTS, flat_endpoints
 from bridge.drives.odrive.frames import AxisError, AxisState, Command, ProcedureResult
+from bridge.drives.odrive.functions import FUNCTIONS
 from bridge.drives.odrive.node import ANSWER_WITHIN_NS, OdriveNode
 from bridge.frame import RTR, Frame
 
@@ -268,8 +269,65 @@ def test_endpoint_requests_that_make_no_sense_get_no_answer_and_change_nothing(d
 
 def test_the_table_comes_in_the_form_of_the_vendors_file() -> None:
     flat = flat_endpoints((0, 6, 10))
-    assert flat["fw_version"] == "0.6.10"
+    said = axis().hear(f.request(NODE, Command.GET_VERSION), 0)[0].data
+    assert flat["fw_version"] == ".".join(map(str, said[4:7])) == "0.6.10"
+    assert flat["hw_version"] == ".".join(map(str, said[1:4])) == "4.4.58"
     assert flat["endpoints"]["vbus_voltage"] == {"id": 1, "type": "float", "access": "r"}
+    assert flat["endpoints"]["get_adc_voltage"] == {
+        "id": 1029,
+        "type": "function",
+        "inputs": [{"name": "gpio", "type": "uint32"}],
+        "outputs": [{"name": "voltage", "type": "float"}],
+    }
+    numbers = [endpoint["id"] for endpoint in flat["endpoints"].values()]
+    assert len(set(numbers)) == len(numbers) == len(ENDPOINTS) + len(FUNCTIONS)
+
+
+def call(node: OdriveNode, path: str, argument: bytes = b"", now_ns: int = 0) -> list[Frame]:
+    number = next(n for n, function in FUNCTIONS.items() if function.path == path)
+    return tell(node, Command.RX_SDO, struct.pack("<BHB", 1, number, 0) + argument, now_ns)
+
+
+def test_functions_are_called_by_writing_their_arguments_and_answered_with_their_result() -> None:
+    (reply,) = call(axis(), "get_adc_voltage", struct.pack("<I", 1))
+    assert reply.can_id == f.identifier(NODE, Command.TX_SDO)
+    assert struct.unpack("<BHBf", reply.data) == (0, 1029, 0, 0.0)
+    assert call(axis(), "get_adc_voltage", b"\1\0") == []
+    assert call(axis(), "clear_errors") == []
+    (confirmation,) = call(axis(firmware=(0, 6, 11)), "clear_errors")
+    assert confirmation.data == struct.pack("<BHB4x", 0, 1028, 0)
+    assert tell(axis(), Command.RX_SDO, struct.pack("<BHB", 0, 1028, 0)) == []  # it is no value
+
+
+def test_a_saved_configuration_outlives_the_reboot_and_nothing_is_saved_while_armed() -> None:
+    path = "axis0.controller.config.vel_integrator_limit"
+    node = axis(boot_ns=SECOND)
+    write(node, path, 1.25)
+    (reply,) = call(node, "save_configuration")
+    assert reply.data[4] == 1
+    assert not node.hear(f.request(NODE, Command.HEARTBEAT), SECOND - 1)
+    assert node.hear(f.request(NODE, Command.HEARTBEAT), SECOND)  # booted, before it says so
+    assert read(node, path) == 1.25
+    arm(node, SECOND)
+    assert call(node, "save_configuration", now_ns=SECOND)[0].data[4] == 0
+
+
+def test_the_integrator_is_held_to_its_limit_and_an_infinite_one_is_none() -> None:
+    path = "axis0.controller.config.vel_integrator_limit"
+    node = axis(watchdog_ns=0)
+    assert read(node, path) == float("inf")
+    modes(node, 2)
+    arm(node)
+    floats(node, Command.SET_VEL_GAINS, 0.0, 1.0)
+    floats(node, Command.SET_INPUT_VEL, 1.0, 0.0)
+    write(node, path, 0.1)
+    for _ in range(400):
+        torque = node.torque_demand(0.001)
+    assert torque == pytest.approx(0.1)
+    write(node, path, float("inf"))
+    for _ in range(100):
+        torque = node.torque_demand(0.001)
+    assert torque == pytest.approx(0.2, abs=0.002)
 
 
 # --- cyclic messages -----------------------------------------------------------------------------
