@@ -97,10 +97,12 @@ def guest_relay(user: str) -> str:
     return f"fleetloop/@guest/{_chunk(user)}/@relay"
 
 
-def guest_of(place: str) -> tuple[str, str]:
-    """The user and the channel, a bus or run/bus, of a guest's line."""
-    _, _, user, _, channel = place.split("/", 4)
-    return user, channel
+def guest_of(place: str) -> tuple[str, str] | None:
+    """The user and the channel, a bus or run/bus, of a guest's line; None if it is no line's."""
+    chunks = place.split("/")
+    if len(chunks) not in (5, 6) or not all(map(_CHUNK.fullmatch, chunks[2:])):
+        return None
+    return chunks[2], "/".join(chunks[4:])
 
 
 def process_of(key: str) -> str:

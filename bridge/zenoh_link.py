@@ -308,7 +308,7 @@ def _listen(
     tries = 1 if endpoint else _PORT_TRIES
     reason = ""
     for _ in range(tries):
-        at = endpoint or f"tcp/127.0.0.1:{_free_port()}"
+        at = endpoint or _loopback()
         config = _config("router")
         _set(config, "listen/endpoints", [at, *([outside.endpoint] if outside else [])])
         if outside is not None and outside.tls is not None:
@@ -403,8 +403,25 @@ def _keep(thing: _Kept) -> _Kept:
     return thing
 
 
-def _free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+def _loopback() -> str:
+    """A free endpoint that only this machine reaches.
+
+    Raises:
+        InfrastructureError: the machine has no loopback address.
+    """
+    reasons = []
+    for family, host in ((socket.AF_INET, "127.0.0.1"), (socket.AF_INET6, "::1")):
+        try:
+            with socket.socket(family, socket.SOCK_STREAM) as probe:
+                probe.bind((host, 0))
+                probe.listen()
+                port: int = probe.getsockname()[1]
+                socket.create_connection((host, port), _PROBE_S).close()  # its device may be down
+        except OSError as error:
+            reasons.append(f"{host}: {error.strerror}")
+        else:
+            return f"tcp/[{host}]:{port}" if ":" in host else f"tcp/{host}:{port}"
+    raise InfrastructureError(
+        f"no loopback address for the processes of a run to meet at ({', '.join(reasons)}):"
+        " ip link set lo up"
+    )

@@ -61,8 +61,15 @@ def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
     identities = [access.user_of(role) for role in deployment.elsewhere(scenario)]
     if any(not deployment.emulates(robot) for robot in scenario.names):
         identities.append(access.LOCALISATION)
-    identities += bus_guests(deployment)
-    return passwords(deployment.network, tuple(identities))
+    known = passwords(deployment.network, (*identities, *bus_guests(deployment)))
+    return known | {user: _as_option(known[user]) for user in bus_guests(deployment)}
+
+
+def _as_option(password: str) -> str:
+    # Imports python-can, which a run without guests does without.
+    from bridge.can_bus.credentials import as_option
+
+    return as_option(password)
 
 
 def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.AccessPlan:

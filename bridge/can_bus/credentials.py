@@ -16,6 +16,8 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
+from can.util import cast_from_string
+
 from configs.brief import NetworkLink, TlsFiles
 from configs.errors import ScenarioError
 from configs.users import read_users
@@ -48,6 +50,19 @@ def network_of(options: Mapping[str, str]) -> NetworkLink:
     return NetworkLink("", endpoint, user, _password(options, user))
 
 
+def as_option(value: object) -> str:
+    """An option of `can.Bus` as text, whether or not it came through python-can.
+
+    python-can makes numbers and truth values of texts: "0123" becomes 123, "1.50" 1.5, "true" True.
+    The router knows guests' passwords by what this makes of them: "123", "1.5", "true".
+    """
+    try:
+        read = cast_from_string(value) if isinstance(value, str) else value
+    except ValueError:  # more digits than Python makes a number of
+        read = value
+    return str(read).lower() if isinstance(read, bool) else str(read)
+
+
 def _tls(options: Mapping[str, str]) -> TlsFiles:
     for name in _TLS:
         if name not in options:
@@ -63,9 +78,9 @@ def _password(options: Mapping[str, str], user: str) -> str:
     if ("password" in options) == ("users" in options):
         raise ScenarioError("over tcp give either password or users")
     if "password" in options:
-        return options["password"]
+        return as_option(options["password"])
     path = Path(options["users"]).expanduser()
     known = read_users(path, "users")
     if not known.get(user):
         raise ScenarioError(f"users = {path}: no line {user}:<password>")
-    return known[user]
+    return as_option(known[user])

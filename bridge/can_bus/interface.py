@@ -28,7 +28,7 @@ from can.typechecking import AutoDetectedConfig, CanFilters
 from bridge.can_bus import packet as wire
 from bridge.can_bus import places
 from bridge.can_bus.convert import to_frame, to_message
-from bridge.can_bus.credentials import OPTIONS, network_of
+from bridge.can_bus.credentials import OPTIONS, as_option, network_of
 from bridge.can_bus.lines import Line, UnixLine
 from bridge.frame import Frame
 from configs.errors import ScenarioError
@@ -73,7 +73,7 @@ class FleetloopBus(can.BusABC):
         fd: bool = False,
         **kwargs: Any,
     ) -> None:
-        remote = {key: str(kwargs.pop(key)) for key in OPTIONS if kwargs.get(key) is not None}
+        remote = {key: as_option(kwargs.pop(key)) for key in OPTIONS if kwargs.get(key) is not None}
         if unknown := sorted(kwargs.keys() - _IGNORED - OPTIONS):
             raise TypeError(f"the fleetloop interface has no option {', '.join(unknown)}")
         if fd:
@@ -88,7 +88,7 @@ class FleetloopBus(can.BusABC):
         self._closed_because: str | None = None
         self._queue = 0  # frames that may wait at this node; 0: frames take no time
         self._said = self._gone = 0  # frames sent, and how many of them have left the queue
-        self.channel = str(channel)
+        self.channel = as_option(channel)
         self._line = self._connect(receive_own_messages, connect_timeout, remote)
         self._send_now, self._next = self._line.send, self._line.receive
         self.channel_info = f"fleetloop bus {self.channel}"

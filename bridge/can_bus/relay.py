@@ -15,19 +15,26 @@ which keeps and counts it as it does for all its clients. So one thread serves a
 A guest that leaves says goodbye behind its last packet and is told when all before it has reached
 the hub; one whose liveliness token goes has left. The bus's end goes to every guest with its
 reason, and the relay waits a little until they have it.
+
+Whatever a guest says, in whatever order, ends at most its own line: keys that are no line's and
+packets that nobody waits for are dropped, and what is held for a user is bounded.
 """
 
 import contextlib
+import logging
 import os
 import queue
 import select
 import socket
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
+
+import zenoh
 
 from bridge import keys
 from bridge.can_bus import packet as wire
@@ -42,7 +49,15 @@ GOODBYE_S = 0.5
 _JOIN_S = 1.0
 _TURN = 64
 """Packets of one guest before the others have their turn."""
+_EVENTS = 256
+"""Events before what the hub said has its turn."""
+MAX_LINES = 32
+"""Lines that one user may have open at a time: each costs two descriptors."""
+MAX_HELD_BYTES = 16 * 1024 * 1024
+"""What may wait here of one user; who keeps to its lines' windows never gets there."""
+_EVENT_BYTES = 256
 _HANG_UP = select.EPOLLHUP | select.EPOLLERR
+_log = logging.getLogger(__name__)
 
 
 class _Event(NamedTuple):
@@ -72,6 +87,7 @@ class Relay:
         self._buses = tuple(buses)
         self._granted = granted
         self._events: queue.SimpleQueue[_Event] = queue.SimpleQueue()
+        self._held: Counter[str] = Counter()  # bytes in the queue above, by user
         self._alive: set[str] = set()
         self._guests: dict[str, Guest] = {}
         self._by_fd: dict[int, Guest] = {}
@@ -121,8 +137,16 @@ class Relay:
         self._put(_Event(key.removesuffix("/alive"), alive=alive))
 
     def _put(self, event: _Event) -> None:
-        self._events.put(event)
+        line = keys.guest_of(event.place) if event.place else ("", "")
+        if line is None:
+            return  # the key of no line
         with self._lock:
+            if event.packet is not None:
+                cost = len(event.packet) + _EVENT_BYTES
+                if self._held[line[0]] + cost > MAX_HELD_BYTES:
+                    return
+                self._held[line[0]] += cost
+            self._events.put(event)
             if self._wake >= 0:
                 os.eventfd_write(self._wake, 1)
 
@@ -135,27 +159,48 @@ class Relay:
                     os.eventfd_read(self._wake)
                     self._take_events()
                 elif (guest := self._by_fd.get(fd)) is not None:
-                    self._move(guest, ended=bool(event & _HANG_UP))
+                    with self._only(guest.place):
+                        self._move(guest, ended=bool(event & _HANG_UP))
         for guest in tuple(self._guests.values()):
             self._part(guest)
         self._epoll.close()
 
     def _take_events(self) -> None:
-        with contextlib.suppress(queue.Empty):
-            while True:
+        """Take some; who says much does not keep the hub's words from the others."""
+        for _ in range(_EVENTS):
+            try:
                 place, packet, alive = self._events.get_nowait()
-                if not place:
-                    self._over_at = time.monotonic() + GOODBYE_S
-                    self._end_all()
-                elif packet is not None:
+            except queue.Empty:
+                return
+            if not place:
+                self._over_at = time.monotonic() + GOODBYE_S
+                self._end_all()
+                continue
+            with self._only(place):
+                if packet is not None:
                     self._take(place, packet)
                 elif alive:
                     self._alive.add(place)
                 else:
                     self._alive.discard(place)
                     self._leave(place)
+        os.eventfd_write(self._wake, 1)
+
+    @contextlib.contextmanager
+    def _only(self, place: str) -> Iterator[None]:
+        """What fails on the way of one guest ends its line and no other."""
+        try:
+            yield
+        except Exception as error:
+            if not isinstance(error, zenoh.ZError | OSError):  # its way or the hub's end is gone
+                _log.exception("the line %s has failed", place)
+            self._unheard.discard(place)
+            if (guest := self._guests.get(place)) is not None:
+                self._part(guest)
 
     def _take(self, place: str, packet: bytes) -> None:
+        with self._lock:
+            self._held[_user_of(place)] -= len(packet) + _EVENT_BYTES
         guest = self._guests.get(place)
         kind = packet[0] if packet else 0
         if guest is None:
@@ -191,7 +236,7 @@ class Relay:
             self._epoll.modify(guest.sock, wanted)
 
     def _join(self, place: str, hello: bytes) -> None:
-        user, channel = keys.guest_of(place)
+        user, channel = keys.guest_of(place) or ("", "")
         run, _, bus = channel.rpartition("/")
         down = self._link.publisher(f"{place}/down")
         granted = self._granted.get(user, ())
@@ -202,18 +247,22 @@ class Relay:
             self._refuse(down, f"no bus {bus!r} is up; buses here: {here}")
         elif ALL_BUSES not in granted and bus not in granted:
             self._refuse(down, f"{user!r} may open {', '.join(granted) or 'no bus'}, not {bus!r}")
+        elif sum(_user_of(other) == user for other in self._guests) >= MAX_LINES:
+            self._refuse(down, f"{user!r} has {MAX_LINES} lines open already")
         else:
-            sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-            sock.setblocking(False)
+            sock = None
             try:
+                sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+                sock.setblocking(False)
                 sock.connect(str(places.socket_path(self._folder, bus)))
                 sock.send(hello)
+                self._epoll.register(sock, READ)
             except OSError as error:
-                sock.close()
+                if sock is not None:
+                    sock.close()
                 self._refuse(down, f"the bus doesn't answer: {error}")
                 return
-            guest = self._guests[place] = self._by_fd[sock.fileno()] = Guest(place, sock, down)
-            self._epoll.register(sock, guest.awaits)
+            self._guests[place] = self._by_fd[sock.fileno()] = Guest(place, sock, down)
 
     def _refuse(self, down: Publisher, reason: str) -> None:
         down.put(wire.encode_text(wire.REFUSED, reason))
@@ -227,9 +276,10 @@ class Relay:
 
     def _end_all(self) -> None:
         for guest in tuple(self._guests.values()):
-            guest.push()
-            guest.pull(None)
-            self._end(guest, "the run has ended")
+            with self._only(guest.place):
+                guest.push()
+                guest.pull(None)
+                self._end(guest, "the run has ended")
 
     def _end(self, guest: Guest, reason: str) -> None:
         """Leave the hub in a guest's name; it is told why, if the hub hasn't said so."""
@@ -244,3 +294,7 @@ class Relay:
             del self._by_fd[guest.sock.fileno()]
             self._epoll.unregister(guest.sock)
             guest.sock.close()
+
+
+def _user_of(place: str) -> str:
+    return place.split("/", 3)[2]

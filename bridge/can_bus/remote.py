@@ -58,13 +58,17 @@ class RemoteLine:
             self._link = open_client(network, timeout_s)
         except InfrastructureError as error:
             raise OSError(str(error)) from error
+        try:
+            self._readable = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC | os.EFD_SEMAPHORE)
+            self._link.each(f"{place}/down", self._take)
+            self._link.on_gone(keys.guest_relay(network.user), self._lose)
+            self._up = self._link.publisher(f"{place}/up")
+            self._link.declare_live(f"{place}/alive")
+        except (zenoh.ZError, OSError) as error:
+            self._link.close()
+            raise OSError(str(error)) from error
         # Later, when the interpreter ends, a session can't be closed and keeps the process.
         atexit.register(self.close)
-        self._readable = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC | os.EFD_SEMAPHORE)
-        self._link.each(f"{place}/down", self._take)
-        self._link.on_gone(keys.guest_relay(network.user), self._lose)
-        self._up = self._link.publisher(f"{place}/up")
-        self._link.declare_live(f"{place}/alive")
         again_s = _FIRST_HELLO_S
         while True:
             self._up.put(hello)

@@ -1,6 +1,7 @@
 """Sessions: how they are opened, and that whatever becomes of them never stops their process."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -73,3 +74,44 @@ def ends(program: str, *args: str, within_s: float = 60.0) -> str:
 @pytest.mark.system
 def test_sixty_routers_come_and_go_while_another_session_calls_python(tmp_path: Path) -> None:
     assert ends(DROPS, str(tmp_path)) == "heard\n"
+
+
+NO_IPV4 = "ip link set lo up && ip addr del 127.0.0.1/8 dev lo"
+ROUTER = """
+import sys
+from pathlib import Path
+from bridge import access
+from bridge.zenoh_link import open_client, open_router
+from configs.brief import NetworkLink
+from configs.errors import InfrastructureError
+plan = access.plan("test", ("r1",), {"r1": ()}, ("r1",))
+try:
+    with open_router(None, plan, Path(sys.argv[1])) as router:
+        login = NetworkLink("test", router.endpoint, "plant", plan.passwords["plant"])
+        with open_client(login, 10.0):
+            print(router.endpoint)
+except InfrastructureError as error:
+    print(error)
+"""
+
+
+def may_have_networks_of_its_own() -> bool:
+    tried = subprocess.run(["unshare", "-n", "ip", "link", "set", "lo", "up"], capture_output=True)
+    return tried.returncode == 0
+
+
+@pytest.mark.skipif(not may_have_networks_of_its_own(), reason="no right to a network namespace")
+@pytest.mark.parametrize(
+    ("first", "said"),
+    [(NO_IPV4, r"tcp/\[::1\]:\d+\n"), ("true", "no loopback address .*: ip link set lo up\n")],
+)
+def test_without_ipv4_the_loopback_of_ipv6_serves(tmp_path: Path, first: str, said: str) -> None:
+    shell = f'{first} && exec "$0" -c "$1" "$2"'
+    done = subprocess.run(
+        ["unshare", "-n", "bash", "-c", shell, sys.executable, ROUTER, str(tmp_path)],
+        timeout=60,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    assert re.fullmatch(said, done.stdout), done.stderr

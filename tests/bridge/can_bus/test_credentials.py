@@ -3,8 +3,11 @@
 from pathlib import Path
 
 import pytest
+from can.util import load_config
+from hypothesis import given
+from hypothesis import strategies as st
 
-from bridge.can_bus.credentials import network_of
+from bridge.can_bus.credentials import as_option, network_of
 from configs.brief import TlsFiles
 from configs.errors import ScenarioError
 
@@ -31,6 +34,20 @@ def test_a_password_goes_with_tcp_given_or_from_a_file(tmp_path: Path) -> None:
     assert network_of({**TCP, "password": "word"}).password == "word"
     found = network_of({**TCP, "users": users(tmp_path)})
     assert (found.user, found.password, found.tls) == ("bench", "a:b", None)
+
+
+@given(st.one_of(st.from_regex(r"[-+0-9.eETruFals]{1,8}", fullmatch=True), st.text(min_size=1)))
+def test_a_password_is_the_same_however_it_reaches_the_router(password: str) -> None:
+    through_python_can = load_config(config={**TCP, "interface": "virtual", "password": password})
+    given = as_option(password)
+    assert as_option(through_python_can["password"]) == given
+    assert network_of({**TCP, "password": given}).password == given
+
+
+def test_a_password_that_looks_like_a_number_or_a_truth_value_is_one() -> None:
+    for text, option in (("0123", "123"), ("1.50", "1.5"), ("true", "true"), ("s3cret", "s3cret")):
+        assert as_option(text) == option
+    assert as_option("9" * 5000) == "9" * 5000
 
 
 def test_certificates_go_with_tls(files: dict[str, str]) -> None:
