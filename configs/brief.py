@@ -493,6 +493,7 @@ class PlantBrief:
     attached: tuple[tuple[str, Settings], ...] = ()  # bus, keyword arguments of can.Bus: not ours
     witnessed: tuple[tuple[str, Pose], ...] = ()  # robots that aren't emulated; where they start
     detached: bool = False  # as an agent's
+    controllers: tuple[tuple[str, str], ...] = ()  # robot, secret: whom lockstep's buses wait for
 
 
 @dataclass(frozen=True, slots=True)

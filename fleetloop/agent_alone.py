@@ -41,7 +41,7 @@ def run_agent(source: str, robot: str, deployment_file: Path, overrides: Overrid
     deployment = load_deployment(deployment_file, scenario)
     role = agent_role(robot)
     network = placing.network_link(scenario, deployment, role)
-    bus = placing.agent_bus(deployment, robot, pace="gathered")
+    bus = placing.agent_bus(deployment, robot)
     brief = replace(agent_brief(scenario, robot, network=network, bus=bus), detached=True)
     settings = " ".join(f"{key}={value}" for key, value in deployment.bus_of(robot))
     note(f"{role}: {settings}; waiting for run {network.run!r} at {network.endpoint}")

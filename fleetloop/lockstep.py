@@ -103,7 +103,7 @@ class _WireLane(_Lane):
         while ask is not None:
             self.frames += len(ask.passed)
             for robot, heard in pending.items():
-                heard += [(p.end_ns, p.frame) for p in ask.passed if p.heard_by(robot)]
+                heard += [p.as_heard_by(robot) for p in ask.passed if p.heard_by(robot)]
             robot = ask.asked
             heard, pending[robot] = pending[robot], []
             said = _think(self.minds[robot], heard)

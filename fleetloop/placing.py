@@ -22,12 +22,22 @@ def robots_of_plant(brief: PlantBrief, deployment: Deployment) -> PlantBrief:
     return replace(brief, robots=emulated, attached=attached, witnessed=witnessed)
 
 
-def agent_bus(deployment: Deployment, robot: str, *, pace: str, socket: str = "") -> Settings:
-    """Keyword arguments of `can.Bus` for a controller; `socket`: where its bus of ours is."""
+def agent_bus(
+    deployment: Deployment, robot: str, *, secret: str = "", socket: str = ""
+) -> Settings:
+    """Keyword arguments of `can.Bus` for a controller.
+
+    Args:
+        deployment: where the robot's bus is.
+        robot: whose controller.
+        secret: by which its bus knows whom to wait for; "" in real time, where it waits for nobody.
+        socket: where its bus of ours is.
+    """
     settings = deployment.bus_of(robot)
     if not deployment.is_ours(robot):
         return settings
-    ours = dict(settings) | {pace: robot if pace == "paced" else True}
+    pace: dict[str, str | bool] = {"paced": robot, "secret": secret} if secret else {}
+    ours = dict(settings) | (pace or {"gathered": True})
     if socket:
         ours["channel"] = socket
     return tuple(sorted(ours.items()))

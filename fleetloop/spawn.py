@@ -3,6 +3,7 @@
 Each is told, by its brief, exactly what it may know; its buses' listening sockets go to the plant.
 """
 
+import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -45,12 +46,15 @@ def spawn(orders: Orders, links: Links, folder: Path, children: list[Child]) -> 
     robots = [r for r in scenario.names if deployment.is_ours(r) and here(PLANT)]
     ours = list(dict.fromkeys(scenario.bus_of(robot) for robot in robots))
     listeners = places.listen(folder, ours)
+    waited_for = [] if realtime else robots
+    told = {robot: secrets.token_hex(16) for robot in waited_for}
     try:
         with Nursery(batch=not realtime) as nursery:
             if here(PLANT):
                 plant = replace(
                     _plant(orders, links, folder),
                     listeners=tuple((bus, FIRST_FD + n) for n, bus in enumerate(ours)),
+                    controllers=tuple(told.items()),
                 )
                 fds = [listeners[bus].fileno() for bus in ours]
                 children.append(Child(nursery, PLANT, "plant", plant, fds))
@@ -58,7 +62,7 @@ def spawn(orders: Orders, links: Links, folder: Path, children: list[Child]) -> 
                 if here(role := agent_role(robot)):
                     bus = scenario.bus_of(robot)
                     socket = str(places.socket_path(folder, bus)) if robot in robots else ""
-                    agent = _agent(orders, links, robot, socket, realtime=realtime)
+                    agent = _agent(orders, links, robot, socket, told.get(robot, ""))
                     children.append(Child(nursery, role, "agents", agent))
             recorder = _recorder(orders, links)
             children.append(Child(nursery, RECORDER, "fleetloop.recorder", recorder))
@@ -78,13 +82,12 @@ def _plant(orders: Orders, links: Links, folder: Path) -> PlantBrief:
     return placing.robots_of_plant(brief, orders.deployment)
 
 
-def _agent(orders: Orders, links: Links, robot: str, socket: str, *, realtime: bool) -> AgentBrief:
-    pace = "gathered" if realtime else "paced"
+def _agent(orders: Orders, links: Links, robot: str, socket: str, secret: str) -> AgentBrief:
     return agent_brief(
         orders.scenario,
         robot,
         network=links[access.agent_user(robot)],
-        bus=placing.agent_bus(orders.deployment, robot, pace=pace, socket=socket),
+        bus=placing.agent_bus(orders.deployment, robot, secret=secret, socket=socket),
         speed=orders.speed,
         profile=orders.profile,
     )

@@ -6,7 +6,6 @@ inherited file descriptors.
 
 import socket
 import time
-from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
@@ -49,7 +48,9 @@ def run(brief: PlantBrief, stop: Stop) -> str:
             if brief.detached:
                 gone = partial(stop.end, LAUNCHER_GONE)
                 link.on_gone(keys.live(brief.network.run, LAUNCHER), gone)
-            hub = Hub(listeners, stop.wake_fd, queue=brief.wire.txqueuelen if brief.wire else 0)
+            queue = brief.wire.txqueuelen if brief.wire else 0
+            controllers = _controllers(brief)
+            hub = Hub(listeners, stop.wake_fd, queue=queue, controllers=controllers)
             end: DriveEnd = hub
             try:
                 end = join(hub, brief.attached)
@@ -60,6 +61,15 @@ def run(brief: PlantBrief, stop: Stop) -> str:
         # The launcher does it too, unless it was killed.
         places.remove_run_folder(Path(brief.runtime_folder))
     return f"ended after {counters.ticks} ticks"
+
+
+def _controllers(brief: PlantBrief) -> dict[str, dict[str, str]]:
+    """The secrets of those whom the buses wait for, by bus and robot."""
+    bus_of = {robot.robot: robot.bus for robot in brief.robots}
+    found: dict[str, dict[str, str]] = {}
+    for robot, secret in brief.controllers:
+        found.setdefault(bus_of[robot], {})[robot] = secret
+    return found
 
 
 def join(hub: Hub, attached: Sequence[tuple[str, Settings]]) -> DriveEnd:
@@ -227,17 +237,16 @@ def _put_rows(publisher: Publisher, first: int, count: int, rows: bytes, final: 
 
 
 def _await_controllers(brief: PlantBrief, hub: Hub, hellos: Hellos, stop: Stop) -> None:
-    """Say hello until every bus has its controller; bounded by the start deadline."""
+    """Say hello until every robot's controller is on its bus; bounded by the start deadline."""
     rounds = int(brief.schedule.start_deadline_s / 0.02)
-    buses = Counter(robot.bus for robot in brief.robots)
     for _ in range(rounds):
         hellos.say()
-        missing = hub.await_paced(buses, 0.02)
+        missing = hub.await_controllers(0.02)
         if not missing or stop.requested:
             return
     raise InfrastructureError(
         f"plant: not ready after {brief.schedule.start_deadline_s:g} s:"
-        f" no controller on bus {', '.join(missing)}"
+        f" no controller of {', '.join(missing)} on its bus"
     )
 
 

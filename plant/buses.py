@@ -5,7 +5,9 @@ answer (an `Ask`), is sent what the clients of the bus had to say, and yields No
 over. Who drives it, over sockets or by calls, changes nothing of what happens.
 
     IdealBus    frames take no time: the drives' frames of an instant are the question, the answer
-                reaches them at the same instant; replies go out at once and are a question again
+                reaches them at the same instant; replies go out at once and are a question again,
+                up to `MAX_QUESTIONS` a tick: what is said beyond them waits for the next tick, so
+                that nobody who never stops asking can stop time
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -29,6 +31,7 @@ class Ask(NamedTuple):
 
 
 _new = tuple.__new__  # of a question, past its constructor: this is the hot path
+MAX_QUESTIONS = 32
 _Answer = TypeVar("_Answer")
 Steps = Generator[Ask | None, Sequence[_Answer], None]
 Begin = Callable[[int], None]
@@ -54,6 +57,7 @@ class IdealBus:
         period_s, period_ns, last = schedule.period_s, schedule.period_ns, schedule.ticks
         units = self.units
         (unit,) = units if len(units) == 1 else (None,)
+        late: list[Frame] = []  # replies that nobody was told in their own tick
         for tick in range(-schedule.countdown_ticks, last + 1):
             bus_ns = schedule.bus_time_ns(tick)
             begin(tick)
@@ -62,13 +66,20 @@ class IdealBus:
             else:
                 frames = sorted(frame for u in units for frame in u.frames_due(bus_ns))
             tap(bus_ns, frames, FROM_DRIVE)
+            if late:
+                frames, late = [*frames, *late], []
             answers = yield _new(Ask, (bus_ns, frames, (), "", ()))
+            asked = 1
             while answers:
                 tap(bus_ns, answers, 0)
                 replies = self._hear(answers, bus_ns)
                 if not replies:
                     break
                 tap(bus_ns, replies, FROM_DRIVE)
+                if asked == MAX_QUESTIONS:
+                    late = replies
+                    break
+                asked += 1
                 answers = yield Ask(bus_ns, replies)
             if 0 <= tick < last:
                 t_s = tick * period_ns * 1e-9

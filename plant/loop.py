@@ -287,12 +287,13 @@ class LockstepLoop:
     def _look_for_the_absent(self, now_ns: int) -> None:
         left = set(self._hub.left())
         limit_ns = int(self._limit_s * 1e9)
-        for bus, lane in self._lanes.items():
+        for lane in self._lanes.values():
             when = f"tick {lane.tick} (t = {lane.tick * self._schedule.period_ns * 1e-9:.3f} s)"
             robot = lane.asked or " or ".join(lane.robots)
             # Each controller leaves when it has answered the closing tick.
-            if bus in left and lane.tick < self._ticks:
-                raise PeerLostError(f"{when}: the controller of {robot} left its bus")
+            if lane.tick < self._ticks and (gone := left.intersection(lane.robots)):
+                names = " and ".join(sorted(gone))
+                raise PeerLostError(f"{when}: the controller of {names} left its bus")
             if lane.asked_ns and now_ns - lane.asked_ns > limit_ns:
                 raise InfrastructureError(
                     f"{when}: no answer from the controller of {robot} within {self._limit_s:g} s"

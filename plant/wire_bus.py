@@ -4,14 +4,17 @@
     a drive has something due   its own time             its frames go to its mailboxes
     a frame ends                by the wire              all clients hear it; a host's is on its way
                                                          to the drives' firmware
+    a frame is destroyed        by the wire              all clients hear an error frame
     firmware looks at it        a latency after its end  the drive acts; replies go to its mailboxes
     a robot's drives are done   with their last frame    its controller is asked; what it says goes
     saying the tick                                      to its transmit queue then
     the tick is over            start of the next one    who was not asked yet hears what there is,
                                                          and that the tick passed
 
-Bodies move from event to event. What finds no free mailbox waits for one, the newest of its
-identifier; what finds no room in a client's transmit queue is refused and counted.
+A client joins the wire with the first frame that it sends: who only listens is no node, and changes
+nothing. An error frame from a client is an error flag on order (`wire`). Bodies move from event to
+event. What finds no free mailbox waits for one, the newest of its identifier; what finds no room in
+a client's transmit queue is refused and counted.
 """
 
 from collections.abc import Sequence
@@ -199,8 +202,7 @@ class WireBus:
             if isinstance(event, Delivered):
                 self._deliver(event)
             elif isinstance(event, ErrorFrame):
-                for key, node in self._hosts.items():
-                    self._passed.append(Passed(event.at_ns, of_error(event, node), to=key))
+                self._note_error(event)
             else:
                 self._note_state(event)
         while self._mail and self._mail[0][0] <= at_ns:
@@ -241,6 +243,11 @@ class WireBus:
                 target.looks_ns = max(target.looks_ns, end_ns + latency_ns)
                 self._number += 1
                 heappush(self._mail, (target.looks_ns, self._number, target, frame))
+
+    def _note_error(self, event: ErrorFrame) -> None:
+        apart = {key: of_error(event, node) for key, node in self._hosts.items()}
+        self._passed.append(Passed(event.at_ns, of_error(event, None), apart=apart))
+        self._freed += [(self._key_of[n], 1) for n in event.ordered_by if n in self._key_of]
 
     def _note_state(self, event: StateChanged) -> None:
         node = event.node

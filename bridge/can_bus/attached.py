@@ -48,7 +48,7 @@ class Counters:
         self.from_drives = 0
         self.from_clients = 0
         self.dropped = 0  # could not be sent, or were not taken in time
-        self.garbage = 0  # FD frames
+        self.garbage = 0  # FD frames, and what is no frame of classic CAN
         self.error_frames = 0
         self.outages = 0
 
@@ -231,7 +231,9 @@ class AttachedBuses:
             if message.is_error_frame:
                 counters.error_frames += 1
                 continue
-            if message.is_fd:
+            try:
+                frame = to_frame(message)
+            except ValueError:
                 counters.garbage += 1
                 continue
             frame = to_frame(message)

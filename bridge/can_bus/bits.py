@@ -19,7 +19,7 @@ analysis (Davis, Burns, Bril, Lukkien 2007, equation 1); no real frame is longer
 
 from functools import lru_cache
 
-from bridge.frame import EFF, ERR, ID_MASK_11, ID_MASK_29, MAX_DATA, RTR, Frame
+from bridge.frame import EFF, ERR, ID_MASK_11, ID_MASK_29, RTR, Frame, flaw
 
 INTERMISSION_BITS = 3
 END_BITS = 7  # end of frame
@@ -27,6 +27,8 @@ TRAILER_BITS = 10  # delimiter, acknowledge, delimiter, end of frame
 ERROR_FLAG_BITS = 6
 LONGEST_ERROR_FLAG_BITS = 12  # of nodes that notice one after the other
 ERROR_DELIMITER_BITS = 8
+ERROR_FRAME_BITS = LONGEST_ERROR_FLAG_BITS + ERROR_DELIMITER_BITS + INTERMISSION_BITS
+"""Of a flag that all others notice by its six dominant bits in a row, intermission included."""
 SUSPEND_BITS = 8  # an error passive transmitter's pause after its frame
 CRC_POLYNOMIAL = 0x4599
 _CRC_BITS = 15
@@ -49,7 +51,7 @@ def frame_bits(frame: Frame) -> int:
     """Exact number of bits of a frame on the wire, from its start through its intermission.
 
     Raises:
-        ValueError: an error frame, or more than 8 bytes; no classic frame is like that.
+        ValueError: an error frame, or no frame of classic CAN.
     """
     head, size, data = _fields(frame)
     content = head.to_bytes(size + 7 >> 3, "big") + data
@@ -111,9 +113,8 @@ def _fields(frame: Frame) -> tuple[int, int, bytes]:
     """Start through control field as a number, its bits, and the data that follow."""
     can_id, data = frame
     length = len(data)
-    if length > MAX_DATA or can_id & ERR:
-        kind = "is an error frame" if can_id & ERR else f"has {length} bytes of data"
-        raise ValueError(f"frame 0x{can_id:X} {kind}: a classic CAN frame has at most {MAX_DATA}")
+    if wrong := flaw(can_id, length) or ("an error frame has no length" if can_id & ERR else ""):
+        raise ValueError(f"frame 0x{can_id:X}: {wrong}")
     if can_id <= ID_MASK_11:
         return can_id << 7 | length, 19, data
     if can_id & RTR:

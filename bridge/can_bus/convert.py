@@ -4,12 +4,15 @@ A message is made slot by slot: its constructor checks what a frame of ours can'
 would cost a good part of a control period.
 """
 
+from operator import index
+
 import can
 
-from bridge.frame import EFF, ERR, ID_MASK_11, ID_MASK_29, RTR, Frame
+from bridge.frame import EFF, ERR, ID_MASK_11, ID_MASK_29, MAX_DATA, RTR, Frame, flaw
 
 _Message = can.Message
 _new = object.__new__
+_new_frame = tuple.__new__
 
 
 def to_message(
@@ -52,7 +55,42 @@ def can_id_of(message: can.Message) -> int:
 
 
 def to_frame(message: can.Message) -> Frame:
-    """The frame of a classic message."""
-    if message.is_remote_frame:
-        return Frame(can_id_of(message), bytes(message.dlc))
-    return Frame(can_id_of(message), bytes(message.data))
+    """The frame of a classic message: what `can.Message(check=True)` takes.
+
+    Raises:
+        ValueError: it is none, as the text says.
+    """
+    flagged = message.is_extended_id or message.is_remote_frame or message.is_error_frame
+    if not flagged and not message.is_fd:
+        can_id, data = message.arbitration_id, message.data
+        if (
+            type(can_id) is int
+            and 0 <= can_id <= ID_MASK_11
+            and type(data) is bytearray
+            and len(data) == message.dlc <= MAX_DATA
+        ):
+            return _new_frame(Frame, (can_id, bytes(data)))
+    return _checked(message)
+
+
+def _checked(message: can.Message) -> Frame:
+    if message.is_fd:
+        raise ValueError("an FD frame: the bus is classic CAN")
+    wide = message.is_extended_id or message.is_error_frame
+    limit = ID_MASK_29 if wide else ID_MASK_11
+    try:
+        identifier, length = index(message.arbitration_id), index(message.dlc)
+        data = bytes(memoryview(message.data or b""))
+    except TypeError as error:
+        raise ValueError(f"identifier, length or data of a wrong type: {error}") from error
+    if not 0 <= identifier <= limit:
+        bits = 29 if wide else 11
+        raise ValueError(f"identifier {identifier:#x}: {bits} bits hold 0 to {limit:#x}")
+    can_id = can_id_of(message)
+    if wrong := flaw(can_id, length):
+        raise ValueError(wrong)
+    if message.is_remote_frame and data:
+        raise ValueError(f"a remote frame with {len(data)} bytes of data: it carries none")
+    if not message.is_remote_frame and len(data) != length:
+        raise ValueError(f"dlc {length} and {len(data)} bytes of data: they must match")
+    return Frame(can_id, data or bytes(length))

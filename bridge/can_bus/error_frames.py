@@ -7,7 +7,8 @@
     its node is bus-off    0x40
     its node is back       0x100
 
-Byte 6 and 7 are the transmit and receive error counters of the client's own node, up to 255.
+Byte 6 and 7 are the transmit and receive error counters of the client's own node, up to 255. A
+client that has sent nothing has no node on the wire: for it they are 0.
 """
 
 from bridge.can_bus.confinement import NodeState
@@ -23,8 +24,8 @@ _VIOLATION = {
 }
 
 
-def of_error(event: ErrorFrame, node: Node) -> Frame:
-    """What a client at `node` hears of a destroyed frame."""
+def of_error(event: ErrorFrame, node: Node | None) -> Frame:
+    """What a client at `node` hears of a destroyed frame; None: it has no node."""
     if event.kind is ErrorKind.ACK:
         return _frame(NO_ACK, node)
     kind, place = _VIOLATION[event.kind]
@@ -49,8 +50,9 @@ def of_state(event: StateChanged, before: NodeState) -> Frame:
     return _frame(CONTROLLER, node, (0, status))
 
 
-def _frame(kind: int, node: Node, details: tuple[int, ...] = ()) -> Frame:
+def _frame(kind: int, node: Node | None, details: tuple[int, ...] = ()) -> Frame:
     data = bytearray(8)
     data[: len(details)] = bytes(details)
-    data[6], data[7] = min(node.confinement.tec, 255), min(node.confinement.rec, 255)
+    if node is not None:
+        data[6], data[7] = min(node.confinement.tec, 255), min(node.confinement.rec, 255)
     return Frame(ERR | kind, bytes(data))

@@ -4,109 +4,56 @@
     collect    wait until paced clients have said all they had to say until that instant
     take       what the clients of a bus sent since the last take
 
-A *gathered* client takes and sends the frames of one instant together, in one packet. A *paced* one
-(a controller in lockstep) is gathered, and owes an answer to every packet: bus time stands still
-until it has answered. All others (loggers, host code under test) come, go, crash or stop reading as
-they like: what they send is taken at the next instant, what they don't read is kept for them up to
-`BACKLOG` frames and then dropped and counted. A client's frames go to all other clients of its bus,
-and back to itself only if it asked for that. One thread, one epoll, no clock but for the bound.
+A *gathered* client takes and sends the frames of one instant together, in one packet or several.
+A *paced* one is gathered, and owes an answer to every question: bus time stands still until it has
+answered. Only a robot's own controller in lockstep can be: it gives its name and a secret that
+nobody else was told. All others (loggers, host code under test) come, go, crash or stop reading as
+they like: what they send is taken at the next instant, what they don't read is kept for them within
+a bound (`connection`). A client's frames go to all other clients of its bus, and back to itself
+only if it asked for that. One thread, one epoll, no clock but for the bound.
+
+Whoever sends more than `UNTAKEN` frames of a bus before these are taken is not read until they are:
+its transmit buffer is full then, and nothing is lost. What is no packet, and what is no frame of
+classic CAN, is counted and goes nowhere; the good frames of a packet do. On a bus where frames take
+no time there is nothing on the wire that an error frame could destroy: it goes to all other
+clients, and not to the drives.
 
 A bus with a `queue` has bit timing: the hub then carries and doesn't forward. Who emulates the wire
 takes with `say` who sent what, gives with `pass_on` what ended when and who had sent it, and tells
 with `left_queue` whose transmit queue has room again.
 """
 
+import hmac
 import select
 import socket
 import time
-from collections import deque
 from collections.abc import Mapping, Sequence
 
 from bridge.can_bus import packet as wire
+from bridge.can_bus.connection import Bus, Connection, Counters
 from bridge.can_bus.traffic import Key, Passed, Said, Stamped
-from bridge.frame import Frame
+from bridge.frame import ERR, Frame
 
-BACKLOG = 100_000
 MAX_CLIENTS = 64
-GOODBYE_S = 0.5
-"""How long the end of a bus may wait for clients that are behind."""
+UNTAKEN = 100_000
+GOODBYE_S = 1.5
+"""How long the end of a bus may wait for clients that are behind ..."""
+STANDSTILL_S = 0.5
+"""... and for one that takes nothing at all."""
+_LOOK_MS = 20
 _READ, _WRITE = select.EPOLLIN, select.EPOLLOUT
-
-
-class Counters:
-    """What went over one bus."""
-
-    __slots__ = ("dropped", "from_clients", "from_drives", "garbage", "joins")
-
-    def __init__(self) -> None:
-        self.from_drives = 0
-        self.from_clients = 0
-        self.dropped = 0
-        self.garbage = 0
-        self.joins = 0
-
-
-class _Client:
-    __slots__ = (
-        "backlog",
-        "bus",
-        "gathered",
-        "gone",
-        "joined",
-        "key",
-        "name",
-        "owes",
-        "own",
-        "paced",
-        "pending",
-        "receive",
-        "send",
-        "sock",
-    )
-
-    def __init__(self, sock: socket.socket, bus: "_Bus") -> None:
-        self.sock = sock
-        self.receive, self.send = sock.recv, sock.send
-        self.bus = bus
-        self.name = ""
-        self.key: Key = 0
-        self.gone = 0  # frames that left its transmit queue
-        self.pending: list[Stamped] = []  # what a paced client hears with its next question
-        self.joined = self.paced = self.gathered = self.own = self.owes = False
-        self.backlog: deque[bytes] = deque()
-
-
-class _Bus:
-    __slots__ = (
-        "clients",
-        "counters",
-        "departed",
-        "listener",
-        "name",
-        "owing",
-        "queue",
-        "said",
-        "stamp_ns",
-        "taken",
-    )
-
-    def __init__(self, name: str, listener: socket.socket, queue: int) -> None:
-        self.queue = queue
-        self.said: list[Said] = []
-        self.departed: list[Key] = []
-        self.name = name
-        self.listener = listener
-        self.stamp_ns = -1  # not powered up yet
-        self.clients: list[_Client] = []
-        self.taken: list[Frame] = []
-        self.owing = 0
-        self.counters = Counters()
+_NOBODY: Mapping[str, Mapping[str, str]] = {}
 
 
 class Hub:
-    """All buses of one process; `listeners` are bound, listening sockets by bus name.
+    """All buses of one process.
 
-    `queue` is how many frames may wait at a client, on buses with bit timing; 0: they have none.
+    Args:
+        listeners: bound, listening sockets by bus name.
+        wake_fd: a descriptor that ends a wait.
+        queue: frames that may wait at a client, on buses with bit timing; 0: they have none.
+        controllers: of each bus the secrets of its robots' controllers, by robot. Bus time waits
+            for these and for nobody else.
     """
 
     def __init__(
@@ -115,12 +62,16 @@ class Hub:
         wake_fd: int | None = None,
         *,
         queue: int = 0,
+        controllers: Mapping[str, Mapping[str, str]] = _NOBODY,
     ) -> None:
-        self._buses = {name: _Bus(name, sock, queue) for name, sock in listeners.items()}
+        self._buses = {
+            name: Bus(name, sock, queue, controllers.get(name, {}))
+            for name, sock in listeners.items()
+        }
         self._joined = 0
         self._epoll = select.epoll()
         self._poll = self._epoll.poll
-        self._readers: dict[int, _Client | _Bus | None] = {}
+        self._readers: dict[int, Connection | Bus | None] = {}
         self._answered: list[str] = []
         self._left: list[str] = []
         for bus in self._buses.values():
@@ -139,21 +90,25 @@ class Hub:
         clients = bus.clients
         if not clients:
             return
-        together = wire.encode_frames(0, stamp_ns, frames)
-        if len(clients) == 1:
+        if len(clients) == 1 and len(frames) <= wire.MAX_FRAMES:
             (client,) = clients
             if client.paced and not (client.owes or client.backlog or client.pending):
                 client.owes = True
                 bus.owing += 1
-                self._send(client, together)
+                self._send(client, wire.encode_frames(0, stamp_ns, frames))
                 return
-        clients = clients.copy()
-        for client in clients:
-            if client.gathered:
-                if client.paced and not client.owes:
-                    client.owes = True
-                    bus.owing += 1
-                self._send(client, self._with_pending(client, stamp_ns, frames) or together)
+        together = b""
+        for client in clients.copy():
+            if client.paced and not client.owes:
+                client.owes = True
+                bus.owing += 1
+            if client.pending or (client.gathered and len(frames) > wire.MAX_FRAMES):
+                heard, client.pending = client.pending, []
+                heard += [Stamped(stamp_ns, frame) for frame in frames]
+                self._send_all(client, stamp_ns, heard)
+            elif client.gathered:
+                together = together or wire.encode_frames(0, stamp_ns, frames)
+                self._send(client, together)
             else:
                 # One frame a packet: a readable descriptor must mean one more frame.
                 for frame in frames:
@@ -169,20 +124,21 @@ class Hub:
         bus = self._buses[name]
         bus.stamp_ns = stamp_ns
         for client in bus.clients.copy():
-            heard = [Stamped(p.end_ns, p.frame) for p in frames if p.heard_by(client.key)]
+            heard = [p.as_heard_by(client.key) for p in frames if p.heard_by(client.key)]
             if client.own:
                 for mine in (Stamped(p.end_ns, p.frame) for p in frames if p.key == client.key):
                     own = wire.encode_stamped(wire.OWN, stamp_ns, [mine], client.gone)
                     self._send(client, own)
             if client.paced:
-                client.pending += heard
+                for frame in heard:
+                    client.pend(frame)
                 if asked is not None and asked in ("", client.name):
                     heard, client.pending = client.pending, []
                     bus.owing += not client.owes
                     client.owes = True
-                    self._send(client, wire.encode_stamped(0, stamp_ns, heard, client.gone))
+                    self._send_all(client, stamp_ns, heard)
             elif client.gathered and heard:
-                self._send(client, wire.encode_stamped(0, stamp_ns, heard, client.gone))
+                self._send_all(client, stamp_ns, heard)
             else:
                 for one in heard:
                     self._send(client, wire.encode_stamped(0, stamp_ns, [one], client.gone))
@@ -191,6 +147,8 @@ class Hub:
         """What the clients of a bus with bit timing sent since the last call, in order."""
         bus = self._buses[name]
         said, bus.said = bus.said, []
+        if bus.held:
+            self._release(bus)
         return said
 
     def departed(self, name: str) -> list[Key]:
@@ -245,20 +203,30 @@ class Hub:
         taken = bus.taken
         if taken:
             bus.taken = []
+        if bus.held:
+            self._release(bus)
         return taken
 
-    def await_paced(self, wanted: Mapping[str, int], timeout_s: float) -> tuple[str, ...]:
-        """Wait until each bus has this many paced clients; return the buses that have not."""
+    def await_controllers(self, timeout_s: float) -> tuple[str, ...]:
+        """Wait until all robots' controllers have joined; return the robots whose have not."""
         deadline = time.monotonic() + timeout_s
-        while missing := tuple(name for name, n in wanted.items() if self._paced(name) < n):
+        while missing := self._missing():
             left_s = deadline - time.monotonic()
             if left_s <= 0:
                 return missing
             self._handle(left_s)
         return ()
 
+    def _missing(self) -> tuple[str, ...]:
+        return tuple(
+            robot
+            for bus in self._buses.values()
+            for robot in bus.controllers
+            if robot not in bus.joined_controllers()
+        )
+
     def left(self) -> tuple[str, ...]:
-        """Buses whose paced client has gone, in the order in which they went."""
+        """Robots whose controllers have gone, in the order in which they went."""
         return tuple(self._left)
 
     def counters(self, name: str) -> Counters:
@@ -276,36 +244,42 @@ class Hub:
     def close(self, reason: str) -> None:
         """Say goodbye to all clients and close everything. Idempotent.
 
-        Who is behind has `GOODBYE_S` to take what was kept for it.
+        Who is behind may take what was kept for it, for `GOODBYE_S` at most and as long as it takes
+        something every `STANDSTILL_S`; then it is told how much it lost.
         """
         if self._epoll.closed:
             return
         goodbye = wire.encode_text(wire.BYE, reason)
         clients = [client for bus in self._buses.values() for client in bus.clients]
+        self._let_catch_up([client for client in clients if client.backlog or client.missing])
         for client in clients:
-            if client.backlog:
-                client.backlog.append(goodbye)  # past the bound: it is the last one
-            else:
-                self._send(client, goodbye)
-        self._let_catch_up([client for client in clients if client.backlog])
+            client.say_last(goodbye)
         for bus in self._buses.values():
             bus.listener.close()
         for reader in self._readers.values():
-            if isinstance(reader, _Client):
+            if isinstance(reader, Connection):
                 reader.sock.close()
         self._readers.clear()
         self._epoll.close()
 
-    def _let_catch_up(self, behind: Sequence[_Client]) -> None:
-        deadline = time.monotonic() + GOODBYE_S
+    def _let_catch_up(self, behind: Sequence[Connection]) -> None:
+        now_s = time.monotonic()
+        deadline = now_s + GOODBYE_S
         poller = select.poll()
         clients = {client.sock.fileno(): client for client in behind}
+        patience = dict.fromkeys(clients, now_s + STANDSTILL_S)
         for fd in clients:
             poller.register(fd, select.POLLOUT)
-        while clients and (left_s := deadline - time.monotonic()) > 0.0:
-            for fd, _ in poller.poll(left_s * 1e3):
-                self._drain(clients[fd])
-                if clients[fd].sock.fileno() < 0 or not clients[fd].backlog:
+        while clients:
+            # A socket is polled as writable when a good part of it is free: look more often.
+            poller.poll(_LOOK_MS)
+            now_s = time.monotonic()
+            for fd, client in tuple(clients.items()):
+                before = len(client.backlog)
+                drained = client.drain()
+                if len(client.backlog) < before:
+                    patience[fd] = now_s + STANDSTILL_S
+                if drained or now_s >= min(deadline, patience[fd]):
                     poller.unregister(fd)
                     del clients[fd]
 
@@ -317,7 +291,7 @@ class Hub:
         readers = self._readers
         for fd, event in self._poll(timeout_s):
             reader = readers.get(fd)
-            if isinstance(reader, _Client):
+            if isinstance(reader, Connection):
                 if event == _READ:
                     self._read(reader)
                     continue
@@ -331,7 +305,7 @@ class Hub:
                 woken = True
         return woken
 
-    def _read(self, client: _Client) -> None:
+    def _read(self, client: Connection) -> None:
         try:
             data = client.receive(wire.MAX_BYTES)
         except BlockingIOError:
@@ -346,6 +320,8 @@ class Hub:
         packet = wire.decode(data)
         if packet is not None and packet[0] == wire.FRAMES and client.joined:
             self._take_frames(client, packet)
+            if packet.flawed:
+                client.bus.counters.garbage += packet.flawed
             return
         if packet is None or (packet.kind == wire.FRAMES) != client.joined:
             client.bus.counters.garbage += 1
@@ -354,74 +330,72 @@ class Hub:
         else:
             client.bus.counters.garbage += 1
 
-    def _take_frames(self, client: _Client, packet: wire.Packet) -> None:
+    def _take_frames(self, client: Connection, packet: wire.Packet) -> None:
         bus = client.bus
         _, flags, _, stamp_ns, frames, *_ = packet
-        if frames and bus.queue:
-            bus.said += [Said(client.key, frame) for frame in frames]
+        if frames:
             bus.counters.from_clients += len(frames)
-        elif frames:
-            bus.taken += frames
-            bus.counters.from_clients += len(frames)
-            if client.own or len(bus.clients) > 1:
-                self._forward(client, frames)
+            if bus.queue:
+                bus.said += [Said(client.key, frame) for frame in frames]
+            else:
+                if client.own or len(bus.clients) > 1:
+                    self._forward(client, frames)
+                bus.taken += _without_errors(frames) if not client.paced else frames
+            if len(bus.taken) + len(bus.said) >= UNTAKEN and not client.paced:
+                client.held = True
+                bus.held.append(client)
+                self._watch(client)
         if client.owes and flags & wire.DONE and stamp_ns == bus.stamp_ns:
             self._settle(client)
 
-    def _settle(self, client: _Client) -> None:
+    def _release(self, bus: Bus) -> None:
+        """What was said is taken: read those again who said so much."""
+        held, bus.held = bus.held, []
+        for client in held:
+            client.held = False
+            if client.sock.fileno() >= 0:
+                self._watch(client)
+
+    def _settle(self, client: Connection) -> None:
         client.owes = False
         bus = client.bus
         bus.owing -= 1
         if not bus.owing:
             self._answered.append(bus.name)
 
-    def _forward(self, sender: _Client, frames: Sequence[Frame]) -> None:
+    def _forward(self, sender: Connection, frames: Sequence[Frame]) -> None:
         bus = sender.bus
         for frame in frames:
             data = wire.encode_frames(0, bus.stamp_ns, (frame,))
             for client in tuple(bus.clients):
                 if client.paced and client is not sender:
-                    client.pending.append(Stamped(bus.stamp_ns, frame))
+                    client.pend(Stamped(bus.stamp_ns, frame))
                 elif client is not sender:
                     self._send(client, data)
             if sender.own:
                 self._send(sender, wire.encode_frames(wire.OWN, bus.stamp_ns, (frame,)))
 
-    def _with_pending(
-        self, client: _Client, stamp_ns: int, frames: Sequence[Frame]
-    ) -> bytes | None:
-        """A packet of these frames after those that came meanwhile; None if none came."""
-        if not client.pending:
-            return None
-        heard = [*client.pending, *(Stamped(stamp_ns, frame) for frame in frames)]
-        client.pending = []
-        return wire.encode_stamped(0, stamp_ns, heard, 0)
-
-    def _accept(self, bus: _Bus) -> None:
+    def _accept(self, bus: Bus) -> None:
         try:
             sock, _ = bus.listener.accept()
         except OSError:
             return
         sock.setblocking(False)
-        self._register(sock.fileno(), _Client(sock, bus))
+        self._register(sock.fileno(), Connection(sock, bus, _READ))
 
-    def _welcome(self, client: _Client, hello: wire.Packet) -> None:
+    def _welcome(self, client: Connection, hello: wire.Packet) -> None:
         bus = client.bus
-        refusal = ""
-        if hello.number != wire.VERSION:
-            refusal = f"it speaks version {hello.number} of the bus's packets, not {wire.VERSION}"
-        elif len(bus.clients) >= MAX_CLIENTS:
-            refusal = f"it has {MAX_CLIENTS} clients already"
-        if refusal:
+        client.name, _, secret = hello.text.partition("\0")
+        paced = bool(hello.flags & wire.PACED)
+        if refusal := self._refusal(bus, hello.number, client.name, secret if paced else None):
             self._send(client, wire.encode_text(wire.REFUSED, refusal))
             self._drop(client)
             return
         self._joined += 1
-        client.name = hello.text
-        client.paced = bool(hello.flags & wire.PACED)
-        client.gathered = client.paced or bool(hello.flags & wire.GATHERED)
+        client.paced = paced
+        client.gathered = paced or bool(hello.flags & wire.GATHERED)
         client.own = bool(hello.flags & wire.OWN)
-        client.key = client.name if client.paced else self._joined
+        client.key = client.name if paced else self._joined
         client.joined = True
         bus.clients.append(client)
         bus.counters.joins += 1
@@ -430,40 +404,52 @@ class Hub:
         )
         self._send(client, welcome)
 
-    def _send(self, client: _Client, data: bytes) -> None:
-        if client.backlog:
-            self._keep(client, data)
-            return
-        try:
-            client.send(data)
-        except BlockingIOError:
-            self._keep(client, data)
-            self._epoll.modify(client.sock.fileno(), _READ | _WRITE)
-        except OSError:
-            # It has gone; what it said before is still to be read, and then its end.
-            client.bus.counters.dropped += 1
+    def _refusal(self, bus: Bus, version: int, name: str, secret: str | None) -> str:
+        """Why a client may not join, "" if it may; `secret` None: it isn't paced."""
+        if version != wire.VERSION:
+            return f"it speaks version {version} of the bus's packets, not {wire.VERSION}"
+        if len(bus.clients) >= MAX_CLIENTS and secret is None:
+            return f"it has {MAX_CLIENTS} clients already"
+        if secret is None:
+            return ""
+        if not bus.controllers:
+            return (
+                "paced is for a robot's own controller in lockstep, and this bus waits for nobody"
+            )
+        known = bus.controllers.get(name)
+        if known is None or not hmac.compare_digest(known.encode(), secret.encode()):
+            robots = ", ".join(bus.controllers)
+            return (
+                f"paced is for the controllers that the run itself started, of {robots}: bus time"
+                " waits for these only; without paced anybody may join"
+            )
+        if name in bus.joined_controllers():
+            return f"the controller of {name} is on it already"
+        return ""
 
-    def _keep(self, client: _Client, data: bytes) -> None:
-        if len(client.backlog) < BACKLOG:
-            client.backlog.append(data)
-        else:
-            client.bus.counters.dropped += 1
+    def _send(self, client: Connection, data: bytes) -> None:
+        if not client.send(data):
+            self._watch(client)
 
-    def _drain(self, client: _Client) -> None:
-        backlog = client.backlog
-        try:
-            while backlog:
-                client.sock.send(backlog[0])
-                backlog.popleft()
-        except BlockingIOError:
-            return
-        except OSError:
-            # It has gone; what it said before is still to be read, and then its end.
-            client.bus.counters.dropped += len(backlog)
-            backlog.clear()
-        self._epoll.modify(client.sock.fileno(), _READ)
+    def _send_all(self, client: Connection, stamp_ns: int, frames: Sequence[Stamped]) -> None:
+        """Send what a client hears of an instant, together."""
+        for data in wire.split(0, stamp_ns, frames, client.gone):
+            self._send(client, data)
 
-    def _drop(self, client: _Client) -> None:
+    def _drain(self, client: Connection) -> None:
+        client.drain()
+        self._watch(client)
+
+    def _watch(self, client: Connection) -> None:
+        """Wait for what a client's connection waits for."""
+        mask = 0 if client.held else _READ
+        if client.backlog or client.missing:
+            mask |= _WRITE
+        if mask != client.mask:
+            client.mask = mask
+            self._epoll.modify(client.sock.fileno(), mask)
+
+    def _drop(self, client: Connection) -> None:
         fd = client.sock.fileno()
         if self._readers.pop(fd, None) is None:
             return
@@ -477,11 +463,15 @@ class Hub:
             client.owes = False
             client.bus.owing -= 1
         if client.paced:
-            self._left.append(client.bus.name)
+            self._left.append(client.name)
 
-    def _register(self, fd: int, reader: _Client | _Bus | None) -> None:
+    def _register(self, fd: int, reader: Connection | Bus | None) -> None:
         self._readers[fd] = reader
         self._epoll.register(fd, _READ)
 
-    def _paced(self, name: str) -> int:
-        return sum(client.paced for client in self._buses[name].clients)
+
+def _without_errors(frames: Sequence[Frame]) -> Sequence[Frame]:
+    """What drives hear of these."""
+    if any(can_id & ERR for can_id, _ in frames):
+        return [frame for frame in frames if not frame.can_id & ERR]
+    return frames

@@ -11,12 +11,21 @@ of own frames unless asked; classic CAN only. `Message.timestamp` is bus time: s
 was powered up. Linux.
 
 `gathered=True` is for a program that reads until nothing is left and then acts: frames of one
-instant come in one packet, and what it sends goes out with its next look at the bus. `paced=True`
-is for a controller in lockstep: it is gathered, the bus waits for it, and its next wait in `recv`
-with nothing left to read says: that was all until now.
+instant come in one packet, and what it sends goes out with its next look at the bus. `paced` is for
+a robot's own controller in lockstep, which is told its secret by the run: it is gathered, the bus
+waits for it, and its next wait in `recv` with nothing left to read says: that was all until now.
+
+`send` takes what `can.Message(check=True)` takes, but no FD frames, and refuses the rest before
+anything goes out. An error frame (`is_error_frame`) on a bus with bit timing is an error flag on
+order: it destroys the frame on the wire, and the nodes count it; where frames take no time it
+goes to the other clients.
+
+What a program doesn't read is kept for it within bounds; what is lost beyond them is counted in
+`lost`, logged, and told by the error with which the bus ends.
 """
 
 import errno
+import logging
 import socket
 import time
 from collections import deque
@@ -25,8 +34,8 @@ from typing import Any
 import can
 from can.typechecking import AutoDetectedConfig, CanFilters
 
+from bridge.can_bus import options, places
 from bridge.can_bus import packet as wire
-from bridge.can_bus import places
 from bridge.can_bus.convert import to_frame, to_message
 from bridge.can_bus.credentials import OPTIONS, as_option, network_of
 from bridge.can_bus.lines import Line, UnixLine
@@ -35,7 +44,7 @@ from configs.errors import ScenarioError
 
 FLUSH_S = 10.0
 """How long a hub that doesn't read may keep waiting who gathers what it sends."""
-_new = tuple.__new__  # of a frame, past its constructor: this is the hot path
+_LOG = logging.getLogger("can.fleetloop")  # as python-can's own interfaces name theirs
 _IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ignore_config"})
 
 
@@ -49,24 +58,30 @@ class FleetloopBus(can.BusABC):
     Args:
         channel: bus name ("r1"), run and bus ("<run>/r1"), or the path of the bus's socket.
         can_filters: see `can.BusABC.set_filters`.
-        paced: bus time waits for this client; the name of the robot that it controls, where a
-            bus has several.
+        paced: the robot whose controller this is, and for which bus time then waits.
+        secret: what the run told that controller and nobody else.
         gathered: frames of one instant travel together; a descriptor is readable once for all.
         receive_own_messages: frames sent come back, with `is_rx` False.
-        connect_timeout: how long to wait for the bus to answer [s].
+        connect_timeout: how long to wait for the bus to answer [s], above 0.
         fd: must be False; the bus is classic CAN.
         endpoint, user, ...: from another machine, see `bridge.can_bus.credentials`.
 
     Raises:
-        can.CanInitializationError: no such bus, or it refused; the text names what there is.
+        can.CanInitializationError: no such bus, it refused, or an option's value is wrong; the text
+            names what there is, or what is right.
+        TypeError: there is no such option.
     """
+
+    lost: int
+    """Frames for this client that were lost because it did not read them in time."""
 
     def __init__(
         self,
-        channel: str,
+        channel: str | int | None = None,
         can_filters: CanFilters | None = None,
         *,
-        paced: bool | str = False,
+        paced: str | bool = "",
+        secret: str = "",
         gathered: bool = False,
         receive_own_messages: bool = False,
         connect_timeout: float = 10.0,
@@ -76,11 +91,15 @@ class FleetloopBus(can.BusABC):
         remote = {key: as_option(kwargs.pop(key)) for key in OPTIONS if kwargs.get(key) is not None}
         if unknown := sorted(kwargs.keys() - _IGNORED - OPTIONS):
             raise TypeError(f"the fleetloop interface has no option {', '.join(unknown)}")
-        if fd:
+        self.channel = options.channel_name(channel)
+        if options.truth("fd", fd):
             raise can.CanInitializationError(f"bus {channel!r} is classic CAN: fd must be False")
-        self._paced = bool(paced)
-        self._gathered = gathered or self._paced
-        self._name = paced if isinstance(paced, str) else socket.gethostname()
+        self._name, self._secret = options.controller(paced, secret)
+        self._paced = bool(self._name)
+        self._gathered = options.truth("gathered", gathered) or self._paced
+        own = options.truth("receive_own_messages", receive_own_messages)
+        timeout_s = options.seconds("connect_timeout", connect_timeout)
+        self.lost = 0
         self._inbox: deque[can.Message] = deque()
         self._outbox: list[Frame] = []
         self._stamp_ns = -1
@@ -88,8 +107,7 @@ class FleetloopBus(can.BusABC):
         self._closed_because: str | None = None
         self._queue = 0  # frames that may wait at this node; 0: frames take no time
         self._said = self._gone = 0  # frames sent, and how many of them have left the queue
-        self.channel = as_option(channel)
-        self._line = self._connect(receive_own_messages, connect_timeout, remote)
+        self._line = self._connect(own, timeout_s, remote)
         self._send_now, self._next = self._line.send, self._line.receive
         self.channel_info = f"fleetloop bus {self.channel}"
         self._can_protocol = can.CanProtocol.CAN_20
@@ -106,12 +124,13 @@ class FleetloopBus(can.BusABC):
     def _connect(self, own: bool, timeout_s: float, remote: dict[str, str]) -> Line:
         flags = wire.PACED if self._paced else wire.GATHERED if self._gathered else 0
         flags |= wire.OWN if own else 0
-        hello = wire.encode_text(wire.HELLO, self._name, flags=flags, count=wire.VERSION)
+        name = f"{self._name}\0{self._secret}" if self._paced else socket.gethostname()
+        hello = wire.encode_text(wire.HELLO, name, flags=flags, count=wire.VERSION)
         line = None
         try:
             line = self._open_line(hello, timeout_s, remote)
             said = line.receive(timeout_s)
-        except (OSError, places.NoSuchBusError, ScenarioError) as error:
+        except (OSError, ValueError, places.NoSuchBusError, ScenarioError) as error:
             if line is not None:
                 line.close()
             late = isinstance(error, TimeoutError) and not remote
@@ -153,7 +172,8 @@ class FleetloopBus(can.BusABC):
                     deadline = time.monotonic() + timeout
             else:
                 wait_s = max(0.0, deadline - time.monotonic())
-            if not self._receive(wait_s) or (self._paced and not inbox):
+            # A question without a frame says that a tick has passed.
+            if not self._receive(wait_s) or (self._owes and not inbox):
                 return None
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
@@ -162,17 +182,17 @@ class FleetloopBus(can.BusABC):
         On a bus with bit timing it waits in this node's transmit queue until it wins the bus.
 
         Raises:
-            can.CanOperationError: FD frame, the bus is gone, or no room within `timeout`.
+            can.CanOperationError: no classic frame, the bus is gone, or no room within `timeout`.
         """
-        if msg.is_extended_id or msg.is_remote_frame or msg.is_error_frame or msg.is_fd:
-            if msg.is_fd:
-                raise can.CanOperationError("the bus is classic CAN: no FD frames")
+        try:
             frame = to_frame(msg)
-        else:
-            frame = _new(Frame, (msg.arbitration_id, bytes(msg.data)))
+        except ValueError as error:
+            raise can.CanOperationError(f"bus {self.channel!r}: not sent: {error}") from error
         if self._queue:
             self._await_room(timeout)
         if self._gathered:
+            if self._is_shutdown:
+                raise self._gone_with(None)
             if len(self._outbox) == wire.MAX_FRAMES:
                 self._flush(0)
             self._outbox.append(frame)
@@ -183,19 +203,25 @@ class FleetloopBus(can.BusABC):
         except BlockingIOError:
             self._send_late(data, timeout)
         except OSError as error:
-            raise can.CanOperationError(f"bus {self.channel!r} is gone: {error}") from error
+            raise self._gone_with(error) from error
 
     def fileno(self) -> int:
         """The descriptor that becomes readable with the next frame."""
         return self._line.fileno()
 
     def shutdown(self) -> None:
-        """Leave the bus; what was sent before is delivered. Idempotent."""
-        if self._line.fileno() >= 0:
+        """Leave the bus; what was sent before is delivered. Idempotent.
+
+        Threads that wait in `recv` or `send` come back with a `can.CanOperationError`.
+        """
+        if self._is_shutdown:
+            return
+        super().shutdown()
+        try:
             if self._outbox:
                 self._flush(wire.DONE)
+        finally:
             self._line.close()
-        super().shutdown()
 
     @staticmethod
     def _detect_available_configs() -> list[AutoDetectedConfig]:
@@ -214,11 +240,11 @@ class FleetloopBus(can.BusABC):
         elif self._outbox:
             self._flush(0)
         if self._closed_because is not None:
-            raise BusClosedError(f"bus {self.channel!r} closed: {self._closed_because}")
+            raise self._closed()
         try:
             data = self._next(wait_s)
         except OSError as error:
-            raise can.CanOperationError(f"bus {self.channel!r} is gone: {error}") from error
+            raise self._gone_with(error) from error
         if data is None:
             return False
         self._take(data)
@@ -227,9 +253,9 @@ class FleetloopBus(can.BusABC):
     def _take(self, data: bytes) -> None:
         packet = wire.decode(data)
         if packet is not None and packet[0] == wire.FRAMES:
-            _, flags, _, stamp_ns, frames, _, self._gone, before_ns = packet
+            _, flags, _, stamp_ns, frames, _, self._gone, before_ns, _ = packet
             self._stamp_ns = stamp_ns
-            self._owes = self._paced
+            self._owes = self._paced and not flags & wire.MORE
             timestamp, channel, is_rx = stamp_ns / 1e9, self.channel, not flags & wire.OWN
             put = self._inbox.append
             if before_ns:
@@ -241,9 +267,28 @@ class FleetloopBus(can.BusABC):
                 put(to_message(can_id, content, timestamp, channel, is_rx))
         elif packet is not None and packet.kind == wire.BYE:
             self._closed_because = packet.text
-            raise BusClosedError(f"bus {self.channel!r} closed: {packet.text}")
+            raise self._closed()
+        elif packet is not None and packet.kind == wire.LOST:
+            self.lost += packet.room
+            _LOG.warning("bus %r: %d frames lost: not read in time", self.channel, packet.room)
         elif not data:
-            raise can.CanOperationError(f"bus {self.channel!r} closed without a word")
+            raise self._gone_with(None)
+
+    def _closed(self) -> BusClosedError:
+        return BusClosedError(
+            f"bus {self.channel!r} closed: {self._closed_because}{self._losses()}"
+        )
+
+    def _gone_with(self, error: OSError | None) -> can.CanOperationError:
+        if self._is_shutdown:
+            return can.CanOperationError(f"bus {self.channel!r} was shut down")
+        if self._closed_because is not None:
+            return self._closed()
+        why = "closed without a word" if error is None else f"is gone: {error}"
+        return can.CanOperationError(f"bus {self.channel!r} {why}{self._losses()}")
+
+    def _losses(self) -> str:
+        return f"; {self.lost} frames for it were lost: not read in time" if self.lost else ""
 
     def _await_room(self, timeout: float | None) -> None:
         """Take a place in the transmit queue, waiting at most `timeout`; None: not at all."""
@@ -274,6 +319,6 @@ class FleetloopBus(can.BusABC):
             try:
                 self._send_now(data)
             except OSError as error:
-                raise can.CanOperationError(f"bus {self.channel!r}: {error}") from error
+                raise self._gone_with(error) from error
             return
         raise can.CanOperationError(f"bus {self.channel!r}: transmit buffer full", errno.ENOBUFS)

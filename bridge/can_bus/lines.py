@@ -4,6 +4,7 @@
 Zenoh.
 """
 
+import contextlib
 import select
 import socket
 import struct
@@ -33,7 +34,7 @@ class Line(Protocol):
         """A descriptor that is readable when a packet is there; −1 once it is closed."""
 
     def close(self) -> None:
-        """Leave; what was sent arrives. Idempotent."""
+        """Leave; what was sent arrives, and who waits in another thread wakes. Idempotent."""
 
 
 class UnixLine:
@@ -66,7 +67,10 @@ class UnixLine:
     def await_room(self, timeout_s: float) -> bool:
         """Wait until there is room to send."""
         poller = select.poll()
-        poller.register(self._socket, select.POLLOUT)
+        try:
+            poller.register(self._socket, select.POLLOUT)
+        except ValueError:
+            return True  # it is closed: whoever sends now hears that
         return bool(poller.poll(timeout_s * 1e3))
 
     def receive(self, wait_s: float | None) -> bytes | None:
@@ -84,13 +88,17 @@ class UnixLine:
         except ConnectionResetError:
             # The hub closed with something of ours unread; what it said is still to be read.
             return self._recv(wire.MAX_BYTES, socket.MSG_DONTWAIT)
+        except ValueError as error:  # a descriptor of −1
+            raise OSError("the line is closed") from error
 
     def fileno(self) -> int:
         """The socket's descriptor."""
         return self._socket.fileno()
 
     def close(self) -> None:
-        """Close the socket."""
+        """Close the socket; whoever waits at it in another thread wakes."""
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
 
     def _limit(self, wait_s: float | None) -> None:

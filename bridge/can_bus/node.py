@@ -80,7 +80,8 @@ class Delivered(NamedTuple):
 class ErrorFrame(NamedTuple):
     """A frame was destroyed: the error flag began at `at_ns`, the wire is free at `free_ns`.
 
-    The senders send it again as soon as they may.
+    The senders send it again as soon as they may. An error flag that was ordered on an idle wire
+    has no senders.
     """
 
     at_ns: int
@@ -88,7 +89,8 @@ class ErrorFrame(NamedTuple):
     free_ns: int
     kind: ErrorKind
     senders: tuple[Node, ...]
-    frame: Frame  # of the first sender
+    frame: Frame  # of the first sender; without any the error frame that was ordered
+    ordered_by: tuple[Node, ...] = ()  # who signalled it because they were told to
 
 
 class StateChanged(NamedTuple):

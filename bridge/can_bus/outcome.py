@@ -2,6 +2,7 @@
 
 In order, the first that applies:
 
+    an error flag on order                        see below
     a sender at the wrong bit rate                bit error after the arbitration field; all fail
     an active listener at the wrong bit rate      the same as a stuff error, and it was the first
     senders of one identifier, different bits     at the first bit that differs, who sends recessive
@@ -10,6 +11,11 @@ In order, the first that applies:
     a disturbance that corrupts it                form error at the delimiter of the CRC
     nobody else to hear it                        acknowledge error after the acknowledge slot
     else                                          it passes
+
+An error flag on order is six dominant bits in a row, at once whatever is on the wire. In a frame
+that is under way it destroys it from the next bit on. At its start it destroys it at the first
+recessive bit, of whoever starts with it. On an idle wire all others see it as a stuff error after
+the sixth bit. Who was told to signal it counts nothing.
 
 An error frame is the error flag, 6 bits, longer when others notice only by it (they see six
 dominant bits in a row and then send their own: 12 at most), and a delimiter of 8 bits.
@@ -22,6 +28,7 @@ from bridge.can_bus.bits import (
     END_BITS,
     ERROR_DELIMITER_BITS,
     ERROR_FLAG_BITS,
+    ERROR_FRAME_BITS,
     INTERMISSION_BITS,
     LONGEST_ERROR_FLAG_BITS,
     stuffed_bits,
@@ -54,6 +61,7 @@ class Outcome(NamedTuple):
     fallen: Sequence[Sending] = ()  # passive senders that saw a bit error and dropped out
     first: Node | None = None  # a listener that destroyed it
     disturbance: Disturbance | None = None
+    orders: Sequence[Sending] = ()  # error flags on order that destroyed it
 
 
 class Plan:
@@ -80,7 +88,32 @@ class Plan:
         """Whether a node is sending in it."""
         if self.what is None:
             return node is self.sender
-        return any(sending.node is node for sending in (*self.what.senders, *self.what.fallen))
+        what = self.what
+        return any(s.node is node for s in (*what.senders, *what.fallen, *what.orders))
+
+
+def ordered(orders: Sequence[Sending], starting: Sequence[Sending]) -> Outcome:
+    """What becomes of error flags on order, and of the frame that starts with them."""
+    at = ERROR_FLAG_BITS
+    if starting:
+        at = stuffed_bits(starting[0].entry.frame).index("1") + 1
+    return Outcome(starting, ERROR_FRAME_BITS, ErrorKind.STUFF, at, orders=orders)
+
+
+def cut_short(plan: Plan, order: Sending, bit: int) -> Outcome:
+    """What becomes of a transmission under way whose bits from `bit` on an error flag covers."""
+    before = plan.what
+    senders: Sequence[Sending] = (Sending(plan.sender, plan.entry),)
+    if before is None:
+        before = Outcome(senders, plan.entry.bits)
+    return before._replace(
+        bits=bit + ERROR_FRAME_BITS,
+        error=ErrorKind.STUFF,
+        error_bit=bit,
+        first=None,
+        disturbance=None,
+        orders=(*before.orders, order),
+    )
 
 
 def outcome(

@@ -4,30 +4,36 @@
     frame    can_id u32, length u8, 3 bytes padding, data 8 bytes      as Linux struct can_frame
     before   u32 for each frame, after all frames; absent if all are 0
 
-    kind       from     flags, count and body
-    HELLO      client   flags PACED, GATHERED, OWN; count = version; body = the client's name
-    WELCOME    hub      stamp = bus time; count = version; room = the client's transmit queue
-    REFUSED    hub      body = reason
-    FRAMES     both     count frames; from the hub OWN: the client's own come back;
-                        from a paced client DONE: all it had to say until `stamp`, which it echoes
-    BYE        hub      body = reason
+    kind         from     flags, count and body
+    1 HELLO      client   flags PACED, GATHERED, OWN; count = version; body = the client's name,
+                          of a paced one also a zero byte and its secret
+    2 WELCOME    hub      stamp = bus time; count = version; room = the client's transmit queue
+    3 REFUSED    hub      body = reason
+    4 FRAMES     both     count frames, at most 1024; from the hub OWN: the client's own come back;
+                          MORE: what it has to say of this instant goes on in the next packet;
+                          from a paced client DONE: all it had to say until `stamp`, which it echoes
+    5 BYE        hub      body = reason
+    6 LOST       hub      room = frames that are missing here: the client did not read in time
+
+    flag         PACED 1, OWN 2, DONE 4, GATHERED 8, MORE 16
 
 `stamp` is bus time: nanoseconds since the bus was powered up; a frame ended `before` nanoseconds
 earlier. `room` in WELCOME is how many frames may wait at the client's node, 0 for a bus on which
 frames take no time; in FRAMES from the hub it says how many of the client's frames have left its
-queue since it came, modulo 2³². What isn't a packet decodes to None.
+queue since it came, modulo 2³². What isn't a packet decodes to None. What isn't a frame of classic
+CAN (`frame.flaw`) is left out of its packet, and counted; the data of remote frames is zero.
 """
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from bridge.can_bus.traffic import Stamped
-from bridge.frame import MAX_DATA, Frame
+from bridge.frame import ID_MASK_11, MAX_DATA, RTR, Frame, flaw
 
-VERSION = 2
-HELLO, WELCOME, REFUSED, FRAMES, BYE = 1, 2, 3, 4, 5
-PACED, OWN, DONE, GATHERED = 1, 2, 4, 8
+VERSION = 3
+HELLO, WELCOME, REFUSED, FRAMES, BYE, LOST = 1, 2, 3, 4, 5, 6
+PACED, OWN, DONE, GATHERED, MORE = 1, 2, 4, 8, 16
 MAX_FRAMES = 1024
 MAX_BYTES = 16 + 20 * MAX_FRAMES
 LONGEST_BEFORE_NS = 2**32 - 1
@@ -50,6 +56,7 @@ class Packet(NamedTuple):
     text: str
     room: int = 0
     before_ns: tuple[int, ...] = ()  # of each frame; empty: all of them ended at `stamp_ns`
+    flawed: int = 0  # frames that were none of classic CAN
 
 
 def encode_frames(flags: int, stamp_ns: int, frames: Sequence[Frame]) -> bytes:
@@ -76,6 +83,21 @@ def encode_stamped(flags: int, stamp_ns: int, frames: Sequence[Stamped], room: i
     return header + b"".join(body) + struct.pack(f"<{count}I", *before)
 
 
+def split(flags: int, stamp_ns: int, frames: Sequence[Stamped], room: int) -> Iterator[bytes]:
+    """The same in as many packets as it takes, at least one."""
+    last = max(len(frames) - 1, 0) // MAX_FRAMES * MAX_FRAMES
+    for first in range(0, last + 1, MAX_FRAMES):
+        more = MORE if first < last else 0
+        yield encode_stamped(flags | more, stamp_ns, frames[first : first + MAX_FRAMES], room)
+
+
+def frames_in(packet: bytes) -> int:
+    """How many frames a packet of ours has, or stands for."""
+    if packet[0] == FRAMES:
+        return packet[2] | packet[3] << 8
+    return int.from_bytes(packet[4:8], "little") if packet[0] == LOST else 0
+
+
 def encode_text(
     kind: int,
     text: str = "",
@@ -89,29 +111,44 @@ def encode_text(
     return _HEADER.pack(kind, flags, count, room, stamp_ns) + text.encode()[:1024]
 
 
+def encode_lost(frames: int) -> bytes:
+    """A packet that says how many frames are missing here."""
+    return _HEADER.pack(LOST, 0, 0, min(frames, 0xFFFF_FFFF), 0)
+
+
 def decode(packet: bytes) -> Packet | None:
     """The packet in the bytes, None if there is none."""
     size = len(packet)
     if size == _TWO.size and packet[0] == FRAMES and packet[2] == 2 and packet[3] == 0:
         kind, flags, count, room, stamp, id_1, n_1, data_1, id_2, n_2, data_2 = _TWO.unpack(packet)
-        if n_1 > MAX_DATA or n_2 > MAX_DATA:
-            return None
-        both = (_new(Frame, (id_1, data_1[:n_1])), _new(Frame, (id_2, data_2[:n_2])))
-        return _new(Packet, (kind, flags, count, stamp, both, "", room, ()))
+        if n_1 <= MAX_DATA and n_2 <= MAX_DATA and id_1 <= ID_MASK_11 and id_2 <= ID_MASK_11:
+            both = (_new(Frame, (id_1, data_1[:n_1])), _new(Frame, (id_2, data_2[:n_2])))
+            return _new(Packet, (kind, flags, count, stamp, both, "", room, (), 0))
     if size < _HEADER.size:
         return None
     kind, flags, count, room, stamp = _HEADER.unpack_from(packet)
     body = packet[_HEADER.size :]
     if kind == FRAMES:
-        end = count * _FRAME.size
-        if count > MAX_FRAMES or len(body) not in (end, end + 4 * count):
-            return None
-        parts = list(_FRAME.iter_unpack(body[:end]))
-        if any(length > MAX_DATA for _, length, _ in parts):
-            return None
-        frames = tuple(Frame(can_id, data[:length]) for can_id, length, data in parts)
-        before = struct.unpack(f"<{count}I", body[end:]) if len(body) > end else ()
-        return Packet(kind, flags, count, stamp, frames, "", room, before)
-    if HELLO <= kind <= BYE:
+        return _decode_frames(Packet(kind, flags, count, stamp, (), "", room), body)
+    if HELLO <= kind <= LOST:
         return Packet(kind, flags, count, stamp, (), body.decode("utf-8", "replace"), room)
     return None
+
+
+def _decode_frames(head: Packet, body: bytes) -> Packet | None:
+    count = head.number
+    end = count * _FRAME.size
+    if count > MAX_FRAMES or len(body) not in (end, end + 4 * count):
+        return None
+    before = struct.unpack(f"<{count}I", body[end:]) if len(body) > end else ()
+    frames, kept = [], []
+    for n, (can_id, length, data) in enumerate(_FRAME.iter_unpack(body[:end])):
+        if (can_id > ID_MASK_11 or length > MAX_DATA) and flaw(can_id, length):
+            continue
+        content = bytes(length) if can_id & RTR else data[:length]
+        frames.append(Frame(can_id, content))
+        kept.append(n)
+    flawed = count - len(kept)
+    if flawed and before:
+        before = tuple(before[n] for n in kept)
+    return head._replace(frames=tuple(frames), before_ns=before, flawed=flawed)

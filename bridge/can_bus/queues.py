@@ -22,6 +22,8 @@ from bridge.frame import Frame
 HOST_QUEUE = 10
 DRIVE_MAILBOXES = 3
 RECEIVE_DEPTH = 3
+ERROR_KEY = -1
+"""Of an error flag on order: it takes part in no arbitration, it ends one."""
 
 
 class Entry(NamedTuple):

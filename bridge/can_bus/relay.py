@@ -44,8 +44,8 @@ from bridge.link import Publisher
 from bridge.zenoh_link import ZenohLink
 
 ALL_BUSES = "*"
-GOODBYE_S = 0.5
-"""How long guests may take to hear of the end."""
+GOODBYE_S = 3.0
+"""How long guests that are there may take to say that they have heard of the end."""
 _JOIN_S = 1.0
 _TURN = 64
 """Packets of one guest before the others have their turn."""

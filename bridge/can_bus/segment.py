@@ -12,8 +12,8 @@ from bridge.can_bus.bits import SUSPEND_BITS
 from bridge.can_bus.confinement import NodeState
 from bridge.can_bus.disturbances import Disturbances
 from bridge.can_bus.node import Delivered, ErrorFrame, ErrorKind, Event, Node, StateChanged
-from bridge.can_bus.outcome import Outcome, Plan, Sending, outcome
-from bridge.can_bus.queues import Entry
+from bridge.can_bus.outcome import Outcome, Plan, Sending, cut_short, ordered, outcome
+from bridge.can_bus.queues import ERROR_KEY, Entry
 from bridge.can_bus.recovery import Recovery
 
 _SECOND_NS = 1_000_000_000
@@ -113,6 +113,20 @@ class Segment:
         if self._plan is not None and self._plan.start_ns >= at_ns:
             self._plan = None
 
+    def interrupt(self, node: Node, at_ns: int) -> None:
+        """The next that a node sends is an error flag: it destroys the frame on the wire, if any.
+
+        On a free wire, or after what is left of an error frame or an intermission, it takes part in
+        the arbitration.
+        """
+        plan = self._plan
+        if plan is None or not plan.start_ns < at_ns < plan.done_ns:
+            return
+        bit = -(-(at_ns - plan.start_ns) * self._bit_rate // _SECOND_NS)
+        what = cut_short(plan, Sending(node, node.queue.entries[0]), bit)
+        self._plan = Plan(plan.sender, plan.entry, plan.start_ns, what, self._bit_rate)
+        self._plan.heard_by = tuple(other for other in plan.heard_by if other is not node)
+
     def revise(self, at_ns: int) -> None:
         """Who is there, or what they may do, has changed; or a disturbance was ordered."""
         self._listeners = tuple(
@@ -172,6 +186,8 @@ class Segment:
         if best is None or entry is None:
             self._first_ns = min(node.not_before_ns for node in self._ready)
             return self._arbitrate(self._first_ns)
+        if entry.key == ERROR_KEY:
+            return self._plan_error(start_ns, entry)
         if self._plain and not tied and not self._disturbances:
             plan = Plan(best, entry, start_ns, None, self._bit_rate)
             others = self._others.get(best)
@@ -185,14 +201,29 @@ class Segment:
         plan.heard_by = tuple(node for node in self._listeners if not plan.involves(node))
         return plan
 
-    def _tied(self, start_ns: int, winner: Entry) -> list[Sending]:
-        """All that send the winning arbitration field, in the order in which they joined."""
-        heads = [
+    def _plan_error(self, start_ns: int, entry: Entry) -> Plan:
+        """Error flags on order, and the frame that would have started with them."""
+        orders = self._tied(start_ns, entry)
+        others = [sending for sending in self._heads(start_ns) if sending.entry.key != ERROR_KEY]
+        starting: list[Sending] = []
+        if others:
+            starting = self._tied(start_ns, min(sending.entry for sending in others))
+        what = ordered(orders, starting)
+        plan = Plan(*(starting or orders)[0], start_ns, what, self._bit_rate)
+        plan.heard_by = tuple(node for node in self._listeners if not plan.involves(node))
+        return plan
+
+    def _heads(self, start_ns: int) -> list[Sending]:
+        """What may start, in the order in which the nodes joined."""
+        return [
             Sending(node, node.queue.entries[0])
             for node in self.nodes
             if node in self._ready and node.not_before_ns <= start_ns
         ]
-        return [sending for sending in heads if sending.entry.key == winner.key]
+
+    def _tied(self, start_ns: int, winner: Entry) -> list[Sending]:
+        """All that send the winning arbitration field, in the order in which they joined."""
+        return [sending for sending in self._heads(start_ns) if sending.entry.key == winner.key]
 
     def _complete(self, plan: Plan, events: list[Event]) -> None:
         """The planned transmission has come to its end, or to its error."""
@@ -257,10 +288,16 @@ class Segment:
     def _failed(self, plan: Plan, what: Outcome, kind: ErrorKind, events: list[Event]) -> None:
         self.errors += 1
         senders = tuple(sending.node for sending in what.senders)
+        orders = tuple(order.node for order in what.orders)
         at_ns, frame = plan.done_ns, plan.entry.frame
-        events.append(ErrorFrame(at_ns, plan.start_ns, plan.free_ns, kind, senders, frame))
+        events.append(ErrorFrame(at_ns, plan.start_ns, plan.free_ns, kind, senders, frame, orders))
         if what.disturbance is not None:
             self._disturbances.struck(what.disturbance)
+        for node, entry in what.orders:
+            node.counters.sent += 1
+            if node.attached:
+                node.queue.sent(entry)
+            self._rest(node, plan)
         for node in senders:
             self._lost(node, kind, plan, events)
         for node, _ in what.fallen:

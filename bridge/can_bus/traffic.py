@@ -1,11 +1,15 @@
 """Frames on a bus with bit timing: when they ended, and whose they were."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from bridge.frame import Frame
 
 Key = str | int
 """A client of a bus: the name of the robot that it controls in lockstep, else a number."""
+
+
+_NOBODY: Mapping[Key, Frame] = {}
 
 
 class Stamped(NamedTuple):
@@ -25,14 +29,20 @@ class Said(NamedTuple):
 class Passed(NamedTuple):
     """A frame that ended on the bus; the key of the client that had sent it, None for a drive.
 
-    An error frame is what the node of one client tells it: `to`.
+    An error frame is what a client's node tells it: `apart` has those of the nodes, `frame` is for
+    clients without one. With `to` it concerns one client only.
     """
 
     end_ns: int
     frame: Frame
     key: Key | None = None
     to: Key | None = None
+    apart: Mapping[Key, Frame] = _NOBODY
 
     def heard_by(self, key: Key) -> bool:
         """Whether a client hears it from the bus; its own frames it doesn't."""
         return key != self.key and self.to in (None, key)
+
+    def as_heard_by(self, key: Key) -> Stamped:
+        """What it hears, and when that ended."""
+        return Stamped(self.end_ns, self.apart.get(key, self.frame) if self.apart else self.frame)

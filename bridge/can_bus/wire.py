@@ -12,6 +12,9 @@
   sent again, and counted as in `confinement`; `outcome` says what destroys a frame.
 * Every accepted frame is delivered exactly once, or queued, or counted as dropped. Frames of one
   node with one identifier stay in order.
+* An error frame that a node submits is an error flag on order: when its turn in the node's queue
+  comes it destroys what is on the wire, or what starts with it, or stands alone on an idle wire.
+  All others count the error; the node that was told to send it does not.
 * Times are integer nanoseconds and never go back: an instant before the last one is an error. The
   same calls give the same events, however often `next_ns` and `advance` are asked in between.
 
@@ -22,13 +25,13 @@ propagation, clock tolerance, and that a node which drops out of a clash is back
 
 from heapq import heappop, heappush
 
-from bridge.can_bus.bits import arbitration_key, frame_bits
+from bridge.can_bus.bits import ERROR_FRAME_BITS, arbitration_key, frame_bits
 from bridge.can_bus.confinement import NodeState
 from bridge.can_bus.disturbances import Disturbance, Disturbances, Kind
 from bridge.can_bus.node import Event, Node
-from bridge.can_bus.queues import Entry, Fifo, Queue
+from bridge.can_bus.queues import ERROR_KEY, Entry, Fifo, Queue
 from bridge.can_bus.segment import Segment
-from bridge.frame import Frame
+from bridge.frame import ERR, Frame
 
 MAX_BIT_RATE = 1_000_000
 
@@ -115,6 +118,8 @@ class Wire:
     def submit(self, node: Node, frame: Frame, at_ns: int) -> bool:
         """Queue a frame at a node; False: no room (ENOBUFS), or the node is bus-off.
 
+        Disturbances don't concern error frames.
+
         Raises:
             ValueError: no classic frame, a node that has left, or an instant in the past.
         """
@@ -122,6 +127,8 @@ class Wire:
             self._run(at_ns)
         if not node.attached:
             raise ValueError(f"{node.name} has left the bus and can't send 0x{frame.can_id:X}")
+        if frame.can_id & ERR:
+            return self._order_error(node, frame)
         bits = frame_bits(frame)
         self._number += 1
         entry = Entry(arbitration_key(frame.can_id), self._number, frame, bits)
@@ -197,6 +204,15 @@ class Wire:
         node.counters.accepted += 1
         segment = self._segment(node) if self._apart else self._main
         segment.wake(node, self.now_ns)
+        return True
+
+    def _order_error(self, node: Node, frame: Frame) -> bool:
+        self._number += 1
+        entry = Entry(ERROR_KEY, self._number, frame, ERROR_FRAME_BITS)
+        if not self._queue(node, entry):
+            return False
+        if node.queue.entries[0] is entry:
+            self._segment(node).interrupt(node, self.now_ns)
         return True
 
     def _disturbed(self, found: Disturbance, node: Node, entry: Entry) -> bool:

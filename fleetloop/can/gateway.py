@@ -4,6 +4,7 @@
     either         classic data, remote         sent to the other, never back
     either         error frame                  counted; it is the state of one wire, not data
     far            FD frame                     counted; ours is classic CAN
+    far            what is no frame at all      counted; some interfaces hand it out
     far            its echo of ours             dropped (see `fleetloop.can.echo`)
 
 A full far bus loses what waits for it, so a stall there ends in a gap and not in old set-points.
@@ -20,7 +21,6 @@ import can
 
 from bridge.can_bus.convert import to_frame, to_message
 from bridge.can_bus.interface import BusClosedError
-from bridge.frame import MAX_DATA
 from configs.errors import InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.echo import EchoGuard
@@ -43,6 +43,7 @@ class Counters:
     error_frames: int = 0
     echoes: int = 0
     fd_frames: int = 0
+    no_frames: int = 0
     most_per_s: int = 0
     _second: int = 0
     _in_second: int = 0
@@ -63,6 +64,7 @@ class Counters:
             (self.echoes, "own echoes dropped"),
             (self.error_frames, "error frames not passed on"),
             (self.fd_frames, "FD frames not passed on"),
+            (self.no_frames, "that are no frames of CAN not passed on"),
         ):
             if count:
                 parts.append(f"{count} {what}")
@@ -163,11 +165,15 @@ class Gateway:
         if message.is_error_frame:
             counters.error_frames += 1
             return
-        if message.is_fd or message.dlc > MAX_DATA:
+        if message.is_fd:
             counters.fd_frames += 1
             return
+        try:
+            frame = to_frame(message)
+        except ValueError:
+            counters.no_frames += 1
+            return
         now_s = time.monotonic()
-        frame = to_frame(message)
         with self._lock:
             echo = self.guard.is_echo(frame, now_s)
         if echo:

@@ -95,8 +95,8 @@ def test_machines_agree_on_the_runs_name() -> None:
 def test_a_controller_is_told_its_bus_verbatim_and_the_pace_only_on_ours() -> None:
     pcan = {"interface": "pcan", "channel": "PCAN_USBBUS1", "bitrate": 1000000}
     deployment = placed(robot={"r1": {"bus": pcan}})
-    assert dict(placing.agent_bus(deployment, "r1", pace="gathered")) == pcan
-    assert dict(placing.agent_bus(deployment, "r2", pace="gathered", socket="/x/r2.can")) == {
+    assert dict(placing.agent_bus(deployment, "r1")) == pcan
+    assert dict(placing.agent_bus(deployment, "r2", socket="/x/r2.can")) == {
         "interface": "fleetloop",
         "channel": "/x/r2.can",
         "gathered": True,

@@ -175,9 +175,38 @@ def test_error_frames_reach_the_clients_and_the_frame_is_sent_again() -> None:
     (ask,) = driven.tick()
     kinds = [passed.frame.can_id for passed in ask.passed]
     errors = [passed for passed in ask.passed if passed.frame.can_id & ERR]
-    assert [(passed.frame.can_id & ~ERR, passed.to) for passed in errors] == [(0x08, "r1")]
-    assert errors[0].frame.data[7] > 0  # the receive error counter of its node
+    assert [passed.frame.can_id & ~ERR for passed in errors] == [0x08]
+    assert errors[0].as_heard_by("r1").frame.data[7] > 0  # the receive error counter of its node
+    assert errors[0].as_heard_by(7).frame.data[6:] == bytes(2)  # who only listens has none
     assert [can_id for can_id in kinds if not can_id & ERR] == [0x009, 0x029]
+
+
+def test_an_error_frame_from_a_client_destroys_what_starts_with_it_and_leaves_its_queue() -> None:
+    from bridge.frame import ERR
+
+    driven = Driven(lambda _: torques(0.1, 0.1))
+    driven.ticks(3)
+    steps = driven._steps
+    ask = next(steps)
+    said = [Said("r1", torques(0.1, 0.1)[0]), Said(7, Frame(ERR, b""))]
+    steps.send(said)
+    after = driven.ticks(1)
+    passed = [p for a in (ask, *after) if a is not None for p in a.passed]
+    assert [p.frame.can_id & ~ERR for p in passed if p.frame.can_id & ERR] == [0x08]
+    assert [p.frame.can_id for p in passed].count(torques(0.1, 0.1)[0].can_id) == 2
+    assert driven.bus._hosts["r1"].confinement.tec == 8 - 3  # three frames have been sent since
+    assert driven.bus._hosts[7].confinement.rec == 0
+    assert (7, 1) in [freed for a in after for freed in a.freed]
+
+
+def test_who_only_listens_is_no_node_on_the_wire() -> None:
+    driven = Driven(lambda _: [])
+    nodes = len(driven.bus.wire._main.nodes)
+    driven.bus.depart(7)  # who has said nothing
+    driven.ticks(3)
+    assert len(driven.bus.wire._main.nodes) == nodes
+    driven.bus.take([Said(7, Frame(0x700, b""))])
+    assert len(driven.bus.wire._main.nodes) == nodes + 1
 
 
 def test_a_drive_that_goes_bus_off_falls_silent_and_the_controller_hears_the_other() -> None:

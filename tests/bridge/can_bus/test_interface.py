@@ -4,6 +4,7 @@ import errno
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import can
 import pytest
@@ -11,7 +12,7 @@ from hub_running import Remote, Running
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.can_bus import places
+from bridge.can_bus import connection, places, remote
 from bridge.can_bus.hub import Hub
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.traffic import Passed
@@ -161,6 +162,76 @@ def test_short_waits_are_kept_to_the_millisecond(running, join) -> None:
     assert min(waits) < 0.003  # the kernel's own bound counts in steps of 4 ms
 
 
+def message(**settings: Any) -> can.Message:
+    """A message with any attributes: its own constructor takes back some that don't fit."""
+    made = can.Message(arbitration_id=0x123, is_extended_id=False, data=b"1234")
+    for name, value in settings.items():
+        setattr(made, name, value)
+    return made
+
+
+NO_FRAMES = {
+    "9 bytes": message(data=bytearray(9), dlc=9),
+    "64 bytes": message(data=bytearray(64), dlc=64),
+    "less data than its length": message(dlc=5),
+    "more data than its length": message(dlc=3),
+    "a remote frame of 9": message(is_remote_frame=True, data=bytearray(), dlc=9),
+    "a remote frame with data": message(is_remote_frame=True),
+    "a negative length": message(is_remote_frame=True, data=bytearray(), dlc=-1),
+    "12 bits": message(arbitration_id=0x802),
+    "30 bits": message(arbitration_id=1 << 29, is_extended_id=True),
+    "33 bits": message(arbitration_id=1 << 32, is_extended_id=True),
+    "flags in the identifier": message(arbitration_id=0x20000123),
+    "a negative identifier": message(arbitration_id=-1),
+    "a fraction as identifier": message(arbitration_id=1.5),
+    "a text as identifier": message(arbitration_id="1"),
+    "a text as data": message(data="1234"),
+    "remote and error at once": message(
+        is_remote_frame=True, is_error_frame=True, data=bytearray(), dlc=0
+    ),
+    "FD": message(is_fd=True),
+    "FD and remote": message(is_fd=True, is_remote_frame=True),
+}
+
+
+@pytest.mark.parametrize("gathered", [False, True])
+def test_what_is_no_classic_frame_is_refused_and_takes_no_neighbour_with_it(
+    running, join, gathered: bool
+) -> None:
+    sender, hearer = join(gathered=gathered), join()
+    sender.send(message(arbitration_id=1))
+    for name, wrong in NO_FRAMES.items():
+        with pytest.raises(can.CanOperationError, match="not sent"):
+            sender.send(wrong)
+            pytest.fail(f"sent: {name}")
+    sender.send(message(arbitration_id=2))
+    sender.recv(0.0)
+    assert [hearer.recv(5.0).arbitration_id for _ in range(2)] == [1, 2]
+    assert hearer.recv(0.05) is None
+    assert [frame.can_id for frame in running.taken(2)] == [1, 2]
+
+
+@pytest.mark.parametrize("data", [b"12", bytearray(b"12"), memoryview(b"12"), [0x31, 0x32]])
+def test_data_may_be_any_bytes(running, join, data) -> None:
+    join().send(message(data=data, dlc=2) if not isinstance(data, list) else can.Message(data=data))
+    (frame,) = running.taken(1)
+    assert frame.data == b"12"
+
+
+@pytest.mark.parametrize("extended", [False, True])
+@pytest.mark.parametrize("data", [b"", bytes(8)])
+def test_where_frames_take_no_time_an_error_frame_goes_to_other_clients_and_not_to_drives(
+    running, join, data: bytes, extended: bool
+) -> None:
+    sender, hearer = join(), join()
+    sent = can.Message(is_error_frame=True, arbitration_id=0x17, data=data, is_extended_id=extended)
+    sender.send(sent)
+    sender.send(message(arbitration_id=2))
+    heard = hearer.recv(5.0)
+    assert heard.equals(sent, timestamp_delta=None, check_channel=False, check_direction=False)
+    assert running.taken(1) == [Frame(2, b"1234")]
+
+
 def test_fd_frames_and_unknown_options_are_refused(running, join) -> None:
     with pytest.raises(can.CanOperationError, match="classic CAN"):
         join().send(can.Message(arbitration_id=1, is_fd=True, is_extended_id=False))
@@ -227,6 +298,108 @@ def test_who_does_not_read_delays_the_end_of_the_bus_by_a_bound(running, join) -
     assert time.monotonic() - began < 3.0
 
 
+@pytest.mark.parametrize("wait_s", [None, 0.04, 60.0])
+def test_shutdown_wakes_who_waits_in_another_thread(running, join, wait_s: float | None) -> None:
+    bus = join()
+    told: list[str] = []
+    waiting = threading.Event()
+
+    def read() -> None:
+        with pytest.raises(can.CanOperationError) as caught:
+            while True:
+                waiting.set()
+                bus.recv(wait_s)
+        told.append(str(caught.value))
+
+    reader = threading.Thread(target=read, daemon=True)
+    reader.start()
+    assert waiting.wait(5.0)
+    reader.join(0.05)
+    bus.shutdown()
+    reader.join(5.0)
+    assert not reader.is_alive()
+    assert told == ["bus 'r1' was shut down"]
+
+
+def test_shutdown_wakes_who_waits_for_room_to_send(running, join) -> None:
+    bus = join()
+    errors: list[str] = []
+    sent = threading.Event()
+
+    def write() -> None:
+        with pytest.raises(can.CanOperationError) as caught:
+            while True:
+                bus.send(message(), timeout=60.0)
+                sent.set()
+        errors.append(str(caught.value))
+
+    writer = threading.Thread(target=write, daemon=True)
+    with running.lock:  # the hub is busy
+        writer.start()
+        assert sent.wait(5.0)
+        writer.join(0.3)
+        closer = threading.Thread(target=bus.shutdown, daemon=True)
+        closer.start()
+        writer.join(5.0)
+        assert not writer.is_alive()
+    closer.join(5.0)
+    assert errors == ["bus 'r1' was shut down"]
+
+
+def test_after_shutdown_nothing_can_be_sent_or_received(running, join) -> None:
+    for gathered in (False, True):
+        bus = join(gathered=gathered)
+        bus.shutdown()
+        for _ in range(2):
+            with pytest.raises(can.CanOperationError, match="was shut down"):
+                bus.recv(0.01)
+            with pytest.raises(can.CanOperationError, match="was shut down"):
+                bus.send(message())
+
+
+def test_who_is_behind_by_more_than_is_kept_is_told_how_much_it_lost(
+    running, join, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connection, "BACKLOG", 500)
+    monkeypatch.setattr(remote, "BACKLOG", 100)
+    bus = join()
+    for k in range(5000):
+        running.deliver(Frame(1, k.to_bytes(4, "big")))
+    heard: list[int] = []
+
+    def read() -> None:
+        while (heard_now := bus.recv(1.0)) is not None:
+            heard.append(int.from_bytes(heard_now.data, "big"))
+
+    read()
+    assert heard == sorted(set(heard))
+    lost = 5000 - len(heard)
+    assert lost > 2000
+    for k in range(5000, 5010):
+        running.deliver(Frame(1, k.to_bytes(4, "big")))
+    read()
+    assert (heard[-10:], bus.lost) == (list(range(5000, 5010)), lost)
+    running.close()
+    with pytest.raises(can.CanOperationError, match=f"the test is over; {lost} frames"):
+        bus.recv(5.0)
+
+
+@LOCAL_ONLY
+def test_who_takes_nothing_at_the_end_finds_how_much_it_lost(running, join) -> None:
+    bus, reader = join(), join()
+    for k in range(3000):
+        running.deliver(Frame(1, k.to_bytes(4, "big")))
+    assert [reader.recv(5.0) is not None for _ in range(3000)] == [True] * 3000
+    running.close()
+    heard = 0
+    with pytest.raises(can.CanOperationError, match="the test is over; ") as caught:
+        while bus.recv(5.0) is not None:
+            heard += 1
+    assert 0 < heard < 3000
+    assert f"; {3000 - heard} frames for it were lost" in str(caught.value)
+    assert bus.lost == running.hub.counters("r1").dropped == 3000 - heard
+
+
 def test_shutdown_twice_is_once(running, join) -> None:
     bus = join()
     bus.shutdown()
@@ -234,6 +407,8 @@ def test_shutdown_twice_is_once(running, join) -> None:
 
 
 LEAVE = 0x7FF
+CONTROLLERS = {"r1": {"r1": "told to nobody else"}}
+OWN: dict[str, Any] = {"paced": "r1", "secret": "told to nobody else"}
 
 
 def answered(hub: Hub) -> bool:
@@ -248,12 +423,12 @@ def answered(hub: Hub) -> bool:
 def paced(where: str, runtime_folder, tmp_path: Path) -> Iterator[Hub]:
     """A hub driven by the test, and a paced client in a thread that answers like a controller."""
     folder = places.create_run_folder("test")
-    hub = Hub(places.listen(folder, ("r1",)))
+    hub = Hub(places.listen(folder, ("r1",)), controllers=CONTROLLERS)
     remote = Remote(tmp_path) if where == "remote" else None
     settings = remote.settings() if remote is not None else {}
 
     def answer() -> None:
-        bus = can.Bus(interface="fleetloop", channel="r1", paced=True, **settings)
+        bus = can.Bus(interface="fleetloop", channel="r1", **OWN, **settings)
         try:
             while True:
                 message = bus.recv(10.0)
@@ -268,7 +443,7 @@ def paced(where: str, runtime_folder, tmp_path: Path) -> Iterator[Hub]:
 
     thread = threading.Thread(target=answer)
     thread.start()
-    assert hub.await_paced({"r1": 1}, 10.0) == ()
+    assert hub.await_controllers(10.0) == ()
     yield hub
     hub.close("the test is over")
     thread.join()
@@ -351,7 +526,7 @@ class Timed:
 
     def __init__(self, queue: int = 10) -> None:
         folder = places.create_run_folder("timed")
-        self.hub = Hub(places.listen(folder, ("r1",)), queue=queue)
+        self.hub = Hub(places.listen(folder, ("r1",)), queue=queue, controllers=CONTROLLERS)
 
     def join(self, **options) -> can.BusABC:
         buses: list[can.BusABC] = []
@@ -378,7 +553,7 @@ def timed(runtime_folder) -> Iterator[Timed]:
 
 
 def test_on_a_bus_with_bit_timing_each_frame_has_the_time_at_which_it_ended(timed) -> None:
-    with timed.join(paced="r1") as bus:
+    with timed.join(**OWN) as bus:
         passed = [Passed(1_108_000, Frame(0x009, b"1")), Passed(1_233_000, Frame(0x029, b"2"))]
         timed.hub.pass_on("r1", 1_233_000, passed, "r1")
         first, second = bus.recv(1.0), bus.recv(1.0)
@@ -418,13 +593,13 @@ def test_with_bit_timing_what_a_client_says_reaches_nobody_before_the_wire_carri
 
 
 def test_a_paced_client_is_told_of_a_tick_without_frames_by_none(timed) -> None:
-    with timed.join(paced="r1") as bus:
+    with timed.join(**OWN) as bus:
         timed.hub.pass_on("r1", 999_999, [], "r1")
         assert bus.recv(5.0) is None
 
 
 def test_who_leaves_a_bus_with_bit_timing_is_named(timed) -> None:
-    with timed.join(paced="r1"):
+    with timed.join(**OWN):
         pass
     timed.hub.serve(0.5)
     assert timed.hub.departed("r1") == ["r1"]

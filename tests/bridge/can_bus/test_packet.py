@@ -2,14 +2,22 @@
 
 import struct
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.can_bus import packet as wire
 from bridge.can_bus.traffic import Stamped
-from bridge.frame import Frame
+from bridge.frame import EFF, ERR, ID_MASK_11, ID_MASK_29, RTR, Frame
 
-frames = st.builds(Frame, st.integers(0, 2**32 - 1), st.binary(max_size=8))
+identifiers = st.one_of(
+    st.integers(0, ID_MASK_11),
+    st.integers(0, ID_MASK_29).map(EFF.__or__),
+    st.integers(0, ID_MASK_29).map(ERR.__or__),
+)
+frames = st.builds(Frame, identifiers, st.binary(max_size=8)) | st.builds(
+    Frame, st.integers(0, ID_MASK_11).map(RTR.__or__), st.integers(0, 8).map(bytes)
+)
 stamps = st.integers(-(2**63), 2**63 - 1)
 
 
@@ -60,7 +68,53 @@ def test_a_frame_has_the_layout_of_linux_can_frame() -> None:
     assert packet[16:32] == struct.pack("=IB3x8s", 0x123, 3, b"\1\2\3")
 
 
-def test_a_frame_longer_than_eight_bytes_is_none() -> None:
-    packet = bytearray(wire.encode_frames(0, 5, [Frame(0x123, b"12345678")]))
-    packet[16 + 4] = 9
-    assert wire.decode(bytes(packet)) is None
+@pytest.mark.parametrize(
+    ("can_id", "length"),
+    [(0x123, 9), (0x123, 255), (0x800, 1), (0x802, 4), (RTR | 0x800, 0), (ERR | RTR, 8), (EFF, 9)],
+)
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_what_is_no_classic_frame_is_left_out_and_takes_no_neighbour_with_it(
+    can_id: int, length: int, place: int
+) -> None:
+    good = [Frame(1, b"a"), Frame(2, b"bc")]
+    for count in (0, 1, 2):
+        neighbours = good[:count]
+        packet = bytearray(wire.encode_frames(0, 5, neighbours))
+        at = 16 + 16 * min(place, count)
+        packet[at:at] = struct.pack("<IB3x8s", can_id, length, b"12345678")
+        packet[2] = count + 1
+        decoded = wire.decode(bytes(packet))
+        assert decoded is not None
+        assert (list(decoded.frames), decoded.flawed) == (neighbours, 1)
+
+
+def test_what_is_left_out_takes_its_time_with_it() -> None:
+    sent = [Stamped(10, Frame(1, b"")), Stamped(20, Frame(0x800, b"")), Stamped(30, Frame(2, b""))]
+    packet = wire.decode(wire.encode_stamped(0, 50, sent, 0))
+    assert packet is not None
+    assert [frame.can_id for frame in packet.frames] == [1, 2]
+    assert packet.before_ns == (40, 20)
+
+
+def test_a_remote_frame_carries_a_length_and_no_data() -> None:
+    packet = wire.decode(wire.encode_frames(0, 5, [Frame(RTR | 1, b"abc")]))
+    assert packet is not None
+    assert packet.frames == (Frame(RTR | 1, bytes(3)),)
+
+
+@pytest.mark.parametrize("count", [0, 1, 1024, 1025, 2048, 66_000])
+def test_any_number_of_frames_travels_in_packets_that_all_decode(count: int) -> None:
+    sent = [Stamped(n, Frame(n % 0x800, b"")) for n in range(count)]
+    packets = [wire.decode(data) for data in wire.split(0, count, sent, 7)]
+    frames = [frame for packet in packets if packet is not None for frame in packet.frames]
+    assert frames == [frame for _, frame in sent]
+    flags = [packet.flags for packet in packets if packet is not None]
+    assert flags == [wire.MORE] * (len(packets) - 1) + [0]
+
+
+def test_a_loss_survives_a_packet_with_its_count() -> None:
+    packet = wire.decode(wire.encode_lost(12_345))
+    assert packet is not None
+    assert (packet.kind, packet.room) == (wire.LOST, 12_345)
+    assert wire.frames_in(wire.encode_lost(12_345)) == 12_345
+    assert wire.frames_in(wire.encode_frames(0, 0, [Frame(1, b"")] * 300)) == 300

@@ -18,10 +18,9 @@ from cut_proxy import CutProxy
 from hub_running import Running
 
 from bridge import keys
+from bridge.can_bus import connection, relay, remote, window
 from bridge.can_bus import guest as guest_module
-from bridge.can_bus import hub as hub_module
 from bridge.can_bus import packet as wire
-from bridge.can_bus import relay, remote, window
 from bridge.frame import Frame
 from bridge.zenoh_link import ZenohLink, open_client
 from configs.brief import NetworkLink
@@ -280,7 +279,7 @@ def test_a_guest_that_reads_late_has_lost_nothing(running: Running) -> None:
 def test_what_a_guest_does_not_read_is_dropped_and_counted_by_the_hub_as_for_all(
     running: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hub_module, "BACKLOG", 500)
+    monkeypatch.setattr(connection, "BACKLOG", 500)
     monkeypatch.setattr(remote, "BACKLOG", 100)
     with running.open() as late:
         for n in range(5000):

@@ -1,0 +1,185 @@
+"""A bus at the hub, and a client's connection: who it is, what it was sent and has not taken yet.
+
+Nothing here waits. What the client doesn't read is kept for it up to `BACKLOG` packets; then the
+newest is lost, counted, and the client is told where it is missing and how much (a LOST packet).
+"""
+
+import contextlib
+import socket
+from collections import deque
+from collections.abc import Mapping
+
+from bridge.can_bus import packet as wire
+from bridge.can_bus.traffic import Key, Said, Stamped
+from bridge.frame import Frame
+
+BACKLOG = 100_000
+
+
+class Counters:
+    """What went over one bus."""
+
+    __slots__ = ("dropped", "from_clients", "from_drives", "garbage", "joins")
+
+    def __init__(self) -> None:
+        self.from_drives = 0
+        self.from_clients = 0
+        self.dropped = 0  # frames that a client did not take in time
+        self.garbage = 0  # packets that are none, and frames that are none of classic CAN
+        self.joins = 0
+
+
+class Bus:
+    """A bus with its clients.
+
+    Args:
+        name: of the bus.
+        listener: its socket.
+        queue: frames that may wait at a client; 0: frames take no time.
+        controllers: secrets by robot, of those who may be paced.
+    """
+
+    __slots__ = (
+        "clients",
+        "controllers",
+        "counters",
+        "departed",
+        "held",
+        "listener",
+        "name",
+        "owing",
+        "queue",
+        "said",
+        "stamp_ns",
+        "taken",
+    )
+
+    def __init__(
+        self, name: str, listener: socket.socket, queue: int, controllers: Mapping[str, str]
+    ) -> None:
+        self.name = name
+        self.listener = listener
+        self.queue = queue
+        self.controllers = controllers
+        self.said: list[Said] = []
+        self.departed: list[Key] = []
+        self.stamp_ns = -1  # not powered up yet
+        self.clients: list[Connection] = []
+        self.held: list[Connection] = []  # not read until what was said is taken
+        self.taken: list[Frame] = []
+        self.owing = 0
+        self.counters = Counters()
+
+    def joined_controllers(self) -> set[str]:
+        """Robots whose controllers are there."""
+        return {client.name for client in self.clients if client.paced}
+
+
+class Connection:
+    """One client of a bus."""
+
+    __slots__ = (
+        "backlog",
+        "bus",
+        "gathered",
+        "gone",
+        "held",
+        "joined",
+        "key",
+        "mask",
+        "missing",
+        "name",
+        "owes",
+        "own",
+        "paced",
+        "pending",
+        "receive",
+        "send_now",
+        "sock",
+    )
+
+    def __init__(self, sock: socket.socket, bus: Bus, mask: int) -> None:
+        self.sock = sock
+        self.receive, self.send_now = sock.recv, sock.send
+        self.bus = bus
+        self.mask = mask  # what the hub waits for at its socket
+        self.name = ""
+        self.key: Key = 0
+        self.gone = 0  # frames that left its transmit queue
+        self.pending: list[Stamped] = []  # what a paced client hears with its next question
+        self.joined = self.paced = self.gathered = self.own = self.owes = False
+        self.held = False  # it isn't read until what its bus said was taken
+        self.backlog: deque[bytes] = deque()
+        self.missing = 0  # frames that were lost behind the backlog
+
+    def send(self, packet: bytes) -> bool:
+        """Send a packet, or keep it; whether nothing is kept."""
+        if self.backlog or self.missing:
+            self._keep(packet)
+            return False
+        try:
+            self.send_now(packet)
+        except BlockingIOError:
+            self._keep(packet)
+            return False
+        except OSError:
+            # It has gone; what it said before is still to be read, and then its end.
+            self.bus.counters.dropped += wire.frames_in(packet)
+        return True
+
+    def pend(self, frame: Stamped) -> None:
+        """Keep a frame for the next question."""
+        if len(self.pending) < BACKLOG:
+            self.pending.append(frame)
+        else:
+            self._lose(1)
+
+    def drain(self) -> bool:
+        """Send what was kept; whether nothing is left."""
+        backlog = self.backlog
+        try:
+            while backlog or self.missing:
+                if not backlog:
+                    self._tell_missing()
+                self.send_now(backlog[0])
+                backlog.popleft()
+        except BlockingIOError:
+            return False
+        except OSError:
+            self.bus.counters.dropped += self._kept_frames()
+            backlog.clear()
+            self.missing = 0
+        return True
+
+    def say_last(self, packet: bytes) -> None:
+        """Send a last packet; what is still kept is lost, and the client told how much."""
+        self.bus.counters.dropped += self._kept_frames()
+        self.missing += sum(map(wire.frames_in, self.backlog))
+        self.backlog.clear()
+        with contextlib.suppress(OSError):
+            # A full socket takes two packets more once it may hold more: the kernel doubles this.
+            room = self.sock.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
+            self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, room)
+            if self.missing:
+                self.send_now(wire.encode_lost(self.missing))
+            self.send_now(packet)
+
+    def _keep(self, packet: bytes) -> None:
+        if len(self.backlog) >= BACKLOG:
+            self._lose(wire.frames_in(packet))
+            return
+        self._tell_missing()
+        self.backlog.append(packet)
+
+    def _kept_frames(self) -> int:
+        return sum(wire.frames_in(kept) for kept in self.backlog if kept[0] == wire.FRAMES)
+
+    def _lose(self, count: int) -> None:
+        self.bus.counters.dropped += count
+        self.missing += count
+
+    def _tell_missing(self) -> None:
+        """The client is told of what is missing before anything newer."""
+        if self.missing:
+            self.backlog.append(wire.encode_lost(self.missing))
+            self.missing = 0

@@ -1,0 +1,271 @@
+"""The hub against clients that don't keep to anything: raw sockets that write what they like."""
+
+import socket
+import struct
+import threading
+from collections.abc import Iterator
+
+import can
+import pytest
+
+from bridge.can_bus import hub as hub_module
+from bridge.can_bus import packet as wire
+from bridge.can_bus import places
+from bridge.can_bus.hub import Hub
+from bridge.can_bus.traffic import Passed
+from bridge.frame import ERR, RTR, Frame
+
+SECRET = "told to nobody else"
+CONTROLLERS = {"r1": {"r1": SECRET, "r2": "another"}}
+
+
+class Stranger:
+    """A client made of a socket."""
+
+    def __init__(self, name: str = "", flags: int = 0, version: int = wire.VERSION) -> None:
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.socket.connect(str(places.socket_path(places.base_folder() / "hub", "r1")))
+        self.socket.settimeout(5.0)
+        self.say(wire.encode_text(wire.HELLO, name, flags=flags, count=version))
+
+    def say(self, data: bytes) -> None:
+        self.socket.send(data)
+
+    def frames(self, *frames: Frame, flags: int = 0, stamp_ns: int = 0) -> None:
+        self.say(wire.encode_frames(flags, stamp_ns, frames))
+
+    def hear(self) -> wire.Packet:
+        packet = wire.decode(self.socket.recv(wire.MAX_BYTES))
+        assert packet is not None
+        return packet
+
+    def hear_question(self) -> list[Frame]:
+        """All frames of a question, in however many packets it comes."""
+        frames: list[Frame] = []
+        while True:
+            packet = self.hear()
+            assert packet.kind == wire.FRAMES
+            frames += packet.frames
+            if not packet.flags & wire.MORE:
+                return frames
+
+
+class Serving:
+    """A hub that the test serves."""
+
+    def __init__(self, queue: int = 0) -> None:
+        folder = places.create_run_folder("hub")
+        self.hub = Hub(places.listen(folder, ("r1",)), queue=queue, controllers=CONTROLLERS)
+        self.strangers: list[Stranger] = []
+
+    def join(self, name: str = "", flags: int = 0, version: int = wire.VERSION) -> Stranger:
+        stranger = Stranger(name, flags, version)
+        self.strangers.append(stranger)
+        self.serve()
+        return stranger
+
+    def serve(self) -> None:
+        """Handle all that is there."""
+        for _ in range(5):
+            self.hub.serve(0.0)
+
+    def close(self) -> None:
+        self.hub.close("the test is over")
+        for stranger in self.strangers:
+            stranger.socket.close()
+        places.remove_run_folder(places.base_folder() / "hub")
+
+
+@pytest.fixture
+def serving(runtime_folder) -> Iterator[Serving]:
+    serving = Serving()
+    yield serving
+    serving.close()
+
+
+# --- whom bus time waits for ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("", "that the run itself started, of r1, r2"),
+        ("r1", "that the run itself started"),
+        ("r1\0wrong", "that the run itself started"),
+        ("r1\0", "that the run itself started"),
+        ("r2\0" + SECRET, "that the run itself started"),  # another's
+        ("r9\0" + SECRET, "that the run itself started"),
+        ("r1\0ü", "that the run itself started"),
+    ],
+)
+def test_nobody_but_a_robots_own_controller_is_waited_for(serving, name: str, why: str) -> None:
+    refused = serving.join(name, wire.PACED).hear()
+    assert refused.kind == wire.REFUSED
+    assert why in refused.text
+    assert (serving.hub.clients(), serving.hub.left()) == (0, ())
+    assert serving.hub.await_controllers(0.0) == ("r1", "r2")
+
+
+def test_a_bus_in_real_time_waits_for_nobody(runtime_folder) -> None:
+    hub = Hub(places.listen(places.create_run_folder("hub"), ("r1",)))
+    refused = Stranger("r1\0" + SECRET, wire.PACED)
+    for _ in range(3):
+        hub.serve(0.0)
+    assert "waits for nobody" in refused.hear().text
+    refused.socket.close()
+    hub.close("")
+    places.remove_run_folder(places.base_folder() / "hub")
+
+
+def test_a_second_controller_of_a_robot_is_refused_while_the_first_is_there(serving) -> None:
+    first = serving.join(f"r1\0{SECRET}", wire.PACED)
+    assert first.hear().kind == wire.WELCOME
+    second = serving.join(f"r1\0{SECRET}", wire.PACED)
+    assert "the controller of r1 is on it already" in second.hear().text
+    assert serving.hub.await_controllers(0.0) == ("r2",)
+    assert serving.hub.left() == ()
+    first.socket.close()
+    serving.serve()
+    assert serving.hub.left() == ("r1",)
+
+
+def test_a_stranger_that_says_a_robots_name_unpaced_and_leaves_is_not_its_controller(
+    serving,
+) -> None:
+    stranger = serving.join(f"r1\0{SECRET}")
+    assert stranger.hear().kind == wire.WELCOME
+    stranger.socket.close()
+    serving.serve()
+    assert serving.hub.left() == ()
+
+
+def test_the_bus_interface_says_why_it_was_refused(serving) -> None:
+    def refusal(**options) -> str:
+        caught: list[str] = []
+
+        def join() -> None:
+            with pytest.raises(can.CanInitializationError) as error:
+                can.Bus(interface="fleetloop", channel="hub/r1", **options)
+            caught.append(str(error.value))
+
+        opener = threading.Thread(target=join)
+        opener.start()
+        while opener.is_alive():
+            serving.hub.serve(0.01)
+        return caught[0]
+
+    assert "refused: paced is for the controllers" in refusal(paced="r1", secret="guessed")
+    assert "refused: paced is for the controllers" in refusal(paced="r1")
+    assert "must name the robot" in refusal(paced=True)
+    assert "must name the robot" in refusal(paced=3)
+
+
+# --- much between two questions -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("queue", [0, 10])
+@pytest.mark.parametrize("count", [1, 1024, 1025, 5000, 66_000])
+def test_a_controller_is_asked_whatever_others_said_between_two_questions(
+    runtime_folder, queue: int, count: int
+) -> None:
+    serving = Serving(queue)
+    controller = serving.join(f"r1\0{SECRET}", wire.PACED)
+    stranger = serving.join()
+    for packet in (controller, stranger):
+        assert packet.hear().kind == wire.WELCOME
+    said = [Frame(n % 0x800, n.to_bytes(4, "big")) for n in range(count)]
+    heard: list[Frame] = []
+
+    def read() -> None:
+        heard.extend(controller.hear_question())
+
+    if queue:
+        reader = threading.Thread(target=read)
+        reader.start()
+        serving.hub.pass_on("r1", 9, [Passed(9, frame, key=2) for frame in said], "r1")
+    else:
+        for first in range(0, count, wire.MAX_FRAMES):
+            stranger.frames(*said[first : first + wire.MAX_FRAMES])
+            serving.serve()
+        reader = threading.Thread(target=read)
+        reader.start()
+        serving.hub.deliver("r1", 9, (Frame(0x009, b""),))
+        said.append(Frame(0x009, b""))
+    while reader.is_alive():
+        serving.hub.collect(0.01)
+    assert heard == said
+    controller.frames(Frame(0x00E, b""), flags=wire.DONE, stamp_ns=9)
+    assert any(serving.hub.collect(0.5) for _ in range(10))
+    serving.close()
+
+
+def test_replies_of_drives_to_very_many_requests_reach_the_controller(serving) -> None:
+    controller = serving.join(f"r1\0{SECRET}", wire.PACED)
+    assert controller.hear().kind == wire.WELCOME
+    replies = [Frame(n % 0x800, n.to_bytes(4, "big")) for n in range(66_000)]
+    heard: list[Frame] = []
+    reader = threading.Thread(target=lambda: heard.extend(controller.hear_question()))
+    reader.start()
+    serving.hub.deliver("r1", 9, replies)
+    while reader.is_alive():
+        serving.hub.collect(0.01)
+    assert heard == replies
+
+
+def test_who_says_more_than_is_taken_is_not_read_until_it_is(
+    serving, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hub_module, "UNTAKEN", 100)
+    flood, quiet = serving.join(), serving.join()
+    flood.socket.setblocking(False)
+    sent = 0
+    with pytest.raises(BlockingIOError):
+        while sent < 100_000:
+            flood.frames(Frame(1, sent.to_bytes(4, "big")))
+            sent += 1
+            serving.hub.serve(0.0)
+    assert 100 < sent < 2000  # what a socket holds, and no more
+    quiet.frames(Frame(2, b""))
+    taken: list[Frame] = []
+    for _ in range(sent):
+        serving.hub.serve(0.0)
+        taken += serving.hub.take("r1")
+    ours = [int.from_bytes(data, "big") for can_id, data in taken if can_id == 1]
+    assert ours == list(range(sent))
+    assert Frame(2, b"") in taken
+
+
+# --- what is no frame -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("can_id", "length"), [(0x802, 4), (0x123, 9), (ERR | RTR, 0), (RTR | 0x800, 0)]
+)
+@pytest.mark.parametrize("queue", [0, 10])
+def test_what_is_no_classic_frame_is_counted_and_goes_nowhere(
+    runtime_folder, can_id: int, length: int, queue: int
+) -> None:
+    serving = Serving(queue)
+    stranger, other = serving.join(), serving.join()
+    packet = bytearray(wire.encode_frames(0, 0, [Frame(1, b"a"), Frame(2, b"b"), Frame(3, b"c")]))
+    packet[32:37] = struct.pack("<IB", can_id, length)
+    stranger.say(bytes(packet))
+    serving.serve()
+    good = [Frame(1, b"a"), Frame(3, b"c")]
+    if queue:
+        assert [frame for _, frame in serving.hub.say("r1")] == good
+    else:
+        assert serving.hub.take("r1") == good
+        assert other.hear().kind == wire.WELCOME
+        assert [other.hear().frames for _ in good] == [(frame,) for frame in good]
+    assert serving.hub.counters("r1").garbage == 1
+    assert serving.hub.counters("r1").from_clients == 2
+    serving.close()
+
+
+def test_with_bit_timing_an_error_frame_is_for_the_wire(runtime_folder) -> None:
+    serving = Serving(10)
+    serving.join().frames(Frame(ERR | 4, bytes(8)))
+    serving.serve()
+    assert [frame for _, frame in serving.hub.say("r1")] == [Frame(ERR | 4, bytes(8))]
+    serving.close()
