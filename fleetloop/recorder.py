@@ -103,6 +103,9 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
                 next_report = now + PROGRESS_EVERY_S
                 record.flush()
                 progress.put(Progress(recorder.ticks, 0, 0).encode())
+        if recorder.unfinished:
+            missing = ", ".join(sorted(recorder.unfinished))
+            record.note_lost(f"the run ended before the last of {missing} came")
         values = {"undecodable": recorder.undecodable, "cpu_ns": cpu_ns() - began_ns}
         report.put(Report(values).encode())
         stop.await_release()

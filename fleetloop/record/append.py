@@ -1,17 +1,35 @@
-"""A file that only grows by whole pieces: what was appended is all there, or nothing of it is."""
+"""A file that only grows by whole pieces: what was appended is all there, or nothing of it is.
 
+Space for what has to be written at the end of all can be reserved beforehand, so that a file can be
+completed on a disk that has become full.
+"""
+
+import contextlib
+import ctypes
+import errno
 import os
+import stat
 from pathlib import Path
+
+_KEEP_SIZE = 1
+_STEP = 4 * 1024 * 1024
+"""Space is reserved in steps of so many bytes, so that most pieces need no call for it."""
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class AppendedFile:
-    """A new file of a recording; an OSError of any call leaves the pieces before it."""
+    """A new file of a recording, or one that goes on; an OSError leaves the pieces before it."""
 
-    __slots__ = ("_fd", "size")
+    __slots__ = ("_fd", "_path", "_reserved", "size")
 
-    def __init__(self, path: Path) -> None:
-        self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o666)
+    def __init__(self, path: Path, *, goes_on: bool = False) -> None:
+        how = os.O_WRONLY if goes_on else os.O_WRONLY | os.O_CREAT | os.O_TRUNC
+        self._path = path
+        self._fd = os.open(path, how | os.O_CLOEXEC, 0o666)
         self.size = 0
+        self._reserved = 0
+        if goes_on:
+            self.size = os.lseek(self._fd, 0, os.SEEK_END)
 
     def append(self, piece: bytes | bytearray) -> None:
         """Append a piece."""
@@ -20,17 +38,66 @@ class AppendedFile:
             while view:
                 view = view[os.write(self._fd, view) :]
         except OSError:
-            os.ftruncate(self._fd, self.size)
-            os.lseek(self._fd, self.size, os.SEEK_SET)
+            with contextlib.suppress(OSError):  # the first one says more
+                self.cut(self.size)
             raise
         self.size += len(piece)
+
+    def reserve(self, length: int) -> None:
+        """Make sure that so many bytes more can be written, whatever becomes of the disk.
+
+        Where the file system can't promise it, nothing happens.
+        """
+        needed = self.size + length
+        if needed <= self._reserved:
+            return
+        try:
+            try:
+                self._allocate(needed + _STEP)
+            except OSError as error:
+                if error.errno not in _NO_SPACE:
+                    raise
+                self._allocate(needed)
+        except OSError as error:
+            if error.errno in _NO_SPACE:
+                raise
+
+    def cut(self, size: int) -> None:
+        """Drop everything beyond a size, and what was reserved."""
+        os.ftruncate(self._fd, size)
+        os.lseek(self._fd, size, os.SEEK_SET)
+        self.size = size
+        self._reserved = 0
 
     def rewrite_head(self, head: bytes) -> None:
         """Replace the first bytes."""
         os.pwrite(self._fd, head, 0)
 
     def close(self) -> None:
-        """Close it. Idempotent."""
+        """Give back what was reserved, and close. Idempotent."""
         if self._fd >= 0:
+            if self._reserved > self.size:
+                os.ftruncate(self._fd, self.size)
             os.close(self._fd)
             self._fd = -1
+
+    def discard(self) -> None:
+        """Close it and remove it: nothing of it is of use."""
+        is_file = stat.S_ISREG(os.fstat(self._fd).st_mode)
+        self.close()
+        if is_file:
+            self._path.unlink(missing_ok=True)
+
+    def _allocate(self, end: int) -> None:
+        """Take space up to a size without changing the file's own."""
+        while _fallocate(self._fd, _KEEP_SIZE, self.size, end - self.size):
+            number = ctypes.get_errno()
+            if number != errno.EINTR:
+                raise OSError(number, os.strerror(number))
+        self._reserved = end
+
+
+_libc = ctypes.CDLL(None, use_errno=True)
+# Under this name the offsets have 64 bits on every machine; musl's other one has, too.
+_fallocate = getattr(_libc, "fallocate64", _libc.fallocate)
+_fallocate.argtypes = (ctypes.c_int, ctypes.c_int, ctypes.c_int64, ctypes.c_int64)

@@ -106,19 +106,25 @@ class BlfFile:
         finally:
             self._file.close()
 
+    def discard(self) -> None:
+        """Close and remove it."""
+        self._file.discard()
+
     def _put(self, least: int) -> None:
         """Write containers while there are at least so many frames to fill one."""
         if self._pending_frames < least:
             return
         frames = np.concatenate(self._pending)
         start = 0
-        while len(frames) - start >= least:
-            part = frames[start : start + CONTAINER_FRAMES]
-            self._append(part)
-            start += len(part)
-        self._pending = [frames[start:]] if start < len(frames) else []
-        self._pending_frames = len(frames) - start
-        self._file.rewrite_head(self._header())
+        try:
+            while len(frames) - start >= least:
+                part = frames[start : start + CONTAINER_FRAMES]
+                self._append(part)
+                start += len(part)
+        finally:
+            self._pending = [frames[start:]] if start < len(frames) else []
+            self._pending_frames = len(frames) - start
+            self._file.rewrite_head(self._header())
 
     def _append(self, frames: Array) -> None:
         content = objects(frames, self._channel)

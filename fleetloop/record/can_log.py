@@ -81,7 +81,7 @@ class CanLogWriter:
                 with _named(log_path):
                     self._writers.append((log_path, CandumpLog(log_path, name)))
         except InfrastructureError:
-            self.close()
+            self.discard()
             raise
 
     def write(self, block: bytes | memoryview | Frames) -> None:
@@ -104,6 +104,11 @@ class CanLogWriter:
             for path, writer in self._writers:
                 all_of_them.enter_context(_named(path))
                 all_of_them.callback(writer.close)
+
+    def discard(self) -> None:
+        """Close and remove the files: nothing is in them."""
+        for _, writer in self._writers:
+            writer.discard()
 
     def __enter__(self) -> Self:
         return self

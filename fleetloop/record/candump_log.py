@@ -55,6 +55,10 @@ class CandumpLog:
         finally:
             self._file.close()
 
+    def discard(self) -> None:
+        """Close and remove it."""
+        self._file.discard()
+
 
 def lines(frames: Array, name: str) -> bytes:
     """The lines of frames."""

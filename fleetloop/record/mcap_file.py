@@ -1,207 +1,188 @@
 """An MCAP file of fixed-size messages, written chunk by chunk and completed at any time.
 
-The records are the `mcap` package's own; only the bodies of chunks come from numpy, a block of
-messages of one channel each. A file that lost its end (its writer was killed) is whole again after
-`McapFile.resume(path).finish()`: what was complete stays, the rest is cut off.
+Chunks come from numpy, a block of messages of one channel each; head and summary are records of the
+`mcap` package. Space for the summary is reserved before each chunk, so that the file can be
+completed on a disk that has become full; where a file system reserves nothing, the last chunks make
+room. A file that lost its end (its writer was killed) is whole again after
+`McapFile.resume(path).finish(why)`: what was complete stays, the rest is cut off.
 """
 
 import zlib
-from io import FileIO
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Self
 
 import numpy as np
-import zstandard
 from mcap import records
-from mcap.data_stream import RecordBuilder
-from mcap.opcode import Opcode
 
 from configs.errors import InfrastructureError
-from fleetloop.record import schema
-from fleetloop.record.scan import MAGIC, scan
+from fleetloop.record.append import AppendedFile
+from fleetloop.record.chunks import ChunkWriter
+from fleetloop.record.head import MAGIC, Head, build, encoded
+from fleetloop.record.scan import RecordError, Written, end_record, scan
 
-LIBRARY = "fleetloop"
-SCENARIO = "scenario.toml"
-_ZSTD_LEVEL = 1
+_LOST_BYTES = 1024
+"""The reason that the end gives is cut off there."""
 
 
 class McapFile:
     """One record file that is being written."""
 
-    def __init__(self, path: Path, stream: FileIO) -> None:
+    def __init__(self, path: Path, file: AppendedFile, head: Head) -> None:
         self._path = path
-        self._stream = stream
-        self._offset = 0
-        self._schemas: list[records.Schema] = []
-        self._channels: list[records.Channel] = []
-        self._attachments: list[records.AttachmentIndex] = []
-        self._chunks: list[records.ChunkIndex] = []
-        self._counts: dict[int, int] = {}
-        self._compress = zstandard.ZstdCompressor(level=_ZSTD_LEVEL).compress
+        self._file = file
+        self._head = head
+        self._crc = 0
+        self._chunks: list[Written] = []
+        self._writer = ChunkWriter()
+        self._closed = False
+        nothing = records.ChunkIndex(0, 0, "zstd", 0, 0, 0, {1: 0}, 0, 0)
+        self._index_bytes = len(encoded(nothing))
+        channels = len(head.channels) * 10  # of the statistics
+        self._tail_bytes = len(self._tail("")) + _LOST_BYTES + channels
 
     @classmethod
-    def create(cls, path: Path, robots: tuple[str, ...], scenario_toml: str) -> Self:
+    def create(cls, path: Path, robots: Sequence[str], scenario_toml: str) -> Self:
         """Begin a new file for these robots.
 
         Raises:
-            InfrastructureError: it can't be written.
+            InfrastructureError: it can't be written; no file of it stays.
         """
+        head = build(robots, scenario_toml)
         try:
-            file = cls(path, path.open("wb", buffering=0))
+            file = AppendedFile(path)
         except OSError as error:
             raise InfrastructureError(f"can't write {path}: {error.strerror}") from error
-        file._write(MAGIC)
-        file._put(records.Header(profile="ros2", library=LIBRARY))
-        for kind, (name, text) in schema.SCHEMAS.items():
-            record = records.Schema(id=kind + 1, name=name, encoding="ros2msg", data=text.encode())
-            file._schemas.append(record)
-            file._put(record)
-        for number, robot in enumerate(robots):
-            for kind in schema.Kind:
-                channel = records.Channel(
-                    id=schema.channel_id(number, kind),
-                    schema_id=kind + 1,
-                    topic=schema.topic(robot, kind),
-                    message_encoding="cdr",
-                    metadata={},
-                )
-                file._channels.append(channel)
-                file._put(channel)
-        data = scenario_toml.encode()
-        attachment = records.Attachment(
-            create_time=0, log_time=0, name=SCENARIO, media_type="application/toml", data=data
-        )
-        file._attach(attachment, file._offset)
-        file._put(attachment)
-        return file
+        record = cls(path, file, head)
+        try:
+            record._append(head.data)
+        except InfrastructureError:
+            file.discard()
+            raise
+        return record
 
     @classmethod
     def resume(cls, path: Path) -> Self:
-        """Take up a file that lost its end; what isn't complete is cut off."""
+        """Take up a file that lost its end; what isn't complete is cut off.
+
+        Raises:
+            RecordError: it is damaged, so what follows the damage would be lost.
+            InfrastructureError: it can't be written.
+        """
         found = scan(path)
-        stream = path.open("r+b", buffering=0)
-        stream.truncate(found.end)
-        stream.seek(found.end)
-        file = cls(path, stream)
-        file._offset = found.end
-        file._schemas, file._channels = found.schemas, found.channels
-        for attachment, offset in found.attachments:
-            file._attach(attachment, offset)
-        for index, channel, count in found.chunks:
-            file._chunks.append(index)
-            file._counts[channel] = file._counts.get(channel, 0) + count
-        return file
+        if found.damaged:
+            raise RecordError(f"{path}: {found.lost}")
+        try:
+            file = AppendedFile(path, goes_on=True)
+            if not found.closed:
+                file.cut(found.end)
+        except OSError as error:
+            raise InfrastructureError(f"can't write {path}: {error.strerror}") from error
+        record = cls(path, file, found.head)
+        record._crc, record._chunks, record._closed = found.crc, found.chunks, found.closed
+        return record
 
     def chunk(self, channel: int, messages: np.ndarray) -> None:
-        """Write a block of messages of one channel."""
+        """Write a block of messages of one channel.
+
+        Raises:
+            InfrastructureError: it can't be written; the file is as it was and can be finished.
+        """
         if not len(messages):
             return
-        body = messages.tobytes()
-        packed = self._compress(body)
-        start, times = self._offset, messages["log_time"]
-        self._put(
-            records.Chunk(
-                compression="zstd",
-                data=packed,
-                message_start_time=int(times[0]),
-                message_end_time=int(times[-1]),
-                uncompressed_crc=zlib.crc32(body),
-                uncompressed_size=len(body),
-            )
-        )
-        length = self._offset - start
-        index_offset = self._offset
-        self._write(_message_index(channel, messages))
-        self._chunks.append(
-            records.ChunkIndex(
-                chunk_start_offset=start,
-                chunk_length=length,
-                compression="zstd",
-                compressed_size=len(packed),
-                uncompressed_size=len(body),
-                message_start_time=int(times[0]),
-                message_end_time=int(times[-1]),
-                message_index_length=self._offset - index_offset,
-                message_index_offsets={channel: index_offset},
-            )
-        )
-        self._counts[channel] = self._counts.get(channel, 0) + len(messages)
+        crc_before = self._crc
+        packed = self._writer.pack(channel, messages, self._file.size)
+        self._append(packed.data)
+        self._chunks.append(Written(packed.summary, channel, len(messages), crc_before))
 
-    def finish(self) -> None:
-        """Write summary and footer, and close."""
-        self._put(records.DataEnd(data_section_crc=0))
-        start = self._offset
-        for record in (*self._schemas, *self._channels, self._statistics()):
-            self._put(record)
-        for index in (*self._chunks, *self._attachments):
-            self._put(index)
-        footer = records.Footer(summary_start=start, summary_offset_start=0, summary_crc=0)
-        self._put(footer)
-        self._write(MAGIC)
-        self._stream.close()
+    def finish(self, lost: str = "") -> None:
+        """Write end, summary and footer, and close; `lost` says what is missing in the file.
 
-    def close(self) -> None:
-        """Close as it is."""
-        self._stream.close()
+        Raises:
+            InfrastructureError: it can't be written, or not without dropping chunks.
+        """
+        if self._closed:
+            self._file.close()
+            return
+        failure: OSError | None = None
+        while True:
+            tail = self._tail(lost)
+            try:
+                self._file.append(tail)
+                break
+            except OSError as error:
+                failure = error
+                lost = lost or f"can't write it: {error.strerror}"
+                if not self._make_room(len(tail)):
+                    break
+        self._closed = True
+        self._file.close()
+        if failure is not None:
+            raise self._unwritable(failure) from failure
+
+    def discard(self) -> None:
+        """Close and remove it."""
+        self._file.discard()
+
+    def _make_room(self, length: int) -> bool:
+        """Drop the last chunks that have so many bytes together; return whether there were any."""
+        size = self._file.size
+        if not self._chunks:
+            return False
+        while self._chunks and size - self._file.size < length:
+            last = self._chunks.pop()
+            self._crc = last.crc_before
+            self._file.cut(last.summary.chunk_start_offset)
+        return True
+
+    def _append(self, data: bytes) -> None:
+        """Hand it to the operating system at once: a kill can't take it back."""
+        tail = self._tail_bytes + (len(self._chunks) + 1) * self._index_bytes
+        try:
+            self._file.reserve(len(data) + tail)
+            self._file.append(data)
+        except OSError as error:
+            raise self._unwritable(error) from error
+        self._crc = zlib.crc32(data, self._crc)
+
+    def _unwritable(self, error: OSError) -> InfrastructureError:
+        return InfrastructureError(f"can't write {self._path}: {error.strerror or error}")
+
+    def _tail(self, lost: str) -> bytes:
+        """Everything behind the last chunk."""
+        end = end_record(lost.encode()[:_LOST_BYTES].decode(errors="ignore"))
+        ended = encoded(end)
+        rows_end = ended + encoded(records.DataEnd(zlib.crc32(ended, self._crc)))
+        index = records.MetadataIndex(self._file.size, len(ended), end.name)
+        summary = b"".join(map(encoded, self._summary(index)))
+        start = self._file.size + len(rows_end)
+        footer = encoded(records.Footer(start, 0, 0))[:-4]
+        crc = zlib.crc32(footer, zlib.crc32(summary))
+        return rows_end + summary + footer + crc.to_bytes(4, "little") + MAGIC
+
+    def _summary(self, end: records.MetadataIndex) -> Iterator[records.McapRecord]:
+        yield from self._head.schemas
+        yield from self._head.channels
+        yield self._statistics()
+        yield from (chunk.summary for chunk in self._chunks)
+        yield self._head.attachment
+        yield self._head.metadata
+        yield end
 
     def _statistics(self) -> records.Statistics:
-        starts = [chunk.message_start_time for chunk in self._chunks]
-        ends = [chunk.message_end_time for chunk in self._chunks]
+        counts: dict[int, int] = {}
+        for chunk in self._chunks:
+            counts[chunk.channel] = counts.get(chunk.channel, 0) + chunk.messages
+        starts = [chunk.summary.message_start_time for chunk in self._chunks]
+        ends = [chunk.summary.message_end_time for chunk in self._chunks]
         return records.Statistics(
-            attachment_count=len(self._attachments),
-            channel_count=len(self._channels),
-            channel_message_counts=dict(sorted(self._counts.items())),
+            attachment_count=1,
+            channel_count=len(self._head.channels),
+            channel_message_counts=dict(sorted(counts.items())),
             chunk_count=len(self._chunks),
-            message_count=sum(self._counts.values()),
+            message_count=sum(counts.values()),
             message_start_time=min(starts, default=0),
             message_end_time=max(ends, default=0),
-            metadata_count=0,
-            schema_count=len(self._schemas),
+            metadata_count=2,
+            schema_count=len(self._head.schemas),
         )
-
-    def _attach(self, attachment: records.Attachment, offset: int) -> None:
-        builder = RecordBuilder()
-        attachment.write(builder)
-        self._attachments.append(
-            records.AttachmentIndex(
-                offset=offset,
-                length=builder.count,
-                log_time=attachment.log_time,
-                create_time=attachment.create_time,
-                data_size=len(attachment.data),
-                name=attachment.name,
-                media_type=attachment.media_type,
-            )
-        )
-
-    def _put(self, record: records.McapRecord) -> None:
-        builder = RecordBuilder()
-        record.write(builder)
-        self._write(builder.end())
-
-    def _write(self, data: bytes) -> None:
-        """Hand it to the operating system at once: a kill can't take it back."""
-        rest = memoryview(data)
-        try:
-            while rest:
-                rest = rest[self._stream.write(rest) :]
-        except OSError as error:
-            self._stream.close()
-            raise InfrastructureError(
-                f"can't write {self._path}: {error.strerror or error}"
-            ) from error
-        self._offset += len(data)
-
-
-def _message_index(channel: int, messages: np.ndarray) -> bytes:
-    entries = np.empty(len(messages), [("time", "<u8"), ("offset", "<u8")])
-    entries["time"] = messages["log_time"]
-    entries["offset"] = np.arange(len(messages)) * messages.dtype.itemsize
-    builder = RecordBuilder()
-    builder.start_record(Opcode.MESSAGE_INDEX)
-    builder.write2(channel)
-    builder.write4(entries.nbytes)
-    builder.write(entries.tobytes())
-    builder.finish_record()
-    data: bytes = builder.end()
-    return data

@@ -4,21 +4,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import zstandard
-from mcap import records
 
-from configs.errors import ScenarioError
 from fleetloop.record import schema
-from fleetloop.record.mcap_file import SCENARIO
-from fleetloop.record.scan import scan
+from fleetloop.record.scan import RecordError, scan
 from fleetloop.record.schema import Kind
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A run's record: per robot and source a structured array, one element per tick.
+    """A run's record: per robot and source a structured array, one element per tick from tick 0 on.
 
-    Fields are `tick` and the signals of `configs.signals` by name.
+    Fields are `tick` and the signals of `configs.signals` by name. Sources are as long as they
+    were: a controller that ended early has fewer rows than the others.
     """
 
     path: Path
@@ -26,33 +23,32 @@ class Record:
     plant: dict[str, np.ndarray]
     controller: dict[str, np.ndarray]
     scenario_toml: str
-    complete: bool  # the file has its end
+    lost: str
+    """What isn't in it, and why; empty if it is all there and right."""
 
     @classmethod
-    def open(cls, path: Path) -> "Record":
-        """Read a record file.
+    def open(cls, path: Path, *, damaged: bool = False) -> "Record":
+        """Read a record file; every byte of what is returned was checked.
+
+        Args:
+            path: the file.
+            damaged: whether a damaged one may be read up to its first damage.
 
         Raises:
-            ScenarioError: it is no record.
+            RecordError: it is no record or damaged; the text says where and what.
         """
-        found = scan(path)
-        robots = _robots(found.channels)
-        if not robots:
-            raise ScenarioError(f"{path}: an MCAP file, but not the record of a run")
         blocks: dict[tuple[int, Kind], list[np.ndarray]] = {}
-        decompress = zstandard.ZstdDecompressor().decompress
-        with path.open("rb") as stream:
-            for index, channel, _ in found.chunks:
-                kind = schema.kind_of(channel)
-                if kind is Kind.POSE:
-                    continue
-                stream.seek(index.chunk_start_offset + index.chunk_length - index.compressed_size)
-                body = decompress(
-                    stream.read(index.compressed_size), max_output_size=index.uncompressed_size
-                )
-                messages = np.frombuffer(body, schema.MESSAGE_TYPES[kind])
+
+        def take(channel: int, messages: np.ndarray) -> None:
+            kind = schema.kind_of(channel)
+            if kind is not Kind.POSE:
                 number = schema.robot_number_of(channel)
                 blocks.setdefault((number, kind), []).append(messages["payload"])
+
+        found = scan(path, take)
+        if found.damaged and not damaged:
+            raise RecordError(f"{path}: {found.lost}")
+        robots = found.head.robots
 
         def rows(kind: Kind) -> dict[str, np.ndarray]:
             empty = np.empty(0, schema.ROW_TYPES[kind])
@@ -61,15 +57,20 @@ class Record:
                 for number, robot in enumerate(robots)
             }
 
-        texts = [a.data.decode() for a, _ in found.attachments if a.name == SCENARIO]
-        return cls(
-            path, robots, rows(Kind.PLANT), rows(Kind.CONTROLLER), "".join(texts), found.complete
-        )
+        plant, controller = rows(Kind.PLANT), rows(Kind.CONTROLLER)
+        return cls(path, robots, plant, controller, found.head.scenario_toml, found.lost)
 
-
-def _robots(channels: list[records.Channel]) -> tuple[str, ...]:
-    in_order = sorted(channels, key=lambda channel: channel.id)
-    parts = [channel.topic.split("/") for channel in in_order]
-    return tuple(
-        part[1] for part in parts if len(part) == 3 and part[0] == "robot" and part[2] == "plant"
-    )
+    def extent(self) -> str:
+        """How much is there: ticks of every robot, and up to what time; alike robots together."""
+        alike: dict[str, list[str]] = {}
+        for robot in self.robots:
+            plant, controller = self.plant[robot], self.controller[robot]
+            longer = max(plant, controller, key=len)
+            text = f"{len(longer)} ticks"
+            if len(longer):
+                text += f" up to {longer['t_s'][-1]:g} s"
+            if len(plant) != len(controller):
+                shorter = "controller" if len(controller) < len(plant) else "plant"
+                text += f" ({shorter} {min(len(plant), len(controller))})"
+            alike.setdefault(text, []).append(robot)
+        return "; ".join(f"{', '.join(robots)}: {text}" for text, robots in alike.items())

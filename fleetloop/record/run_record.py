@@ -1,5 +1,6 @@
 """Everything that a run records: signals in `record.mcap`, each bus in `can/`."""
 
+import contextlib
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -35,22 +36,39 @@ class RunRecord:
         buses: Sequence[str] = (),
         formats: Sequence[str] = (),
     ) -> None:
-        self._rows = RecordWriter(path, robots, scenario_toml, period_ns)
         self._logs: dict[str, CanLogWriter] = {}
-        if formats and buses:
-            folder = path.parent / CAN_FOLDER
-            try:
-                folder.mkdir(exist_ok=True)
-            except OSError as error:
-                raise InfrastructureError(f"can't make {folder}: {error.strerror}") from error
-            for number, bus in enumerate(buses, 1):
-                blf = folder / f"{bus}.blf" if "blf" in formats else None
-                log = folder / f"{bus}.log" if "log" in formats else None
-                self._logs[bus] = CanLogWriter(blf, log, channel=number, name=bus)
+        self._rows = RecordWriter(path, robots, scenario_toml, period_ns)
+        try:
+            if formats and buses:
+                self._open_logs(path.parent / CAN_FOLDER, buses, formats)
+        except InfrastructureError:
+            self._discard(path.parent / CAN_FOLDER)
+            raise
+
+    def _open_logs(self, folder: Path, buses: Sequence[str], formats: Sequence[str]) -> None:
+        try:
+            folder.mkdir(exist_ok=True)
+        except OSError as error:
+            raise InfrastructureError(f"can't make {folder}: {error.strerror}") from error
+        for number, bus in enumerate(buses, 1):
+            blf = folder / f"{bus}.blf" if "blf" in formats else None
+            log = folder / f"{bus}.log" if "log" in formats else None
+            self._logs[bus] = CanLogWriter(blf, log, channel=number, name=bus)
+
+    def _discard(self, folder: Path) -> None:
+        for log in self._logs.values():
+            log.discard()
+        self._rows.discard()
+        with contextlib.suppress(OSError):
+            folder.rmdir()
 
     def add(self, robot: str, source: Source, first_tick: int, rows: bytes) -> None:
         """Add rows of consecutive ticks, as `RecordWriter.add`."""
         self._rows.add(robot, source, first_tick, rows)
+
+    def note_lost(self, what: str) -> None:
+        """Have the record say that something is missing in it."""
+        self._rows.note_lost(what)
 
     def end(self, robot: str, source: Source) -> None:
         """Take note that no row of this source follows, as `RecordWriter.end`."""

@@ -1,107 +1,230 @@
-"""Walk an MCAP file from its beginning, record by record, up to its end or to where it was cut."""
+"""Walk a record from its beginning and check every byte of it, up to its end or to where it is cut.
 
+    head       its own check sum                                    `fleetloop.record.head`
+    chunks     a check sum each, ticks one after the other          `fleetloop.record.chunks`
+    end        Metadata: what is missing in it, DataEnd: check sum of all bytes before
+    summary    check sum in the footer; the file ends with it
+
+A file that ends before its end is *cut*; one with a byte that isn't what was written is *damaged*.
+"""
+
+import contextlib
+import os
 import struct
-from collections.abc import Iterator
+import zlib
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from io import BytesIO
+from io import BufferedReader, BytesIO
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 from mcap import records
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
 from configs.errors import ScenarioError
+from fleetloop.record.chunks import ChunkReader, DamageError, packed_size, summary_of
+from fleetloop.record.head import MAGIC, PREFIX, Head, HeadError, encoded, understood
 
-MAGIC = b"\x89MCAP0\r\n"
-_PREFIX = struct.Struct("<BQ")
+_END, _LOST = "fleetloop.end", "lost"
+_FOOTER = struct.Struct("<QQI")
+Take = Callable[[int, np.ndarray], None]
 
 
-class Found(NamedTuple):
-    """A record of the file: what it is and where its content begins and ends."""
+class RecordError(ScenarioError):
+    """A file that is no record, or isn't what was written; the text says where and what."""
 
-    opcode: int
-    start: int
-    content: int
-    end: int
+
+class Written(NamedTuple):
+    """A chunk of the file, and how the file was before it."""
+
+    summary: records.ChunkIndex
+    channel: int
+    messages: int
+    crc_before: int
 
 
 @dataclass(slots=True)
 class Scan:
-    """What the complete part of a file holds."""
+    """What the whole part of a file holds."""
 
-    end: int = len(MAGIC)  # where its complete part ends, before any summary
-    complete: bool = False  # it has its end
-    schemas: list[records.Schema] = field(default_factory=list)
-    channels: list[records.Channel] = field(default_factory=list)
-    attachments: list[tuple[records.Attachment, int]] = field(default_factory=list)
-    chunks: list[tuple[records.ChunkIndex, int, int]] = field(default_factory=list)
-    """Index, channel and number of messages of each chunk."""
+    head: Head
+    end: int  # where the whole chunks end
+    crc: int  # of all bytes before
+    chunks: list[Written] = field(default_factory=list)
+    lost: str = ""
+    """What isn't in it and why; empty if it is all there and right."""
+    closed: bool = False
+    """It has its end and its summary."""
+    damaged: bool = False
 
 
-def scan(path: Path) -> Scan:
-    """What is in a record file, complete or cut.
+class _CutError(Exception):
+    """The file ends here, and shouldn't."""
+
+
+class _Found(NamedTuple):
+    opcode: int
+    start: int
+    content: bytes
+    crc_before: int
+
+
+def end_record(lost: str) -> records.Metadata:
+    """What stands after the last chunk: what is missing."""
+    return records.Metadata(_END, {_LOST: lost})
+
+
+def scan(path: Path, take: Take = lambda _channel, _messages: None) -> Scan:
+    """What is in a record file; `take` gets channel and messages of every chunk before a damage.
 
     Raises:
-        ScenarioError: it is no MCAP file.
+        RecordError: it is no record, its head isn't whole, or it can't be read.
     """
-    found = Scan()
-    with path.open("rb") as stream:
-        if stream.read(len(MAGIC)) != MAGIC:
-            raise ScenarioError(f"{path}: not an MCAP file")
-        chunk: tuple[records.Chunk, Found] | None = None
-        for record in _walk(path, len(MAGIC)):
-            stream.seek(record.content)
-            data = ReadDataStream(BytesIO(stream.read(record.end - record.content)))
-            match record.opcode:
-                case Opcode.SCHEMA:
-                    found.schemas.append(records.Schema.read(data))
-                case Opcode.CHANNEL:
-                    found.channels.append(records.Channel.read(data))
-                case Opcode.ATTACHMENT:
-                    found.attachments.append((records.Attachment.read(data), record.start))
-                case Opcode.CHUNK:
-                    chunk = records.Chunk.read(data), record
-                    continue
-                case Opcode.MESSAGE_INDEX if chunk is not None:
-                    found.chunks.append(_chunk_index(*chunk, record, data))
-                case Opcode.DATA_END:
-                    found.complete = True
-                    return found
-            found.end = record.end
-    return found
+    try:
+        with path.open("rb") as stream:
+            file = _File(stream)
+            found = _head(path, file)
+            try:
+                _body(file, found, take)
+            except _CutError as cut:
+                found.lost = str(cut)
+            except DamageError as damage:
+                found.lost, found.damaged = str(damage), True
+            return found
+    except OSError as error:
+        raise RecordError(f"{path}: can't be read: {error.strerror or error}") from error
 
 
-def _walk(path: Path, offset: int) -> Iterator[Found]:
-    size = path.stat().st_size
-    with path.open("rb") as stream:
-        while offset + _PREFIX.size <= size:
-            stream.seek(offset)
-            opcode, length = _PREFIX.unpack(stream.read(_PREFIX.size))
-            end = offset + _PREFIX.size + length
-            if opcode == 0 or end > size:
-                return
-            yield Found(opcode, offset, offset + _PREFIX.size, end)
-            offset = end
+class _File:
+    """Records of a file one after the other, with the check sum of all that was read."""
+
+    def __init__(self, stream: BufferedReader) -> None:
+        self._stream = stream
+        self.size = os.fstat(stream.fileno()).st_size
+        self.at = 0
+        self.crc = 0
+        stream.seek(max(0, self.size - len(MAGIC)))
+        self.ends_well = self.size > 2 * len(MAGIC) and stream.read() == MAGIC
+        stream.seek(0)
+
+    def bytes(self, length: int) -> bytes:
+        """The next bytes."""
+        if self.at + length > self.size:
+            if self.ends_well:
+                raise DamageError(
+                    f"damaged at byte {self.at}: the record there is longer than the file"
+                )
+            raise _CutError(f"cut at byte {self.size}")
+        data = self._stream.read(length)
+        self.at += length
+        self.crc = zlib.crc32(data, self.crc)
+        return data
+
+    def record(self) -> _Found:
+        """The next record."""
+        start, crc = self.at, self.crc
+        opcode, length = PREFIX.unpack(self.bytes(PREFIX.size))
+        if opcode == 0:
+            self._refuse_zeros(start)
+        return _Found(opcode, start, self.bytes(length), crc)
+
+    def _refuse_zeros(self, start: int) -> None:
+        self._stream.seek(start)
+        for block in iter(lambda: self._stream.read(1 << 20), b""):
+            if block.count(0) != len(block):
+                raise DamageError(f"damaged at byte {start}: no record there")
+        raise _CutError(f"cut at byte {start}, only zeros follow")
 
 
-def _chunk_index(
-    chunk: records.Chunk, at: Found, index: Found, data: ReadDataStream
-) -> tuple[records.ChunkIndex, int, int]:
-    channel = data.read2()
-    count = data.read4() // 16
-    return (
-        records.ChunkIndex(
-            chunk_start_offset=at.start,
-            chunk_length=at.end - at.start,
-            compression=chunk.compression,
-            compressed_size=len(chunk.data),
-            uncompressed_size=chunk.uncompressed_size,
-            message_start_time=chunk.message_start_time,
-            message_end_time=chunk.message_end_time,
-            message_index_length=index.end - index.start,
-            message_index_offsets={channel: index.start},
-        ),
-        channel,
-        count,
-    )
+def _head(path: Path, file: _File) -> Scan:
+    if not file.size:
+        raise RecordError(f"{path}: empty, not a record")
+    found: list[tuple[int, bytes]] = []
+    try:
+        if file.bytes(len(MAGIC)) != MAGIC:
+            raise RecordError(f"{path}: not an MCAP file")
+        record = file.record()
+        while record.opcode in (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT):
+            found.append((record.opcode, record.content))
+            record = file.record()
+        found.append((record.opcode, record.content))
+        return Scan(understood(found, record.crc_before), file.at, file.crc)
+    except _CutError as cut:
+        raise RecordError(f"{path}: {cut}, before the first row") from cut
+    except (DamageError, HeadError) as error:
+        raise RecordError(f"{path}: {error}") from error
+
+
+def _body(file: _File, found: Scan, take: Take) -> None:
+    """Chunks, end and summary."""
+    chunks = ChunkReader(len(found.head.robots))
+    record = file.record()
+    while record.opcode == Opcode.CHUNK:
+        index = file.record()
+        with _at(record.start):
+            if index.opcode != Opcode.MESSAGE_INDEX:
+                raise DamageError("a chunk without index")
+            channel, messages = chunks.unpack(record.content, index.content)
+        length, packed = index.start - record.start, packed_size(record.content)
+        summary = summary_of(channel, messages, record.start, length, packed)
+        found.chunks.append(Written(summary, channel, len(messages), record.crc_before))
+        take(channel, messages)
+        found.end, found.crc = file.at, file.crc
+        record = file.record()
+    with _at(record.start):
+        lost = _missing(record)
+    record = file.record()
+    with _at(record.start):
+        if record.opcode != Opcode.DATA_END or len(record.content) != 4:
+            raise DamageError("no end of the rows")
+        if int.from_bytes(record.content, "little") != record.crc_before:
+            raise DamageError("the check sum over all rows differs")
+    try:
+        _summary(file)
+    except _CutError as cut:
+        raise _CutError(f"{cut}, behind its last row") from cut
+    found.closed, found.lost = True, lost
+
+
+def _missing(record: _Found) -> str:
+    """What the end says is missing."""
+    if record.opcode != Opcode.METADATA:
+        raise DamageError(f"a record of kind {record.opcode}, not a chunk")
+    try:
+        end = records.Metadata.read(ReadDataStream(BytesIO(record.content)))
+    except (McapError, ValueError, struct.error) as error:
+        raise DamageError("the end of the rows is damaged") from error
+    lost: str | None = end.metadata.get(_LOST)
+    if end.name != _END or lost is None or encoded(end)[PREFIX.size :] != record.content:
+        raise DamageError("the end of the rows is damaged")
+    return lost
+
+
+def _summary(file: _File) -> None:
+    """Everything behind the rows, up to the last byte."""
+    start = file.at
+    file.crc = 0
+    record = file.record()
+    while record.opcode != Opcode.FOOTER:
+        record = file.record()
+    with _at(start):
+        if len(record.content) != _FOOTER.size:
+            raise DamageError("the footer is damaged")
+        summary_start, _, crc = _FOOTER.unpack(record.content)
+        before = PREFIX.pack(record.opcode, _FOOTER.size) + record.content[:-4]
+        if summary_start != start or zlib.crc32(before, record.crc_before) != crc:
+            raise DamageError("the check sum of the summary differs")
+    if file.bytes(len(MAGIC)) != MAGIC or file.at != file.size:
+        raise DamageError(f"damaged at byte {file.at}: more than a record")
+
+
+@contextlib.contextmanager
+def _at(start: int) -> Iterator[None]:
+    """Name the place of a damage."""
+    try:
+        yield
+    except DamageError as damage:
+        raise DamageError(f"damaged at byte {start}: {damage}") from damage

@@ -6,6 +6,7 @@ that nothing follows, in the order of the robots; the rest at the end. So the fi
 run alone, and a source that ends early holds nobody's rows back.
 """
 
+import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
@@ -15,11 +16,11 @@ import numpy as np
 
 from configs.errors import InfrastructureError
 from configs.signals import AGENT_SIGNALS, PLANT_SIGNALS
+from fleetloop.record.chunks import CHUNK_TICKS
 from fleetloop.record.mcap_file import McapFile
 from fleetloop.record.schema import Kind, channel_id, pose_messages, row_messages
 
 Source = Literal["plant", "controller"]
-CHUNK_TICKS = 512
 _KINDS: dict[str, Kind] = {"plant": Kind.PLANT, "controller": Kind.CONTROLLER}
 _WIDTHS = {Kind.PLANT: len(PLANT_SIGNALS), Kind.CONTROLLER: len(AGENT_SIGNALS)}
 
@@ -63,6 +64,7 @@ class RecordWriter:
             (number, kind): _Rows() for number in range(len(self._robots)) for kind in _WIDTHS
         }
         self._numbers = {robot: number for number, robot in enumerate(self._robots)}
+        self._lost = ""
 
     def add(self, robot: str, source: Source, first_tick: int, rows: bytes) -> None:
         """Add rows of consecutive ticks, float64 as `bridge.telemetry` packs them.
@@ -98,11 +100,28 @@ class RecordWriter:
                 return
             self._write_group(CHUNK_TICKS)
 
+    def note_lost(self, what: str) -> None:
+        """Have the file say that something is missing in it."""
+        self._lost = what
+
     def close(self) -> None:
-        """Write what is left and complete the file."""
-        while any(rows.count for rows in self._sources.values()):
-            self._write_group(CHUNK_TICKS)
-        self._file.finish()
+        """Write what is left and complete the file.
+
+        Raises:
+            InfrastructureError: not everything could be written; what could is a complete file.
+        """
+        try:
+            while any(rows.count for rows in self._sources.values()):
+                self._write_group(CHUNK_TICKS)
+        except InfrastructureError as error:
+            self._lost = str(error)
+            raise
+        finally:
+            self._file.finish(self._lost)
+
+    def discard(self) -> None:
+        """Close and remove the file: nothing is in it."""
+        self._file.discard()
 
     def _write_group(self, ticks: int) -> None:
         for (number, kind), held in self._sources.items():
@@ -125,12 +144,19 @@ class RecordWriter:
         value: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        if isinstance(value, InfrastructureError):
-            self._file.close()
-        else:
+        if value is None:
+            self.close()
+            return
+        self.note_lost(str(value) or type(value).__name__)
+        with contextlib.suppress(InfrastructureError):  # what ended it says more
             self.close()
 
 
 def finish_truncated(path: Path) -> None:
-    """Complete a record whose writer was killed, so that any reader opens it."""
-    McapFile.resume(path).finish()
+    """Complete a record whose writer was killed, so that any reader opens it.
+
+    Raises:
+        RecordError: its head isn't whole, or it is damaged.
+        InfrastructureError: it can't be written.
+    """
+    McapFile.resume(path).finish("its recorder ended before it did")

@@ -43,7 +43,7 @@ def test_what_was_written_is_read(tmp_path: Path, ticks: int) -> None:
     write(tmp_path / "a.mcap", ticks)
     record = Record.open(tmp_path / "a.mcap")
     assert record.robots == ROBOTS
-    assert record.complete
+    assert not record.lost
     assert record.scenario_toml == 'name = "x"\n'
     for robot in ROBOTS:
         for source, table in (("plant", record.plant), ("controller", record.controller)):
@@ -140,9 +140,10 @@ def test_a_file_cut_anywhere_opens_and_is_whole_again_when_finished(
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(content[: data.draw(st.integers(header, len(content) - 1))])
     before = Record.open(cut)
+    assert before.lost.startswith("cut at byte")
     finish_truncated(cut)
     after = Record.open(cut)
-    assert after.complete
+    assert after.lost == "its recorder ended before it did"
     for robot in ROBOTS:
         ticks = len(before.plant[robot])
         assert np.array_equal(after.plant[robot], before.plant[robot])
