@@ -1,8 +1,8 @@
 """What a user can cause: one line, and the exit status that the process ends with.
 
-Exit statuses of every command: 0 held, 1 an expectation failed (or a difference was found),
-2 usage or scenario, 3 infrastructure, 130 interrupted. Anything else is a bug and keeps its
-traceback.
+Exit statuses of every command: 0 held, 1 an expectation failed (or a difference was found, or a
+record isn't all there), 2 usage or scenario, 3 infrastructure, 130 interrupted. Anything else is a
+bug and keeps its traceback.
 """
 
 from collections.abc import Sequence

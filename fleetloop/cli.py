@@ -1,7 +1,7 @@
 """The command line: `fleetloop VERB ...`. Arguments only; each verb's work is in its own module.
 
-Exit status: 0 held, 1 an expectation failed or was not reached or two runs differ, 2 usage or
-scenario, 3 infrastructure (named), 130 interrupted.
+Exit status: 0 held, 1 an expectation failed or was not reached, two runs differ or a record is cut,
+2 usage or scenario, 3 infrastructure (named), 130 interrupted.
 """
 
 import os
@@ -56,6 +56,14 @@ ClockOption = Annotated[
 ]
 SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Seed, instead of the file's.")]
 RunArg = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its record.mcap.")]
+PartialOption = Annotated[
+    bool,
+    typer.Option(
+        "--partial",
+        help="Take what there is of a record that is cut or damaged, up to there, with exit status"
+        " 0. Else such a record is refused: 1 if it is cut, 2 if it is damaged.",
+    ),
+]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -242,12 +250,13 @@ def check(
 
 
 @app.command()
-def report(run: RunArg) -> None:
+def report(run: RunArg, partial: PartialOption = False) -> None:
     """Make report.html and the figures of a run again from its record."""
     from fleetloop.report import write_report
     from fleetloop.results import print_report
+    from fleetloop.run_folder import read_record
 
-    print_report(write_report(run))
+    print_report(write_report(run, read_record(run, partial=partial)))
 
 
 @app.command()
@@ -274,6 +283,7 @@ def export(
         typer.Option("--to", metavar="SECONDS", help="Up to and with this scenario time [s]."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite FILE if it exists.")] = False,
+    partial: PartialOption = False,
 ) -> None:
     """Write one row per tick and robot, each robot up to its own end."""
     from fleetloop.export import Selection
@@ -286,7 +296,8 @@ def export(
         from_s=from_s,
         to_s=to_s,
     )
-    say(f"wrote {target}: {export_run(run, target, chosen, force=force)} rows")
+    rows = export_run(run, target, chosen, force=force, partial=partial)
+    say(f"wrote {target}: {rows} rows")
 
 
 @app.command()
@@ -294,11 +305,12 @@ def diff(
     a: Annotated[Path, typer.Argument(metavar="A", help="A run's folder, or its record.mcap.")],
     b: Annotated[Path, typer.Argument(metavar="B", help="The other one.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    partial: PartialOption = False,
 ) -> None:
     """Compare two runs bit for bit; name the first tick, robot and field that differ."""
     from fleetloop.diff import print_comparison
 
-    raise typer.Exit(print_comparison(a, b, as_json=as_json))
+    raise typer.Exit(print_comparison(a, b, as_json=as_json, partial=partial))
 
 
 @app.command()

@@ -21,7 +21,7 @@ import numpy as np
 from configs.errors import InfrastructureError, ScenarioError
 from configs.signals import AGENT_SIGNALS, PLANT_SIGNALS
 from fleetloop.record.reader import Record
-from fleetloop.run_folder import record_of
+from fleetloop.run_folder import read_record
 
 ALL = "all"
 _TRUTH = tuple(signal.name for signal in PLANT_SIGNALS)
@@ -135,13 +135,19 @@ def _column(record: Record, numbers: Sequence[int], name: str) -> np.ma.MaskedAr
 
 
 def export(
-    run: Path, target: Path, selection: Selection | None = None, *, force: bool = False
+    run: Path,
+    target: Path,
+    selection: Selection | None = None,
+    *,
+    force: bool = False,
+    partial: bool = False,
 ) -> int:
     """Write the table of a run to a .csv or .npz file; return its number of rows.
 
     Raises:
         ScenarioError: no record there, another ending, an existing file without `force`, or
             something that was asked for isn't in the record.
+        IncompleteError: the record isn't all there, and `partial` wasn't asked for.
         InfrastructureError: the file can't be written; an older one is as it was.
     """
     if target.suffix not in (".csv", ".npz"):
@@ -150,7 +156,7 @@ def export(
         raise ScenarioError(f"{target}: is a folder; name a file")
     if target.exists() and not force:
         raise ScenarioError(f"{target}: exists already; --force overwrites it")
-    columns = table(Record.open(record_of(run)), selection)
+    columns = table(read_record(run, partial=partial), selection)
     part = target.with_name(f".{target.name}.{os.getpid()}")
     try:
         (_write_npz if target.suffix == ".npz" else _write_csv)(part, columns)

@@ -29,7 +29,7 @@ from bridge.zenoh_link import RouterLink, open_router
 from configs.brief import NetworkLink
 from configs.briefing import leader_brief, schedule
 from configs.deployment import Deployment, roles_of
-from configs.errors import InfrastructureError
+from configs.errors import FleetloopError, InfrastructureError
 from configs.scenario import Scenario
 from fleetloop import placing
 from fleetloop.children import (
@@ -318,8 +318,16 @@ class ProcessRun:
             outcome.ended = "aborted"
             lost = recorder.failure()
             outcome.reason = lost.text if lost else f"recorder: not done within {DRAIN_S:g} s"
-        if unfinished and self._record.exists():
-            finish_truncated(self._record)
+        if unfinished:
+            self._complete_record()
+
+    def _complete_record(self) -> None:
+        """Give the record the end that its writer didn't."""
+        try:
+            if self._record.exists():
+                finish_truncated(self._record)
+        except FleetloopError as error:
+            self.outcome.reason += f"; {error}"
 
     def _hear_from_elsewhere(self, link: Link) -> None:
         """Let those on other machines say their last word; what they don't say in time is lost."""

@@ -32,15 +32,20 @@ PAGE = "report.html"
 FIGURES = "figures"
 
 
-def write_report(run: Path) -> Path:
-    """Make the figures and the page of a run, named by its folder or its record; return the page.
+def write_report(run: Path, record: Record | None = None) -> Path:
+    """Make the figures and the page of a run; return the page.
+
+    Args:
+        run: its folder, or the record file itself.
+        record: the record, if it was read already.
 
     Raises:
         ScenarioError: no record there, or nothing in it.
         InfrastructureError: the page or a figure can't be written.
     """
-    path = run_folder.record_of(run)
-    record = Record.open(path)
+    if record is None:
+        record = Record.open(run_folder.record_of(run))
+    path = record.path
     if not any(len(rows) for rows in record.controller.values()):
         raise ScenarioError(f"{path}: not one tick of a controller is in it, nothing to show")
     scenario = loads(f"{path}: {run_folder.SCENARIO}", record.scenario_toml)
@@ -84,6 +89,7 @@ def _page(
     return template.substitute(
         title=escape(f"Fleetloop: {scenario.name}"),
         subtitle=escape(scenario.description),
+        lost=escape(_lost(record)),
         verdict=escape(summary["verdict"]),
         reason=escape(summary["reason"]),
         robots=_table(robot_header(summary), robot_rows(summary)),
@@ -95,6 +101,12 @@ def _page(
         facts=_table(("", ""), _facts(summary)),
         scenario=escape(record.scenario_toml),
     )
+
+
+def _lost(record: Record) -> str:
+    if not record.lost:
+        return ""
+    return f"The record isn't all there: {record.lost}. In it are {record.extent()}."
 
 
 def _facts(summary: Summary) -> Iterable[tuple[str, str]]:

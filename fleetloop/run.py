@@ -22,6 +22,7 @@ from fleetloop.lockstep import InProcessRun
 from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.reader import Record
 from fleetloop.record.run_record import RunRecord
+from fleetloop.record.scan import RecordError
 from fleetloop.results import print_report, print_results
 from fleetloop.signals import stop_on_signals
 from fleetloop.summary import RunStats, Summary, summarise, to_json
@@ -131,30 +132,39 @@ def _in_process(
     began = time.monotonic()
     record = folder / run_folder.RECORD
     period_ns = schedule(scenario).period_ns
-    with (
-        RunRecord(
-            record,
-            scenario.names,
-            to_toml(scenario),
-            period_ns,
-            buses=scenario.buses,
-            formats=scenario.bus.record,
-        ) as file,
-        BackgroundWriter(file) as writer,
-    ):
-        run = InProcessRun(
-            plant_brief(scenario, network=network),
-            [agent_brief(scenario, r, network=network, bus=()) for r in scenario.names],
-            leader_brief(scenario),
-            writer,
-            on_progress,
-        )
-        startup_s = time.monotonic() - began
-        run.run(stop)
+    run: InProcessRun | None = None
+    ended, reason = "completed", ""
+    try:
+        with (
+            RunRecord(
+                record,
+                scenario.names,
+                to_toml(scenario),
+                period_ns,
+                buses=scenario.buses,
+                formats=scenario.bus.record,
+            ) as file,
+            BackgroundWriter(file) as writer,
+        ):
+            run = InProcessRun(
+                plant_brief(scenario, network=network),
+                [agent_brief(scenario, r, network=network, bus=()) for r in scenario.names],
+                leader_brief(scenario),
+                writer,
+                on_progress,
+            )
+            startup_s = time.monotonic() - began
+            run.run(stop)
+    except InfrastructureError as error:
+        if run is None:
+            raise
+        ended, reason = "aborted", str(error)
+    if stop.requested:
+        ended, reason = "interrupted", stop.reason
     return RunStats(
         mode="in-process",
-        ended="interrupted" if stop.requested else "completed",
-        reason=stop.reason,
+        ended=ended,
+        reason=reason,
         wall_s=run.wall_s,
         startup_s=startup_s,
         frames_per_bus=run.frames,
@@ -225,7 +235,14 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options)
     if not record.exists():
         say(f"{stats.ended}: {stats.reason}; nothing was recorded")
         return EXIT_CODES[stats.ended]
-    summary = summarise(Record.open(record), scenario, stats)
+    try:
+        recorded = Record.open(record)
+    except RecordError as error:
+        say(f"{stats.ended}: {stats.reason}; {error}")
+        return EXIT_CODES["aborted" if stats.ended == "completed" else stats.ended]
+    if recorded.lost:
+        note(f"{record}: {recorded.lost}; in it are {recorded.extent()}")
+    summary = summarise(recorded, scenario, stats)
     unsaved: InfrastructureError | None = None
     try:
         run_folder.write(folder / run_folder.SUMMARY, to_json(summary))
@@ -240,7 +257,7 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options)
     if options.figures and summary["ticks"]:
         from fleetloop.report import write_report
 
-        page = write_report(folder)
+        page = write_report(folder, recorded)
         if not options.as_json:
             print_report(page)
     return exit_status(summary, allow_unchecked=options.allow_unchecked)

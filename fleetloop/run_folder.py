@@ -4,11 +4,19 @@ import os
 from datetime import datetime
 from pathlib import Path
 
-from configs.errors import InfrastructureError, ScenarioError
+from configs.errors import FleetloopError, InfrastructureError, ScenarioError
+from fleetloop.record.reader import Record
+from fleetloop.terminal import note
 
 RECORD = "record.mcap"
 SCENARIO = "scenario.toml"
 SUMMARY = "summary.json"
+
+
+class IncompleteError(FleetloopError):
+    """A record that isn't all there, where all of it was asked for."""
+
+    exit_code = 1
 
 
 def create(scenario_name: str, out: Path | None, *, now: datetime) -> Path:
@@ -59,9 +67,34 @@ def record_of(run: Path) -> Path:
     Raises:
         ScenarioError: there is none.
     """
-    record = run / RECORD if run.is_dir() else run
-    if not record.is_file():
-        raise ScenarioError(f"{run}: no {RECORD} there; name a run's folder or its record")
+    try:
+        record = run / RECORD if run.is_dir() else run
+        if record.is_dir():
+            raise ScenarioError(f"{record}: a folder, not a record")
+        if not record.is_file():
+            raise ScenarioError(f"{run}: no {RECORD} there; name a run's folder or its record")
+    except OSError as error:
+        raise ScenarioError(f"{run}: {error.strerror or error}") from error
+    return record
+
+
+def read_record(run: Path, *, partial: bool) -> Record:
+    """The record of a run; what is missing in it is said on standard error.
+
+    Args:
+        run: its folder, or the record file itself.
+        partial: whether one that is cut or damaged will do, up to there.
+
+    Raises:
+        ScenarioError: there is none, or it is damaged and that won't do.
+        IncompleteError: it isn't all there and that won't do.
+    """
+    record = Record.open(record_of(run), damaged=partial)
+    if record.lost:
+        text = f"{record.path}: {record.lost}; in it are {record.extent()}"
+        if not partial:
+            raise IncompleteError(f"{text}; --partial takes that")
+        note(f"{text}")
     return record
 
 

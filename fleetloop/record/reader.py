@@ -47,7 +47,7 @@ class Record:
 
         found = scan(path, take)
         if found.damaged and not damaged:
-            raise RecordError(f"{path}: {found.lost}")
+            raise RecordError(f"{path}: {found.lost}; --partial takes what is before it")
         robots = found.head.robots
 
         def rows(kind: Kind) -> dict[str, np.ndarray]:
