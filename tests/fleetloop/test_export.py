@@ -16,6 +16,11 @@ HEADER = (
 )
 
 
+def arrays_of(path: Path) -> dict[str, np.ndarray]:
+    with np.load(path) as arrays:
+        return dict(arrays)
+
+
 def read(path: Path) -> list[dict[str, str]]:
     with path.open() as stream:
         return list(csv.DictReader(stream))
@@ -39,7 +44,7 @@ def test_the_table_has_the_promised_columns_and_a_row_per_tick_and_robot(
 def test_npz_and_csv_hold_the_same(finished_run: Path, tmp_path: Path) -> None:
     export(finished_run, tmp_path / "a.csv")
     export(finished_run, tmp_path / "a.npz")
-    arrays = np.load(tmp_path / "a.npz")
+    arrays = arrays_of(tmp_path / "a.npz")
     assert tuple(arrays) == ("t_s", "robot", *DEFAULT)
     rows = read(tmp_path / "a.csv")
     for name in arrays:
@@ -53,7 +58,7 @@ def test_every_robot_has_all_its_rows_after_one_controller_ended(
 ) -> None:
     for name in ("a.csv", "a.npz"):
         assert export(uneven_run, tmp_path / name) == 4000
-    arrays = np.load(tmp_path / "a.npz")
+    arrays = arrays_of(tmp_path / "a.npz")
     record = Record.open(uneven_run / "record.mcap")
     for robot, ends in (("r1", 2000), ("r2", 1200)):
         mine = arrays["robot"] == robot
