@@ -26,6 +26,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
@@ -111,10 +112,17 @@ def pack_brief(brief: object) -> bytes:
     return len(body).to_bytes(_LENGTH_BYTES, "little") + body
 
 
-def serve(kind: type[_Brief], body: Callable[[_Brief, Stop], str | None], *, name: str) -> int:
+def serve(
+    kind: type[_Brief],
+    body: Callable[[_Brief, Stop], str | None],
+    *,
+    name: str,
+    orphaned: Callable[[_Brief], None] = lambda _: None,
+) -> int:
     """Take the brief from standard input, run `body` until it returns, return the exit status.
 
     What `body` returns is its last word: said if there is no launcher any more that could say it.
+    `orphaned` is called, in a thread of its own, as soon as there is none.
     """
     if sys.stdin.isatty():
         print(f"{name}: started by `fleetloop run`, not by hand", file=sys.stderr)  # noqa: T201
@@ -127,7 +135,10 @@ def serve(kind: type[_Brief], body: Callable[[_Brief, Stop], str | None], *, nam
     stop = Stop()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: stop.request("asked to stop"))
-    threading.Thread(target=_watch_lifeline, args=(stop,), daemon=True).start()
+    lifeline = threading.Thread(
+        target=_watch_lifeline, args=(stop, partial(orphaned, brief)), daemon=True
+    )
+    lifeline.start()
     try:
         word = body(brief, stop)
     except FleetloopError as error:
@@ -200,10 +211,11 @@ def _read_brief(stream: BinaryIO) -> object:
     return pickle.loads(body) if body and len(body) == length else None
 
 
-def _watch_lifeline(stop: Stop) -> None:
+def _watch_lifeline(stop: Stop, orphaned: Callable[[], None]) -> None:
     while os.read(0, 4096):
         stop.release()
     stop.end(LAUNCHER_GONE)
+    orphaned()
     threading.Event().wait(GRACE_S)
     os._exit(3)
 

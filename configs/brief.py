@@ -487,7 +487,6 @@ class PlantBrief:
     seed: int
     wire: WireModel | None  # of every bus; None: ideal, frames take no time
     traffic: bool  # tell the recorder what crosses the buses
-    runtime_folder: str  # holds the buses' sockets; removed when the run ends
     network: NetworkLink
     listeners: tuple[tuple[str, int], ...] = ()  # bus, inherited file descriptor of its socket
     attached: tuple[tuple[str, Settings], ...] = ()  # bus, keyword arguments of can.Bus: not ours
@@ -518,3 +517,4 @@ class RecorderBrief:
     period_ns: int
     start_deadline_s: float
     network: NetworkLink
+    runtime_folder: str  # holds the buses' sockets; goes when the launcher was killed

@@ -165,7 +165,6 @@ def plant_brief(
     scenario: Scenario,
     *,
     network: NetworkLink,
-    runtime_folder: str = "",
     speed: float = 0.0,
     profile: bool = False,
 ) -> PlantBrief:
@@ -179,7 +178,6 @@ def plant_brief(
         seed=scenario.seed,
         wire=wire_model(scenario),
         traffic=bool(scenario.bus.record),
-        runtime_folder=runtime_folder,
         network=network,
     )
 

@@ -26,21 +26,17 @@ TERM_GRACE_S = 1.0
 class Child:
     """One process of the run."""
 
-    def __init__(
-        self,
-        nursery: Nursery,
-        name: str,
-        module: str,
-        brief: object,
-        fds: Sequence[int] = (),
-    ) -> None:
+    fds: tuple[int, ...]
+    """The numbers that the descriptors given to it have there."""
+
+    def __init__(self, nursery: Nursery, name: str, module: str, fds: Sequence[int] = ()) -> None:
         self.name = name
         self.status: Status | None = None
         self._code: int | None = None
         stdin, self._stdin = os.pipe()
         self._stdout, stdout = os.pipe()
         try:
-            self._pid = nursery.bear(module, stdin, stdout, fds)
+            self._pid, self.fds = nursery.bear(module, stdin, stdout, fds)
         except InfrastructureError:
             os.close(self._stdin)
             os.close(self._stdout)
@@ -50,6 +46,9 @@ class Child:
             os.close(stdout)
         self._reader = threading.Thread(target=self._read_status, daemon=True)
         self._reader.start()
+
+    def tell(self, brief: object) -> None:
+        """Hand it its brief."""
         with (
             contextlib.suppress(BrokenPipeError),
             os.fdopen(self._stdin, "wb", closefd=False) as lifeline,

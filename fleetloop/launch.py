@@ -42,6 +42,7 @@ from fleetloop.children import (
     refuse_shadowed_roles,
 )
 from fleetloop.elsewhere import Elsewhere
+from fleetloop.nursery import Nursery
 from fleetloop.record.writer import finish_truncated
 from fleetloop.spawn import Orders, spawn
 
@@ -124,11 +125,15 @@ class ProcessRun:
     @contextlib.contextmanager
     def _started(self) -> Iterator[RouterLink]:
         scenario, run = self._scenario, self._run
-        folder = places.create_run_folder(run)
-        try:
-            plan = placing.access_plan(scenario, self._deployment, run)
-            outside = placing.outside(self._deployment)
-            with open_router(scenario.network.endpoint, plan, folder, outside) as link:
+        plan = placing.access_plan(scenario, self._deployment, run)
+        outside = placing.outside(self._deployment)
+        batch = not schedule(scenario).realtime
+        with contextlib.ExitStack() as open_:
+            # It imports while the router opens, and knows the folder before there is one.
+            with Nursery(places.folder_of(run), batch=batch) as nursery:
+                folder = open_.enter_context(places.run_folder(run))
+                router = open_router(scenario.network.endpoint, plan, folder, outside)
+                link = open_.enter_context(router)
                 link.declare_live(keys.live(run, access.LAUNCHER))
                 link.watch_live(keys.live_all(run), "live")
                 # One by one: a wildcard is wider than any identity's rights and would be refused.
@@ -139,16 +144,10 @@ class ProcessRun:
                     user: NetworkLink(run, link.endpoint, user, password)
                     for user, password in plan.passwords.items()
                 }
-                spawn(self._orders, links, folder, self._children)
-                granted = placing.bus_guests(self._deployment)
-                with (
-                    Relay(link, folder, scenario.buses, granted)
-                    if granted
-                    else contextlib.nullcontext()
-                ):
-                    yield link
-        finally:
-            places.remove_run_folder(folder)
+                spawn(self._orders, links, folder, nursery, self._children)
+            if granted := placing.bus_guests(self._deployment):
+                open_.enter_context(Relay(link, folder, scenario.buses, granted))
+            yield link
 
     def _await_ready(self, link: Link, stop: Stop) -> Failure | None:
         """Say the leader's speed until all tokens are there, then go until the plant ticks."""

@@ -101,23 +101,20 @@ def run_plant(source: str, options: Options) -> int:
     brief = plant_brief(scenario, network=NetworkLink("alone", "", "", ""))
     brief = _alone(placing.robots_of_plant(brief, deployment), options)
     name_process(f"plant {scenario.name}")
-    with stop_on_signals() as stop:
-        folder = places.create_run_folder(f"{scenario.name}-{os.getpid()}")
+    attached = {bus for bus, _ in brief.attached}
+    ours = [bus for bus in dict.fromkeys(r.bus for r in brief.robots) if bus not in attached]
+    queue = brief.wire.txqueuelen if brief.wire else 0
+    with (
+        stop_on_signals() as stop,
+        places.run_folder(f"{scenario.name}-{os.getpid()}") as folder,
+    ):
+        hub = Hub(places.listen(folder, ours), stop.wake_fd, queue=queue)
+        end: DriveEnd = hub
         try:
-            attached = {bus for bus, _ in brief.attached}
-            ours = [
-                bus for bus in dict.fromkeys(r.bus for r in brief.robots) if bus not in attached
-            ]
-            queue = brief.wire.txqueuelen if brief.wire else 0
-            hub = Hub(places.listen(folder, ours), stop.wake_fd, queue=queue)
-            end: DriveEnd = hub
-            try:
-                end = join(hub, brief.attached)
-                _run(brief, hub, end, _buses(brief, folder), options, stop)
-            finally:
-                end.close(stop.reason or "the plant has ended")
+            end = join(hub, brief.attached)
+            _run(brief, hub, end, _buses(brief, folder), options, stop)
         finally:
-            places.remove_run_folder(folder)
+            end.close(stop.reason or "the plant has ended")
     return 0
 
 
@@ -128,20 +125,15 @@ def _join(scenario: Scenario, deployment: Deployment) -> int:
     attached = {bus for bus, _ in brief.attached}
     ours = [bus for bus in dict.fromkeys(r.bus for r in brief.robots) if bus not in attached]
     note(f"plant: waiting for run {network.run!r} at {network.endpoint}")
-    with stop_on_signals() as stop:
-        folder = places.create_run_folder(f"{network.run}-plant")
-        try:
-            listeners = places.listen(folder, ours)
-            brief = replace(
-                brief,
-                runtime_folder=str(folder),
-                listeners=tuple((bus, listener.detach()) for bus, listener in listeners.items()),
-                detached=True,
-            )
-            name_process("plant")
-            word = plant_of_a_run(brief, stop)
-        finally:
-            places.remove_run_folder(folder)
+    with stop_on_signals() as stop, places.run_folder(f"{network.run}-plant") as folder:
+        listeners = places.listen(folder, ours)
+        brief = replace(
+            brief,
+            listeners=tuple((bus, listener.detach()) for bus, listener in listeners.items()),
+            detached=True,
+        )
+        name_process("plant")
+        word = plant_of_a_run(brief, stop)
     note(f"plant: {word}{f'; {stop.reason}' if stop.reason else ''}")
     return INTERRUPTED if stop.reason.startswith("interrupted") else 0
 

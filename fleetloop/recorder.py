@@ -9,6 +9,7 @@ from pathlib import Path
 
 from bridge import keys
 from bridge.barrier import Hellos, await_hellos
+from bridge.can_bus import places
 from bridge.link import Arrival
 from bridge.messages import Progress, Report, Rows
 from bridge.process import Stop, cpu_ns, serve
@@ -112,5 +113,10 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
     return f"{brief.path} has {recorder.ticks} ticks"
 
 
+def _tidy(brief: RecorderBrief) -> None:
+    """What the launcher would have done."""
+    places.remove_run_folder(Path(brief.runtime_folder))
+
+
 if __name__ == "__main__":
-    raise SystemExit(serve(RecorderBrief, run, name="recorder"))
+    raise SystemExit(serve(RecorderBrief, run, name="recorder", orphaned=_tidy))

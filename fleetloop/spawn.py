@@ -4,7 +4,8 @@ Each is told, by its brief, exactly what it may know; its buses' listening socke
 """
 
 import secrets
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from configs.loading import to_toml
 from configs.scenario import Scenario
 from fleetloop import placing
 from fleetloop.children import Child
-from fleetloop.nursery import FIRST_FD, Nursery
+from fleetloop.nursery import Nursery
 
 Links = Mapping[str, NetworkLink]
 """How each identity reaches the router."""
@@ -34,7 +35,9 @@ class Orders:
     profile: bool
 
 
-def spawn(orders: Orders, links: Links, folder: Path, children: list[Child]) -> None:
+def spawn(
+    orders: Orders, links: Links, folder: Path, nursery: Nursery, children: list[Child]
+) -> None:
     """Start the processes, the recorder last, and add them to `children` as they are born.
 
     Raises:
@@ -44,38 +47,39 @@ def spawn(orders: Orders, links: Links, folder: Path, children: list[Child]) -> 
     realtime = schedule(scenario).realtime
     here = deployment.runs_here
     robots = [r for r in scenario.names if deployment.is_ours(r) and here(PLANT)]
-    ours = list(dict.fromkeys(scenario.bus_of(robot) for robot in robots))
-    listeners = places.listen(folder, ours)
     waited_for = [] if realtime else robots
     told = {robot: secrets.token_hex(16) for robot in waited_for}
-    try:
-        with Nursery(batch=not realtime) as nursery:
-            if here(PLANT):
-                plant = replace(
-                    _plant(orders, links, folder),
-                    listeners=tuple((bus, FIRST_FD + n) for n, bus in enumerate(ours)),
-                    controllers=tuple(told.items()),
-                )
-                fds = [listeners[bus].fileno() for bus in ours]
-                children.append(Child(nursery, PLANT, "plant", plant, fds))
-            for robot in scenario.names:
-                if here(role := agent_role(robot)):
-                    bus = scenario.bus_of(robot)
-                    socket = str(places.socket_path(folder, bus)) if robot in robots else ""
-                    agent = _agent(orders, links, robot, socket, told.get(robot, ""))
-                    children.append(Child(nursery, role, "agents", agent))
-            recorder = _recorder(orders, links)
-            children.append(Child(nursery, RECORDER, "fleetloop.recorder", recorder))
-    finally:
-        for listener in listeners.values():
-            listener.close()
+
+    def start(name: str, module: str, fds: Sequence[int] = ()) -> Child:
+        children.append(Child(nursery, name, module, fds))
+        return children[-1]
+
+    if here(PLANT):
+        buses = list(dict.fromkeys(scenario.bus_of(robot) for robot in robots))
+        with ExitStack() as listening:
+            listeners = places.listen(folder, buses)
+            for listener in listeners.values():
+                listening.enter_context(listener)
+            plant = start(PLANT, "plant", [listeners[bus].fileno() for bus in buses])
+        brief = replace(
+            _plant(orders, links),
+            listeners=tuple(zip(buses, plant.fds, strict=True)),
+            controllers=tuple(told.items()),
+        )
+        plant.tell(brief)
+    for robot in scenario.names:
+        if here(role := agent_role(robot)):
+            bus = scenario.bus_of(robot)
+            socket = str(places.socket_path(folder, bus)) if robot in robots else ""
+            agent = _agent(orders, links, robot, socket, told.get(robot, ""))
+            start(role, "agents").tell(agent)
+    start(RECORDER, "fleetloop.recorder").tell(_recorder(orders, links, folder))
 
 
-def _plant(orders: Orders, links: Links, folder: Path) -> PlantBrief:
+def _plant(orders: Orders, links: Links) -> PlantBrief:
     brief = plant_brief(
         orders.scenario,
         network=links[access.PLANT],
-        runtime_folder=str(folder),
         speed=orders.speed,
         profile=orders.profile,
     )
@@ -93,7 +97,7 @@ def _agent(orders: Orders, links: Links, robot: str, socket: str, secret: str) -
     )
 
 
-def _recorder(orders: Orders, links: Links) -> RecorderBrief:
+def _recorder(orders: Orders, links: Links, folder: Path) -> RecorderBrief:
     ticks = schedule(orders.scenario, orders.speed)
     return RecorderBrief(
         str(orders.record),
@@ -104,6 +108,7 @@ def _recorder(orders: Orders, links: Links) -> RecorderBrief:
         ticks.period_ns,
         ticks.start_deadline_s,
         links[access.RECORDER],
+        str(folder),
     )
 
 

@@ -9,12 +9,10 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
-from pathlib import Path
 
 from bridge import keys
 from bridge.access import LAUNCHER
 from bridge.barrier import Hellos, await_hellos
-from bridge.can_bus import places
 from bridge.can_bus.ends import DriveEnd
 from bridge.can_bus.hub import Hub
 from bridge.clock import monotonic_of
@@ -43,23 +41,18 @@ EARLY = -1
 def run(brief: PlantBrief, stop: Stop) -> str:
     """Wire the plant to its buses and the network, wait for everybody, and run."""
     listeners = {bus: socket.socket(fileno=fd) for bus, fd in brief.listeners}
-    try:
-        with open_client(brief.network, brief.schedule.start_deadline_s) as link:
-            if brief.detached:
-                gone = partial(stop.end, LAUNCHER_GONE)
-                link.on_gone(keys.live(brief.network.run, LAUNCHER), gone)
-            queue = brief.wire.txqueuelen if brief.wire else 0
-            controllers = _controllers(brief)
-            hub = Hub(listeners, stop.wake_fd, queue=queue, controllers=controllers)
-            end: DriveEnd = hub
-            try:
-                end = join(hub, brief.attached)
-                counters = _run(brief, stop, link, hub, end)
-            finally:
-                end.close(stop.reason or "the plant has ended")
-    finally:
-        # The launcher does it too, unless it was killed.
-        places.remove_run_folder(Path(brief.runtime_folder))
+    with open_client(brief.network, brief.schedule.start_deadline_s) as link:
+        if brief.detached:
+            gone = partial(stop.end, LAUNCHER_GONE)
+            link.on_gone(keys.live(brief.network.run, LAUNCHER), gone)
+        queue = brief.wire.txqueuelen if brief.wire else 0
+        hub = Hub(listeners, stop.wake_fd, queue=queue, controllers=_controllers(brief))
+        end: DriveEnd = hub
+        try:
+            end = join(hub, brief.attached)
+            counters = _run(brief, stop, link, hub, end)
+        finally:
+            end.close(stop.reason or "the plant has ended")
     return f"ended after {counters.ticks} ticks"
 
 

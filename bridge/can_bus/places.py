@@ -1,21 +1,27 @@
 """Where a run's buses live: Unix sockets in a private folder.
 
-    <base>/<run>/<bus>.can        base: $FLEETLOOP_RUNTIME, else $XDG_RUNTIME_DIR/fleetloop,
-                                  else /tmp/fleetloop-<uid>
+    <base>/<run>/<bus>.can              base: $FLEETLOOP_RUNTIME, else $XDG_RUNTIME_DIR/fleetloop,
+    <base>/<run>/.fleetloop-lock              else /tmp/fleetloop-<uid>
 
 A channel is named by its bus ("r1"), by run and bus ("20261123-101500-paper/r1") or by the path of
 its socket. Sockets that nobody listens on any more are no buses.
+
+The base must be this user's: whoever could write there could pretend to be a bus. Who started a run
+holds its lock, so what a killed one left is known and goes when the next one starts.
 """
 
 import contextlib
+import fcntl
 import os
 import socket
-from collections.abc import Iterable
+import stat
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from configs.errors import InfrastructureError
 
 SUFFIX = ".can"
+LOCK = ".fleetloop-lock"
 _MAX_PATH_BYTES = 107
 _BACKLOG = 64
 
@@ -25,33 +31,92 @@ class NoSuchBusError(InfrastructureError):
 
 
 def base_folder() -> Path:
-    """The folder that holds one folder per live run."""
+    """The folder that holds one folder per live run; absolute."""
     if named := os.environ.get("FLEETLOOP_RUNTIME"):
-        return Path(named)
-    if runtime := os.environ.get("XDG_RUNTIME_DIR"):
+        return Path(named).absolute()
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    if runtime.startswith("/"):  # others are to be ignored, says the standard
         return Path(runtime) / "fleetloop"
     return Path(f"/tmp/fleetloop-{os.getuid()}")
+
+
+def folder_of(run: str) -> Path:
+    """The folder of a run, whether it exists or not."""
+    return base_folder() / run
+
+
+@contextlib.contextmanager
+def run_folder(run: str) -> Iterator[Path]:
+    """The private folder of a run while it lives; first removes what killed runs left.
+
+    Raises:
+        InfrastructureError: as `create_run_folder`.
+    """
+    _sweep(base_folder())
+    folder = folder_of(run)
+    lock = _locked(folder) or _locked(folder) or _locked(folder)
+    if lock is None:
+        raise InfrastructureError(f"{folder} is taken away again and again")
+    try:
+        yield folder
+    finally:
+        remove_run_folder(folder)
+        os.close(lock)
+
+
+def _locked(folder: Path) -> int | None:
+    """Make a run's folder and hold its lock; None if another start took it for left over."""
+    create_run_folder(folder.name)
+    with contextlib.suppress(FileNotFoundError):
+        lock = os.open(folder / LOCK, os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if (folder / LOCK).exists():
+            return lock
+        os.close(lock)
+    return None
 
 
 def create_run_folder(run: str) -> Path:
     """Make the private folder of a run.
 
     Raises:
-        InfrastructureError: it can't be made, exists already, or the base is somebody else's.
+        InfrastructureError: it can't be made, exists already, or the base isn't safe.
     """
-    base = base_folder()
-    folder = base / run
+    folder = folder_of(run)
+    base = folder.parent
     try:
         base.mkdir(mode=0o700, parents=True, exist_ok=True)
-        owner = base.stat().st_uid
-        if owner != os.getuid():
-            raise InfrastructureError(
-                f"{base} belongs to user {owner}; set FLEETLOOP_RUNTIME to a folder of your own"
-            )
+        if danger := _danger(base):
+            raise InfrastructureError(f"{base} {danger}")
         folder.mkdir(mode=0o700)
     except OSError as error:
-        raise InfrastructureError(f"can't make the run's folder for sockets: {error}") from error
+        raise InfrastructureError(
+            f"can't make the run's folder for sockets: {error}; FLEETLOOP_RUNTIME names another"
+            " place for it"
+        ) from error
     return folder
+
+
+def _danger(base: Path) -> str:
+    """Why others could pretend to be our buses, "" if they can't."""
+    status = base.lstat()
+    if stat.S_ISLNK(status.st_mode):
+        return "is a symbolic link; set FLEETLOOP_RUNTIME to a folder itself"
+    if status.st_uid != os.getuid():
+        return f"belongs to user {status.st_uid}; set FLEETLOOP_RUNTIME to a folder of your own"
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        mode = stat.S_IMODE(status.st_mode)
+        return f"can be written by others (mode {mode:04o}); chmod 700 {base}"
+    return ""
+
+
+def _sweep(base: Path) -> None:
+    """Remove the folders of runs whose lock nobody holds and whose buses nobody serves."""
+    for path in base.glob(f"*/{LOCK}"):
+        with contextlib.suppress(OSError), path.open() as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if not any(_answers(bus) for bus in path.parent.glob(f"*{SUFFIX}")):
+                remove_run_folder(path.parent)
 
 
 def socket_path(folder: Path, bus: str) -> Path:
@@ -87,20 +152,22 @@ def listen(folder: Path, buses: Iterable[str]) -> dict[str, socket.socket]:
 
 def remove_run_folder(folder: Path) -> None:
     """Remove a run's folder and its sockets, and the base when it is empty. Idempotent."""
-    if not folder.is_dir():
-        return
-    for leftover in folder.iterdir():
-        leftover.unlink(missing_ok=True)
     with contextlib.suppress(OSError):
-        folder.rmdir()
-    with contextlib.suppress(OSError):
-        folder.parent.rmdir()
+        # The lock last: what is interrupted here is still known as left over.
+        for leftover in sorted(folder.iterdir(), key=lambda path: path.name == LOCK):
+            leftover.unlink(missing_ok=True)
+    for empty in (folder, folder.parent):
+        with contextlib.suppress(OSError):
+            empty.rmdir()
 
 
 def live_buses() -> list[Path]:
     """The sockets of all buses that somebody listens on, in order of their names."""
     base = base_folder()
-    return [path for path in sorted(base.glob(f"*/*{SUFFIX}")) if _answers(path)]
+    with contextlib.suppress(OSError):
+        if not _danger(base):
+            return [path for path in sorted(base.glob(f"*/*{SUFFIX}")) if _answers(path)]
+    return []
 
 
 def find(channel: str) -> Path:
@@ -111,6 +178,9 @@ def find(channel: str) -> Path:
     """
     if channel.startswith("/"):
         return Path(channel)
+    base = base_folder()
+    if base.exists() and (danger := _danger(base)):
+        raise NoSuchBusError(f"no bus {channel!r} to be trusted: {base} {danger}")
     buses = live_buses()
     run, _, bus = channel.rpartition("/")
     matches = [
