@@ -73,7 +73,7 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> str:
     if brief.hears_leader:
         link.subscribe(keys.leader_speed(name), "leader")
 
-    hellos = Hellos()
+    hellos = Hellos(brief.schedule.hello_every_s)
     hellos.add(path, agent.share(-1).encode())
     hellos.add(telemetry, Rows(0, 0, b"", False).encode())
     run_loop = _realtime if brief.schedule.realtime else _lockstep

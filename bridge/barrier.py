@@ -13,23 +13,33 @@ from bridge.link import Arrival, Link, Publisher
 from bridge.process import Stop
 from configs.errors import InfrastructureError
 
-HELLO_EVERY_S = 0.02
-
 
 class Hellos:
-    """What a process says on its publishers before the run: the same as in it, marked as early."""
+    """What a process says on its publishers before the run: the same as in it, marked as early.
 
-    def __init__(self) -> None:
+    Args:
+        every_s: from one round to the next, however often one is asked for.
+    """
+
+    def __init__(self, every_s: float) -> None:
         self._hellos: list[tuple[Publisher, bytes]] = []
+        self._every_s = every_s
+        self._next_s = 0.0
 
     def add(self, publisher: Publisher, payload: bytes) -> None:
-        """Say `payload` on `publisher` at every round."""
+        """Say `payload` on `publisher` at every round, the first of which is at once."""
         self._hellos.append((publisher, payload))
+        self._next_s = 0.0
 
-    def say(self) -> None:
-        """Say all of them once."""
-        for publisher, payload in self._hellos:
-            publisher.put(payload)
+    def say(self) -> float:
+        """Say all of them once, if it is time; return how long it is until the next round."""
+        now = time.monotonic()
+        if now >= self._next_s:
+            # Never sooner: a hello that answers a hello would be a storm on a ring.
+            self._next_s = now + self._every_s
+            for publisher, payload in self._hellos:
+                publisher.put(payload)
+        return max(self._next_s - time.monotonic(), 0.0)
 
 
 def await_hellos(
@@ -48,20 +58,14 @@ def await_hellos(
         InfrastructureError: something was still missing after `within_s`; the text names it.
     """
     deadline = time.monotonic() + within_s
-    next_hello = time.monotonic()
     while absent := tuple(missing()):
         if stop.requested:
             return
-        now = time.monotonic()
-        if now > deadline:
+        if time.monotonic() > deadline:
             raise InfrastructureError(
                 f"{who}: not ready after {within_s:g} s: heard nothing of {', '.join(absent)}"
             )
-        if now >= next_hello:
-            # Never sooner: a hello that answers a hello would be a storm on a ring.
-            next_hello = now + HELLO_EVERY_S
-            hellos.say()
-        arrival = link.receive(max(next_hello - time.monotonic(), 0.0))
+        arrival = link.receive(hellos.say())
         while arrival is not None:
             take(arrival)
             arrival = link.receive(0.0)

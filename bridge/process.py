@@ -41,6 +41,7 @@ _SAME_CAUSE_S = 0.1
 """A peer that left may have left for a reason that is on its way here too."""
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 _LENGTH_BYTES = 8
+_PR_SET_DUMPABLE = 4
 _Brief = TypeVar("_Brief")
 
 
@@ -127,6 +128,7 @@ def serve(
     if sys.stdin.isatty():
         print(f"{name}: started by `fleetloop run`, not by hand", file=sys.stderr)  # noqa: T201
         return 2
+    keep_to_itself()
     brief = _read_brief(sys.stdin.buffer)
     if not isinstance(brief, kind):
         print(f"{name}: no {kind.__name__} on standard input", file=sys.stderr)  # noqa: T201
@@ -157,6 +159,14 @@ def serve(
 def name_process(name: str) -> None:
     """What `ps` and `pgrep -f` call this process."""
     setproctitle.setproctitle(f"fleetloop {name}")
+
+
+def keep_to_itself() -> None:
+    """No core dump, and no look into its memory from this user's other processes: it has passwords.
+
+    Debuggers and profilers from outside need root then.
+    """
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
 
 
 def go_realtime(priority: int) -> list[str]:

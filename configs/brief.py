@@ -187,6 +187,7 @@ class Schedule:
     pose_delay_ticks: int  # and reach the robots this many ticks later
     tick_deadline_s: float  # how long anybody waits for anybody within one tick [wall s]
     start_deadline_s: float  # how long everybody has to become ready [wall s]
+    hello_every_s: float = 0.02  # how often everybody says hello until then [wall s]
     realtime: bool = False  # everybody keeps the wall clock; else the plant owns time
     profile: bool = False  # every process samples where its processor time goes
 
@@ -516,5 +517,6 @@ class RecorderBrief:
     scenario_toml: str
     period_ns: int
     start_deadline_s: float
+    hello_every_s: float
     network: NetworkLink
     runtime_folder: str  # holds the buses' sockets; goes when the launcher was killed

@@ -45,6 +45,9 @@ ENCODER_AGE_LIMIT_S = 0.05
 """Machines that are no real-time machines stand still for 10 ms now and then; drives' watchdogs
 allow 100 ms."""
 POSE_AGE_LIMIT_S = 0.5
+START_DEADLINE_S, START_DEADLINE_PER_ROBOT_S = 20.0, 0.5
+HELLO_EVERY_S, HELLO_EVERY_PER_ROBOT_S = 0.02, 0.001
+"""All say hello at once: a large fleet says it less often."""
 UNLIMITED = 1e6
 """A limit that nothing reaches: [A], [rev/s]."""
 SERIAL_NUMBER = 0x3858_0000_0000
@@ -63,7 +66,9 @@ def schedule(scenario: Scenario, speed: float = 0.0, *, profile: bool = False) -
         localise_every=round(clock.localisation_period_s / h),
         pose_delay_ticks=1 if delay_s is None else round(delay_s / h),
         tick_deadline_s=clock.tick_deadline_s + (h / speed if speed > 0 else 0.0),
-        start_deadline_s=clock.start_deadline_s,
+        start_deadline_s=clock.start_deadline_s
+        or max(START_DEADLINE_S, START_DEADLINE_PER_ROBOT_S * len(scenario.robot)),
+        hello_every_s=max(HELLO_EVERY_S, HELLO_EVERY_PER_ROBOT_S * len(scenario.robot)),
         realtime=clock.mode == "realtime",
         profile=profile,
     )

@@ -39,7 +39,11 @@ class Clock(Section):
     plant_step_s: Positive = Field(0.001, description="longest integration step of the plant")
     countdown_s: NotNegative = Field(0.25, description="for arming the drives, before t = 0")
     tick_deadline_s: Positive = Field(2.0, description="longest wait within a tick, wall clock")
-    start_deadline_s: Positive = Field(20.0, description="longest wait for everybody to be ready")
+    start_deadline_s: Positive | None = Field(
+        None,
+        description="longest wait for everybody to be ready; if not given 20 s, or 0.5 s for each"
+        " robot if that is more",
+    )
     on_late: Literal["abort"] = Field("abort", description="what happens when somebody is late")
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from agents.__main__ import run
-from bridge.process import LAUNCHER_GONE
+from bridge.process import LAUNCHER_GONE, keep_to_itself
 from configs.briefing import agent_brief
 from configs.deployment import agent_role, load_deployment
 from configs.errors import InfrastructureError, ScenarioError
@@ -40,6 +40,7 @@ def run_agent(source: str, robot: str, deployment_file: Path, overrides: Overrid
         )
     deployment = load_deployment(deployment_file, scenario)
     role = agent_role(robot)
+    keep_to_itself()
     network = placing.network_link(scenario, deployment, role)
     bus = placing.agent_bus(deployment, robot)
     brief = replace(agent_brief(scenario, robot, network=network, bus=bus), detached=True)

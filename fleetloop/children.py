@@ -33,8 +33,11 @@ class Child:
         self.name = name
         self.status: Status | None = None
         self._code: int | None = None
-        stdin, self._stdin = os.pipe()
-        self._stdout, stdout = os.pipe()
+        try:
+            stdin, self._stdin = os.pipe()
+            self._stdout, stdout = os.pipe()
+        except OSError as error:
+            raise InfrastructureError(f"can't start {name}: {error.strerror}") from error
         try:
             self._pid, self.fds = nursery.bear(module, stdin, stdout, fds)
         except InfrastructureError:
@@ -73,6 +76,16 @@ class Child:
             if pid:
                 self._code = os.waitstatus_to_exitcode(status)
         return self._code
+
+    def await_end(self, within_s: float) -> None:
+        """Wait until it has ended, at most so long."""
+        fd = os.pidfd_open(self._pid)
+        try:
+            poller = select.poll()
+            poller.register(fd, select.POLLIN)
+            poller.poll(within_s * 1e3)
+        finally:
+            os.close(fd)
 
     def failure(self) -> "Failure | None":
         """Why it ended, None if it has not or if it ended well."""
@@ -144,21 +157,12 @@ def cause(children: Iterable[Child]) -> Failure | None:
 
 def await_end(children: Iterable[Child], within_s: float) -> list[Child]:
     """Wait until all have ended, at most `within_s`; return those that have not."""
+    children = list(children)
     deadline = time.monotonic() + within_s
-    fds = {os.pidfd_open(child.pid): child for child in children if not child.ended()}
-    try:
-        poller = select.poll()
-        for fd in fds:
-            poller.register(fd, select.POLLIN)
-        waiting = dict(fds)
-        while waiting and (left_s := deadline - time.monotonic()) > 0:
-            for fd, _ in poller.poll(left_s * 1e3):
-                poller.unregister(fd)
-                del waiting[fd]
-    finally:
-        for fd in fds:
-            os.close(fd)
-    return [child for child in waiting.values() if not child.ended()]
+    for child in children:
+        if not child.ended():
+            child.await_end(max(deadline - time.monotonic(), 0.0))
+    return [child for child in children if not child.ended()]
 
 
 def end(children: Sequence[Child], *, grace_s: float = TERM_GRACE_S) -> None:

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridge import access, keys
+from bridge.barrier import Hellos
 from bridge.can_bus import places
 from bridge.can_bus.relay import Relay
 from bridge.clock import wall_of
@@ -31,7 +32,7 @@ from configs.briefing import leader_brief, schedule
 from configs.deployment import Deployment, roles_of
 from configs.errors import FleetloopError, InfrastructureError
 from configs.scenario import Scenario
-from fleetloop import placing
+from fleetloop import open_files, placing
 from fleetloop.children import (
     GAVE_UP,
     PEER_SILENT,
@@ -104,6 +105,7 @@ class ProcessRun:
             InfrastructureError: the run could not start.
         """
         refuse_shadowed_roles(("agents", "plant", "fleetloop"))
+        open_files.ensure(len(self._processes))
         began = time.monotonic()
         try:
             with self._started() as link:
@@ -152,13 +154,14 @@ class ProcessRun:
     def _await_ready(self, link: Link, stop: Stop) -> Failure | None:
         """Say the leader's speed until all tokens are there, then go until the plant ticks."""
         run = self._run
-        leader = link.publisher(keys.leader_speed(run))
         go = link.publisher(keys.go(run))
-        speed = LeaderSpeed(leader_brief(self._scenario).speed_steps).encode()
-        deadline = time.monotonic() + self._scenario.clock.start_deadline_s
         ticks = schedule(self._scenario)
+        hellos = Hellos(ticks.hello_every_s)
+        speed = LeaderSpeed(leader_brief(self._scenario).speed_steps)
+        hellos.add(link.publisher(keys.leader_speed(run)), speed.encode())
+        deadline = time.monotonic() + ticks.start_deadline_s
         countdown_ns = ticks.countdown_ticks * ticks.period_ns + GO_AHEAD_NS
-        epoch_ns = 0
+        gone = False
         while not stop.requested:
             ready = self._alive.issuperset(self._processes)
             if ready and "plant" in self._seen:
@@ -171,14 +174,12 @@ class ProcessRun:
                 absent = self._elsewhere.absent() or sorted(set(self._processes) - self._alive)
                 absent = absent or ["the plant's first tick"]
                 raise InfrastructureError(
-                    f"not ready within {self._scenario.clock.start_deadline_s:g} s:"
-                    f" {', '.join(absent)}"
+                    f"not ready within {ticks.start_deadline_s:g} s: {', '.join(absent)}"
                 )
-            leader.put(speed)
-            if ready:
-                epoch_ns = epoch_ns or wall_of(time.monotonic_ns() + countdown_ns)
-                go.put(Go(epoch_ns).encode())
-            self._take(link.receive(0.02))
+            if ready and not gone:
+                gone = True
+                hellos.add(go, Go(wall_of(time.monotonic_ns() + countdown_ns)).encode())
+            self._take(link.receive(hellos.say()))
         return None
 
     # --- run ---------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from bridge.can_bus import places
 from bridge.can_bus.ends import DriveEnd
 from bridge.can_bus.hub import Hub
 from bridge.messages import Progress
-from bridge.process import Stop, go_realtime, name_process, settled_memory
+from bridge.process import Stop, go_realtime, keep_to_itself, name_process, settled_memory
 from bridge.telemetry import PLANT_ROW, RowBuffer
 from configs.brief import NetworkLink, PlantBrief, Settings
 from configs.briefing import plant_brief
@@ -34,7 +34,7 @@ from configs.loading import load
 from configs.overrides import Override, Overrides
 from configs.scenario import Scenario
 from configs.signals import PLANT_SIGNALS
-from fleetloop import placing
+from fleetloop import open_files, placing
 from fleetloop.signals import stop_on_signals
 from fleetloop.terminal import note, say
 from plant.__main__ import PLANT_PRIORITY, join
@@ -101,6 +101,7 @@ def run_plant(source: str, options: Options) -> int:
     brief = plant_brief(scenario, network=NetworkLink("alone", "", "", ""))
     brief = _alone(placing.robots_of_plant(brief, deployment), options)
     name_process(f"plant {scenario.name}")
+    open_files.ensure(1)
     attached = {bus for bus, _ in brief.attached}
     ours = [bus for bus in dict.fromkeys(r.bus for r in brief.robots) if bus not in attached]
     queue = brief.wire.txqueuelen if brief.wire else 0
@@ -120,6 +121,7 @@ def run_plant(source: str, options: Options) -> int:
 
 def _join(scenario: Scenario, deployment: Deployment) -> int:
     """Be the plant of a run whose launcher is elsewhere."""
+    keep_to_itself()
     network = placing.network_link(scenario, deployment, PLANT)
     brief = placing.robots_of_plant(plant_brief(scenario, network=network), deployment)
     attached = {bus for bus, _ in brief.attached}

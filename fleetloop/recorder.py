@@ -81,7 +81,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         report = link.publisher(keys.report(name, "recorder"))
         await_hellos(
             link,
-            Hellos(),
+            Hellos(brief.hello_every_s),
             recorder.take,
             lambda: sorted(recorder.unheard),
             who="recorder",

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from bridge.messages import Progress, Report
-from bridge.process import Stop
+from bridge.process import Stop, keep_to_itself
 from configs.brief import NetworkLink
 from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
 from configs.deployment import Deployment, load_deployment
@@ -68,6 +68,8 @@ def run_scenario(source: str, options: Options) -> int:
             f"--deployment {options.deployment}: --in-process has no buses and no network to place"
         )
     deployment = _deployment(scenario, options)
+    if not options.in_process:
+        keep_to_itself()
     placing.guests(scenario, deployment)  # what is wrong with credentials comes before the run
     if long := wall_time.warning(scenario, speed=options.speed, in_process=options.in_process):
         note(long)

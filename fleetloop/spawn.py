@@ -107,6 +107,7 @@ def _recorder(orders: Orders, links: Links, folder: Path) -> RecorderBrief:
         to_toml(orders.scenario),
         ticks.period_ns,
         ticks.start_deadline_s,
+        ticks.hello_every_s,
         links[access.RECORDER],
         str(folder),
     )

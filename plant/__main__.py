@@ -103,7 +103,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
     for other in others:
         link.subscribe(keys.pose(name, other.robot), other.robot)
 
-    hellos = Hellos()
+    hellos = Hellos(brief.schedule.hello_every_s)
     for unit, pose in zip(units, poses, strict=True):
         start = unit.brief.pose
         hellos.add(pose, PoseFix(EARLY, 0, start.x_m, start.y_m, start.theta_rad).encode())

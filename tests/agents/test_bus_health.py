@@ -158,7 +158,7 @@ class Rig:
         self.wire = Wire(self.bench, self.clock, epoch_ns - schedule.bus_time_ns(0))
         self.link = PoseLink(self.bench, self.clock, epoch_ns)
         path = SimpleNamespace(put=lambda _: None)
-        self.loop = RealtimeLoop(self.bench.agent, self.wire, self.link, path, Hellos())
+        self.loop = RealtimeLoop(self.bench.agent, self.wire, self.link, path, Hellos(0.02))
         self.epoch_ns = epoch_ns
 
     def run(self) -> None:

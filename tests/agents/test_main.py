@@ -28,7 +28,7 @@ class Ending:
         bus = SimpleNamespace(send=self._send, recv=lambda _: None)
         publisher = SimpleNamespace(put=lambda _: self.said.append("report"))
         self.wired = _Wired(
-            self.bench.agent, bus, None, publisher, Hellos(), self.bench.agent._rows, publisher
+            self.bench.agent, bus, None, publisher, Hellos(0.02), self.bench.agent._rows, publisher
         )
         self.stop = Stop()
         self.stop.release()
