@@ -1,4 +1,7 @@
-"""A file that only grows by whole pieces: what was appended is all there, or nothing of it is.
+"""A file that only grows by whole pieces: what was put is all there, or nothing of it is.
+
+A piece is appended for good, or put at the end as the tail: readable at once, and replaced by what
+is appended or put next. So what is written doesn't depend on when it was flushed.
 
 Space for what has to be written at the end of all can be reserved beforehand, so that a file can be
 completed on a disk that has become full.
@@ -20,28 +23,29 @@ _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 class AppendedFile:
     """A new file of a recording, or one that goes on; an OSError leaves the pieces before it."""
 
-    __slots__ = ("_fd", "_path", "_reserved", "size")
+    __slots__ = ("_fd", "_path", "_reserved", "_tail", "size")
 
     def __init__(self, path: Path, *, goes_on: bool = False) -> None:
         how = os.O_WRONLY if goes_on else os.O_WRONLY | os.O_CREAT | os.O_TRUNC
         self._path = path
         self._fd = os.open(path, how | os.O_CLOEXEC, 0o666)
         self.size = 0
+        """Without the tail."""
+        self._tail = b""
         self._reserved = 0
         if goes_on:
             self.size = os.lseek(self._fd, 0, os.SEEK_END)
 
     def append(self, piece: bytes | bytearray) -> None:
-        """Append a piece."""
-        view = memoryview(piece)
-        try:
-            while view:
-                view = view[os.write(self._fd, view) :]
-        except OSError:
-            with contextlib.suppress(OSError):  # the first one says more
-                self.cut(self.size)
-            raise
+        """Append a piece, in place of the tail."""
+        self._put(piece)
+        self._tail = b""
         self.size += len(piece)
+
+    def put_tail(self, piece: bytes) -> None:
+        """Put a piece at the end, in place of the tail."""
+        self._put(piece)
+        self._tail = piece
 
     def reserve(self, length: int) -> None:
         """Make sure that so many bytes more can be written, whatever becomes of the disk.
@@ -63,10 +67,11 @@ class AppendedFile:
                 raise
 
     def cut(self, size: int) -> None:
-        """Drop everything beyond a size, and what was reserved."""
+        """Drop everything beyond a size, the tail, and what was reserved."""
         os.ftruncate(self._fd, size)
         os.lseek(self._fd, size, os.SEEK_SET)
         self.size = size
+        self._tail = b""
         self._reserved = 0
 
     def rewrite_head(self, head: bytes) -> None:
@@ -77,7 +82,7 @@ class AppendedFile:
         """Give back what was reserved, and close. Idempotent."""
         if self._fd >= 0:
             if self._reserved > self.size:
-                os.ftruncate(self._fd, self.size)
+                os.ftruncate(self._fd, self.size + len(self._tail))
             os.close(self._fd)
             self._fd = -1
 
@@ -87,6 +92,23 @@ class AppendedFile:
         self.close()
         if is_file:
             self._path.unlink(missing_ok=True)
+
+    def _put(self, piece: bytes | bytearray) -> None:
+        tail, view = self._tail, memoryview(piece)
+        if tail:
+            os.lseek(self._fd, self.size, os.SEEK_SET)
+        try:
+            while view:
+                view = view[os.write(self._fd, view) :]
+            if len(tail) > len(piece):
+                os.ftruncate(self._fd, self.size + len(piece))
+        except OSError:
+            with contextlib.suppress(OSError):  # the first one says more
+                self.cut(self.size + len(tail))
+                self.size -= len(tail)
+                os.pwrite(self._fd, tail, self.size)  # its room is there
+            self._tail = tail
+            raise
 
     def _allocate(self, end: int) -> None:
         """Take space up to a size without changing the file's own."""

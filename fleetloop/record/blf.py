@@ -13,7 +13,8 @@ Lorenz), little endian:
     id           bit 31: 29-bit identifier; of an error frame: its error classes
 
 Every container holds whole objects and is written by one call, and the file's header is brought up
-to date after it: a killed writer leaves a file that ends at its last flush.
+to date after it: a killed writer leaves a file that ends at its last flush. A container that was
+flushed before it was full is written again once it is.
 """
 
 import struct
@@ -77,27 +78,54 @@ _ERROR_OBJECT = np.dtype(
 
 
 class BlfFile:
-    """One BLF file that is being written; calls raise OSError."""
+    """One BLF file that is being written; calls raise OSError.
+
+    All containers but the last have `CONTAINER_FRAMES` frames, however often it was flushed: the
+    same frames leave the same bytes.
+    """
 
     def __init__(self, path: Path, channel: int) -> None:
         self._file = AppendedFile(path)
         self._channel = channel
         self._pending: list[Array] = []
         self._pending_frames = 0
+        self._flushed_frames = 0  # those of the pending ones that are in the file
         self._objects = 0
         self._uncompressed = _HEADER_SIZE
-        self._file.append(self._header())
+        self._file.append(self._header(0, 0, 0))
 
     def write(self, frames: Array) -> None:
         """Append frames; complete containers go into the file."""
         self._pending.append(frames.copy())
         self._pending_frames += len(frames)
-        if self._pending_frames >= CONTAINER_FRAMES:
-            self._put(CONTAINER_FRAMES)
+        if self._pending_frames < CONTAINER_FRAMES:
+            return
+        frames = np.concatenate(self._pending)
+        start = 0
+        try:
+            while len(frames) - start >= CONTAINER_FRAMES:
+                container, uncompressed = self._container(frames[start : start + CONTAINER_FRAMES])
+                self._file.append(container)
+                self._flushed_frames = 0
+                self._objects += CONTAINER_FRAMES
+                self._uncompressed += uncompressed
+                start += CONTAINER_FRAMES
+        finally:
+            self._pending = [frames[start:]]
+            self._pending_frames = len(frames) - start
+            if start:
+                self._file.rewrite_head(self._header(0, 0, 0))
 
     def flush(self) -> None:
         """Put everything so far into the file."""
-        self._put(1)
+        if self._pending_frames == self._flushed_frames:
+            return
+        frames = np.concatenate(self._pending)
+        self._pending = [frames]
+        container, uncompressed = self._container(frames)
+        self._file.put_tail(container)
+        self._flushed_frames = len(frames)
+        self._file.rewrite_head(self._header(len(container), uncompressed, len(frames)))
 
     def close(self) -> None:
         """Flush and close. Idempotent."""
@@ -110,44 +138,29 @@ class BlfFile:
         """Close and remove it."""
         self._file.discard()
 
-    def _put(self, least: int) -> None:
-        """Write containers while there are at least so many frames to fill one."""
-        if self._pending_frames < least:
-            return
-        frames = np.concatenate(self._pending)
-        start = 0
-        try:
-            while len(frames) - start >= least:
-                part = frames[start : start + CONTAINER_FRAMES]
-                self._append(part)
-                start += len(part)
-        finally:
-            self._pending = [frames[start:]] if start < len(frames) else []
-            self._pending_frames = len(frames) - start
-            self._file.rewrite_head(self._header())
-
-    def _append(self, frames: Array) -> None:
+    def _container(self, frames: Array) -> tuple[bytes, int]:
+        """A container of frames, and its size uncompressed."""
         content = objects(frames, self._channel)
         packed = zlib.compress(content, _FAST)
         size = _OBJECT_HEADER.size + _CONTAINER.size + len(packed)
-        self._file.append(
+        container = (
             _OBJECT_HEADER.pack(b"LOBJ", _OBJECT_HEADER.size, 1, size, _CONTAINER_TYPE)
             + _CONTAINER.pack(_ZLIB, len(content))
             + packed
             + bytes(size % 4)
         )
-        self._objects += len(frames)
-        self._uncompressed += _OBJECT_HEADER.size + _CONTAINER.size + len(content)
+        return container, _OBJECT_HEADER.size + _CONTAINER.size + len(content)
 
-    def _header(self) -> bytes:
+    def _header(self, tail: int, tail_uncompressed: int, tail_objects: int) -> bytes:
+        """The file's header, with a tail of so many bytes and objects."""
         packed = _FILE_HEADER.pack(
             b"LOGG",
             _HEADER_SIZE,
             *_APPLICATION,
             *_FORMAT_VERSION,
-            max(self._file.size, _HEADER_SIZE),
-            self._uncompressed,
-            self._objects,
+            max(self._file.size + tail, _HEADER_SIZE),
+            self._uncompressed + tail_uncompressed,
+            self._objects + tail_objects,
             0,
             *_NO_DATE,
             *_NO_DATE,

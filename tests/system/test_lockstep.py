@@ -13,6 +13,7 @@ CYCLE = 'graph={edges=["r1 -> r2", "r2 -> r1"], leader=["r2"]}'
 
 
 WIRE = 'bus.timing="wire"'
+KINDS = ["blf", "log"]
 
 
 @pytest.mark.parametrize(
@@ -24,6 +25,7 @@ def test_processes_and_one_process_leave_the_same_record_bit_for_bit(
     overrides: tuple[str, ...], tmp_path: Path, capsys
 ) -> None:
     a, b, c = (tmp_path / name for name in "abc")
+    overrides = (*overrides, "--set", f"bus.record={KINDS}")
     assert completed(a, "two_robots", *overrides)[0] == 0
     assert completed(b, "two_robots", "--in-process", *overrides)[0] == 0
     assert completed(c, "two_robots", *overrides)[0] == 0
@@ -31,7 +33,9 @@ def test_processes_and_one_process_leave_the_same_record_bit_for_bit(
     assert print_comparison(a, c, as_json=False) == 0
     ticks = 4000 if WIRE in overrides else 2000
     assert f"identical: {ticks} ticks of 2 robots" in capsys.readouterr().out
-    assert (a / "record.mcap").read_bytes() == (b / "record.mcap").read_bytes()
+    recorded = ["record.mcap", *(f"can/{bus}.{kind}" for bus in ("r1", "r2") for kind in KINDS)]
+    for name in recorded:
+        assert (a / name).read_bytes() == (b / name).read_bytes() == (c / name).read_bytes(), name
 
 
 def test_a_robot_that_diverges_is_named_and_the_other_goes_on_in_either_mode(

@@ -121,13 +121,33 @@ def test_a_block_may_be_reused_after_the_call(tmp_path: Path) -> None:
         assert [is_read_as(*both) for both in zip(reader, regular(10), strict=True)] == [True] * 10
 
 
-def test_the_same_frames_leave_the_same_bytes(tmp_path: Path) -> None:
-    for name in ("a", "b"):
+def test_the_same_frames_leave_the_same_bytes_however_they_come_and_are_flushed(
+    tmp_path: Path,
+) -> None:
+    block = block_of(regular(5000))
+    for name, step in (("a", 5000), ("b", 700), ("c", CONTAINER_FRAMES)):
         paths = tmp_path / f"{name}.blf", tmp_path / f"{name}.log"
         with CanLogWriter(*paths, channel=1, name="r1") as writer:
-            writer.write(block_of(regular(5000)))
+            for start in range(0, len(block), step):
+                writer.write(block[start : start + step])
+                if name != "a":
+                    writer.flush()
+                    writer.flush()
     for suffix in (".blf", ".log"):
-        assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+        a, b, c = ((tmp_path / f"{name}{suffix}").read_bytes() for name in "abc")
+        assert a == b == c
+
+
+def test_every_flush_leaves_a_file_that_reads_to_its_end(tmp_path: Path) -> None:
+    path, block = tmp_path / "r1.blf", block_of(regular(3 * CONTAINER_FRAMES))
+    with CanLogWriter(path, None, channel=1, name="r1") as writer:
+        for start in range(0, len(block), 500):
+            writer.write(block[start : start + 500])
+            writer.flush()
+            with can.LogReader(path) as reader:
+                assert sum(1 for _ in reader) == min(start + 500, len(block))
+                assert reader.object_count == min(start + 500, len(block))
+                assert reader.file_size == path.stat().st_size
 
 
 def test_what_was_flushed_is_readable_while_the_writer_lives_or_dies(tmp_path: Path) -> None:
@@ -191,6 +211,24 @@ def small_files():
     yield
     resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     signal.signal(signal.SIGXFSZ, handler)
+
+
+def test_a_full_disk_leaves_what_was_flushed_of_a_blf_file(tmp_path: Path, small_files) -> None:
+    rng = np.random.default_rng(1)  # noise doesn't compress
+    path, block = tmp_path / "r1.blf", block_of(regular(20_000))
+    block["data"] = rng.integers(0, 256, block["data"].shape)
+    writer = CanLogWriter(path, None, channel=1, name="r1")
+    flushed = 0
+    with pytest.raises(InfrastructureError, match=r"can't write .*r1.blf: File too large"):
+        for start in range(0, len(block), 1500):
+            writer.write(block[start : start + 1500])
+            writer.flush()
+            flushed = start + 1500
+    assert flushed > 0
+    with can.LogReader(path) as reader:
+        assert flushed <= sum(1 for _ in reader) < flushed + CONTAINER_FRAMES
+    with pytest.raises(InfrastructureError):
+        writer.close()
 
 
 def test_a_full_disk_is_named_and_leaves_what_fitted(tmp_path: Path, small_files) -> None:
