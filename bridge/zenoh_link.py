@@ -13,7 +13,6 @@ import contextlib
 import ctypes
 import json
 import os
-import re
 import socket
 import threading
 import time
@@ -27,6 +26,7 @@ from zenoh.handlers import Callback, FifoChannel
 
 from bridge.access import AccessPlan
 from bridge.link import Arrival, Inbox, Publisher
+from bridge.login import Obstacle, obstacle
 from configs.brief import NetworkLink, Outside, TlsFiles
 from configs.errors import InfrastructureError
 
@@ -34,6 +34,8 @@ LEASE_MS = 1000
 """A peer that is silent for this long is gone."""
 CLOSE_S = 1.0
 _PROBE_S = 1.0
+_FIRST_RETRY_S, _LAST_RETRY_S = 0.02, 0.3
+_ATTEMPT_S, _LISTEN_S = 5.0, 10.0
 _PORT_TRIES = 5
 _POLLED_DEPTH = 4096
 """Messages that wait for who polls; many times more than any schedule lets be on their way."""
@@ -231,39 +233,49 @@ def open_polled(network: NetworkLink, timeout_s: float) -> PolledLink:
 
 
 def _client(network: NetworkLink, timeout_s: float) -> zenoh.Session:
-    config = _config("client")
+    """Try until it opens; a refused login is told at once, who isn't there yet is waited for."""
+    deadline = time.monotonic() + timeout_s
+    pause_s = _FIRST_RETRY_S
+    while True:
+        left_s = min(max(deadline - time.monotonic(), _FIRST_RETRY_S), _ATTEMPT_S)
+        with _few_threads(_APP):
+            session = _open_bounded(_login_config("client", network, left_s), left_s + 1.0)
+        if not isinstance(session, str):
+            return session
+        reason = _reason(network)
+        if reason.final or time.monotonic() + pause_s > deadline:
+            within = "" if reason.final else f" within {timeout_s:g} s"
+            raise InfrastructureError(
+                f"{network.user}: no session with the router at {network.endpoint}{within}:"
+                f" {reason.text}"
+            )
+        time.sleep(pause_s)
+        pause_s = min(1.5 * pause_s, _LAST_RETRY_S)
+
+
+def _reason(network: NetworkLink) -> Obstacle:
+    """Why there is no session: Zenoh tells it peers only."""
+    config = _login_config("peer", network, _PROBE_S)
+    _set(config, "listen/endpoints", [])
+    _set(config, "connect/exit_on_failure", True)
+    said = _open_bounded(config, _PROBE_S + 1.0)
+    if isinstance(said, str):
+        return obstacle(said, network.user)
+    said.close()
+    return obstacle("", network.user)
+
+
+def _login_config(mode: str, network: NetworkLink, timeout_s: float) -> zenoh.Config:
+    """For a single attempt."""
+    config = _config(mode)
     _set(config, "connect/endpoints", [network.endpoint])
-    _set(config, "connect/timeout_ms", int(timeout_s * 1000))
+    _set(config, "connect/timeout_ms", 0)
+    _set(config, "transport/unicast/open_timeout", max(int(timeout_s * 1000), 1))
     _set(config, "transport/auth/usrpwd/user", network.user)
     _set(config, "transport/auth/usrpwd/password", network.password)
     if network.tls is not None:
         _set(config, "transport/link/tls", _mutual_tls(network.tls, "connect"))
-    failure = (
-        f"{network.user}: no session with the router at {network.endpoint} within {timeout_s:g} s"
-    )
-    try:
-        with _few_threads(_APP):
-            return _open_bounded(config, timeout_s + 1.0, failure)
-    except InfrastructureError as error:
-        raise InfrastructureError(f"{failure}: {_why(network.endpoint)}") from error
-
-
-def _why(endpoint: str) -> str:
-    """Why there is no session: Zenoh itself says of all reasons that it timed out."""
-    host, _, port = endpoint.partition("/")[2].rpartition(":")
-    found: list[str] = []
-
-    def connect() -> None:
-        try:
-            socket.create_connection((host.strip("[]"), int(port)), _PROBE_S).close()
-            found.append("somebody listens there, and refused the login")
-        except (OSError, ValueError) as error:
-            found.append(f"nobody listens there ({getattr(error, 'strerror', None) or error})")
-
-    prober = threading.Thread(target=connect, daemon=True)  # a name may take long to resolve
-    prober.start()
-    prober.join(_PROBE_S)
-    return found[0] if found else "nobody answers there"
+    return config
 
 
 @contextlib.contextmanager
@@ -315,12 +327,11 @@ def _listen(
             _set(config, "transport/link/tls", _mutual_tls(outside.tls, "listen"))
         _set(config, "transport/auth/usrpwd/dictionary_file", str(dictionary))
         config.insert_json5("access_control", access.access_control())
-        try:
-            with _few_threads(_OWN):
-                session = _open_bounded(config, 10.0, f"{at}: the router did not open")
+        with _few_threads(_OWN):
+            session = _open_bounded(config, _LISTEN_S)
+        if not isinstance(session, str):
             return RouterLink(session, at)
-        except InfrastructureError as error:
-            reason = str(error)
+        reason = session or f"nothing within {_LISTEN_S:g} s"
     where = " and ".join(
         [endpoint or "any loopback port", *([outside.endpoint] if outside is not None else [])]
     )
@@ -355,25 +366,26 @@ def _set(config: zenoh.Config, path: str, value: object) -> None:
     config.insert_json5(path, json.dumps(value))
 
 
-def _open_bounded(config: zenoh.Config, timeout_s: float, failure: str) -> zenoh.Session:
-    """Open in a thread of its own: a peer that accepts and never answers would hang it.
+def _open_bounded(config: zenoh.Config, timeout_s: float) -> zenoh.Session | str:
+    """A session, or why there is none; "" if that took too long.
 
-    A session that opens after all when nobody waits for it any more is closed.
+    Opened in a thread of its own: a peer that accepts and never answers would hang it. A session
+    that opens after all when nobody waits for it any more is closed.
     """
-    result: list[zenoh.Session | Exception] = []
+    result: list[zenoh.Session | str] = []
     lock = threading.Lock()
     waiting = True
 
     def open_session() -> None:
         try:
-            opened: zenoh.Session | Exception = _keep(zenoh.open(config))
+            opened: zenoh.Session | str = _keep(zenoh.open(config))
         except zenoh.ZError as error:
-            opened = error
+            opened = str(error)
         with lock:
             if waiting:
                 result.append(opened)
                 return
-        if not isinstance(opened, Exception):
+        if not isinstance(opened, str):
             opened.close()
 
     opener = threading.Thread(target=open_session, daemon=True)
@@ -381,13 +393,7 @@ def _open_bounded(config: zenoh.Config, timeout_s: float, failure: str) -> zenoh
     opener.join(timeout_s)
     with lock:
         waiting = False
-    if not result:
-        raise InfrastructureError(failure)
-    session = result[0]
-    if isinstance(session, Exception):
-        reason = re.sub(r" at /\S+:\d+\.", "", str(session))  # places in Zenoh's own source
-        raise InfrastructureError(f"{failure} ({reason})")
-    return session
+    return result[0] if result else ""
 
 
 def _keep(thing: _Kept) -> _Kept:

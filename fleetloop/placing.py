@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from bridge import access
-from configs.brief import NetworkLink, Outside, PlantBrief, Settings
-from configs.deployment import Deployment, passwords, tls_files
+from configs.brief import NetworkLink, Outside, PlantBrief, Settings, TlsFiles
+from configs.deployment import Deployment, NetworkSection, passwords, tls_files
 from configs.errors import ScenarioError
 from configs.scenario import Scenario
 
@@ -47,6 +47,26 @@ def run_name(scenario: Scenario, deployment: Deployment) -> str | None:
     """The run's name in every key if machines had to agree on one."""
     network = deployment.network
     return None if network is None else network.run or scenario.name
+
+
+def check_credentials(scenario: Scenario, deployment: Deployment) -> None:
+    """Refuse a run whose router could not know who comes, before anything is started.
+
+    Raises:
+        ScenarioError: a password or a file of TLS is missing or wrong; the text names key and file.
+    """
+    guests(scenario, deployment)
+    if deployment.network is not None:
+        _tls(deployment.network, None)
+
+
+def _tls(network: NetworkSection, identity: str | None) -> TlsFiles | None:
+    files = tls_files(network)
+    if files is not None:
+        from bridge.tls import check_tls
+
+        check_tls(files, identity, "network.tls.")
+    return files
 
 
 def outside(deployment: Deployment) -> Outside | None:
@@ -116,4 +136,4 @@ def network_link(scenario: Scenario, deployment: Deployment, role: str) -> Netwo
     user = access.user_of(role)
     (password,) = passwords(network, (user,)).values()
     run = network.run or scenario.name
-    return NetworkLink(run, network.endpoint, user, password, tls_files(network))
+    return NetworkLink(run, network.endpoint, user, password, _tls(network, user))

@@ -70,7 +70,7 @@ def run_scenario(source: str, options: Options) -> int:
     deployment = _deployment(scenario, options)
     if not options.in_process:
         keep_to_itself()
-    placing.guests(scenario, deployment)  # what is wrong with credentials comes before the run
+    placing.check_credentials(scenario, deployment)
     if long := wall_time.warning(scenario, speed=options.speed, in_process=options.in_process):
         note(long)
     for line in out_of_reach(scenario):

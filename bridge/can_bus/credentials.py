@@ -18,6 +18,7 @@ from pathlib import Path
 
 from can.util import cast_from_string
 
+from bridge.tls import check_tls
 from configs.brief import NetworkLink, TlsFiles
 from configs.errors import ScenarioError
 from configs.users import read_users
@@ -46,7 +47,7 @@ def network_of(options: Mapping[str, str]) -> NetworkLink:
     if wrong := [name for name in others if name in options]:
         raise ScenarioError(f"{wrong[0]} doesn't go with {endpoint}: give {', '.join(needed)}")
     if secure:
-        return NetworkLink("", endpoint, user, user, _tls(options))
+        return NetworkLink("", endpoint, user, user, _tls(options, user))
     return NetworkLink("", endpoint, user, _password(options, user))
 
 
@@ -63,15 +64,13 @@ def as_option(value: object) -> str:
     return str(read).lower() if isinstance(read, bool) else str(read)
 
 
-def _tls(options: Mapping[str, str]) -> TlsFiles:
+def _tls(options: Mapping[str, str], user: str) -> TlsFiles:
     for name in _TLS:
         if name not in options:
             raise ScenarioError(f"{name} = (missing): over tls give {', '.join(_TLS)}")
-        try:
-            Path(options[name]).open("rb").close()
-        except OSError as error:
-            raise ScenarioError(f"{name} = {options[name]}: {error.strerror}") from error
-    return TlsFiles(*(options[name] for name in _TLS))
+    files = TlsFiles(*(options[name] for name in _TLS))
+    check_tls(files, user)
+    return files
 
 
 def _password(options: Mapping[str, str], user: str) -> str:

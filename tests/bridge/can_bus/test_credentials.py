@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from can.util import load_config
+from certificates import certificates
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,10 +18,9 @@ TLS = {"endpoint": "tls/lab:7447", "user": "bench"}
 
 @pytest.fixture
 def files(tmp_path: Path) -> dict[str, str]:
-    names = ("ca", "certificate", "private_key")
-    for name in names:
-        (tmp_path / name).write_text("PEM")
-    return {name: str(tmp_path / name) for name in names}
+    certificates(tmp_path, ("bench", "boss"))
+    made = {"ca": "ca.pem", "certificate": "bench.pem", "private_key": "bench.key"}
+    return {name: str(tmp_path / file) for name, file in made.items()}
 
 
 def users(folder: Path, text: str = "boss:x\nbench:a:b\n", mode: int = 0o600) -> str:
