@@ -134,7 +134,7 @@ class _Wired(NamedTuple):
                 **asdict(counters),
                 **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
                 "stopped": self.agent.guard.stopped_because,
-                "notices": "\n".join(self.agent.guard.notices()),
+                "notices": "\n".join(self.agent.notices()),
                 "refused": ", ".join(refused),
                 "failure": failure,
                 "early": "" if self.agent.closed else early,

@@ -13,7 +13,7 @@
 
 A fault is a drive that drops out or falls silent, two senders of a drive's telemetry, a bus that
 can't be sent on, a pose that is too old, sensors that disagree, or a law, a path or a path variable
-that is no number any more: it diverged, and the last that was one is kept for the neighbours. It
+beyond what the scenario can reach: it diverged, and the last within is kept for the neighbours. It
 takes the torque from both wheels in the same tick: the frames that report a change of phase out of
 DRIVING are already torque 0. An obstacle is a fault that is still there, less what a host may clear
 by itself; an error that appears before tick 0 and is a person's to clear isn't cleared again. After
@@ -27,6 +27,7 @@ a message; it never reads a clock.
 from collections.abc import Sequence
 from math import hypot, inf, isfinite, nan
 
+from agents.admission import Admission
 from agents.coordination import CoordinationState, Coordinator
 from agents.guard import WHOLE, Guard, Passed, Phase
 from agents.laws import LAWS, LawState, Sense
@@ -71,7 +72,10 @@ class Agent:
         self._coordination = CoordinationState(start.v_hat_0, start.mu_0, start.s_0)
         self.heard_since = self._drives.heard_since
         """Whether both encoder frames came after a bus time [ns]."""
-        self._astray = False  # the path variable would be no number
+        self._astray = False  # the path variable would be beyond reach
+        self.admission = self._admission = Admission(brief)
+        """What is believed of what arrives, and what was refused."""
+        self._reach = brief.reach
         self._leader: LeaderSpeed | None = None
         self._start_fix: PoseFix | None = None
         self._fixes: dict[int, PoseFix] = {}  # by tick, until due
@@ -97,6 +101,8 @@ class Agent:
 
     def take_pose(self, fix: PoseFix) -> None:
         """Take a pose from the localisation system; ticks below 0: where the robot starts."""
+        if not self._admission.pose(fix):
+            return
         if fix.tick < 0:
             self._start_fix = fix
         else:
@@ -104,6 +110,8 @@ class Agent:
 
     def take_path(self, robot: str, state: PathState) -> None:
         """Take what an in-neighbour says of its path variable; ticks below 0: where it starts."""
+        if not self._admission.path(robot, state):
+            return
         self._unheard.discard(robot)
         if state.tick < 0 or self._at_once:
             self._neighbours.hear(robot, state.t_ns, state.s, state.v_hat)
@@ -112,7 +120,16 @@ class Agent:
 
     def take_leader(self, speed: LeaderSpeed) -> None:
         """Take the virtual leader's speed, now and to come."""
-        self._leader = speed
+        if self._admission.leader(speed):
+            self._leader = speed
+
+    def refusals(self) -> list[str]:
+        """What was not believed, in words."""
+        return self._admission.refusals.lines()
+
+    def notices(self) -> list[str]:
+        """What a report should say beside the numbers, in words."""
+        return [*self._guard.notices(), *self.refusals()]
 
     def missing_to_start(self) -> list[str]:
         """Whom the robot has to hear before the run, and has not yet."""
@@ -147,6 +164,7 @@ class Agent:
         Raises:
             InfrastructureError: the drives were not armed when control had to start.
         """
+        self._admission.tick = tick
         motion = self._drives.motion()
         if motion is None:
             return self._guard.arm(tick)
@@ -230,22 +248,24 @@ class Agent:
             self._law_state = None
         n, sum_s, sum_v = self._neighbours.sums(t_ns)
         v_r = self._leader.at(t_ns) if self._leader is not None else 0.0
-        self._go_on(self._coordinator.advance(coordination, n, sum_s, sum_v, v_r))
+        self._go_on(
+            t_ns * 1e-9 + self._h, self._coordinator.advance(coordination, n, sum_s, sum_v, v_r)
+        )
         x_d, y_d, theta_d, _, _ = reference
         used = (t_ns * 1e-9, *sense, s, s_dot, mu, v_hat, n, x_d, y_d, theta_d)
         measured = (*self._drives.sent, self.late_s, self.round_trip_s)
         self._rows.add(tick, (*used, *signals, *measured))
         return frames
 
-    def _go_on(self, after: CoordinationState) -> None:
-        """Take the next path variable; one that is no number stays, and the robot stops."""
+    def _go_on(self, t_s: float, after: CoordinationState) -> None:
+        """Take the next path variable; one beyond reach is not taken, and the robot stops."""
         v_hat, mu, s = after
-        sound = isfinite(v_hat + mu + s)
-        if sound:
+        far = self._reach.beyond(t_s, s, v_hat if isfinite(mu) else mu)
+        if far is None:
             self._coordination = after
-        if sound is self._astray:
-            self._astray = not sound
-            trouble = None if sound else "its path variable diverged: it would not be finite"
+        if (far is None) is self._astray:
+            self._astray = far is not None
+            trouble = None if far is None else f"its path variable diverged: {far}"
             self._guard.note_doubt("path variable", trouble)
 
     def leave(self) -> Sequence[Frame]:

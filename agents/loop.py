@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import can
 
+from agents.admission import LEADER, LOCALISATION
 from agents.agent import Agent
 from agents.bus_clock import BusClock
 from agents.guard import Phase
@@ -32,6 +33,8 @@ BUS_SHARE = 2.0
 first."""
 STOP_EVERY_S = 0.1
 """How often a controller that waits for messages looks whether it was told to stop."""
+
+_SAID = {"pose": ("pose", LOCALISATION), "leader": ("speed", LEADER)}
 
 
 @dataclass(slots=True)
@@ -74,10 +77,7 @@ class LockstepLoop:
             if message is not None:
                 return message
             if time.monotonic() > deadline:
-                raise InfrastructureError(
-                    f"{self._robot}: the run did not start within"
-                    f" {self._schedule.start_deadline_s:g} s"
-                )
+                raise did_not_start(self._agent)
         return None
 
     def run(self, first: can.Message, stop: Stop) -> None:
@@ -141,17 +141,17 @@ class LockstepLoop:
     def _listen(self, tick: int, stop: Stop) -> None:
         """Wait for what the schedule owes this tick, or for a stop."""
         agent = self._agent
-        deadline = time.monotonic() + LISTEN_SHARE * self._schedule.tick_deadline_s
+        within_s = LISTEN_SHARE * self._schedule.tick_deadline_s
+        deadline = time.monotonic() + within_s
         while (missing := agent.missing(tick)) and not stop.requested:
+            # Who is asked too late may find it waiting; who is flooded finds that there is no end.
             left_s = deadline - time.monotonic()
             arrival = self._link.receive(min(max(0.0, left_s), STOP_EVERY_S))
-            if arrival is not None:
+            if arrival is not None and left_s > -within_s:
                 self.take(arrival)
             elif left_s <= 0.0:
-                raise PeerSilentError(
-                    f"{self._robot}: tick {tick}: no {', no '.join(missing)} within"
-                    f" {LISTEN_SHARE * self._schedule.tick_deadline_s:g} s"
-                )
+                said = "; ".join((f"no {', no '.join(missing)}", *agent.refusals()))
+                raise PeerSilentError(f"{self._robot}: tick {tick}: within {within_s:g} s {said}")
 
     def _receive(self, timeout_s: float) -> can.Message | None:
         try:
@@ -160,6 +160,13 @@ class LockstepLoop:
             raise PeerLostError(
                 f"{self._robot}: lost its bus after {self.counters.ticks} ticks: {error}"
             ) from error
+
+
+def did_not_start(agent: Agent) -> InfrastructureError:
+    """The error of a controller that waited in vain for the run, with what it did not believe."""
+    waited_s = agent.brief.schedule.start_deadline_s
+    said = (f"{agent.brief.robot}: the run did not start within {waited_s:g} s", *agent.refusals())
+    return InfrastructureError("; ".join(said))
 
 
 def give(agent: Agent, arrival: Arrival) -> bool:
@@ -175,5 +182,7 @@ def give(agent: Agent, arrival: Arrival) -> bool:
         case "go":
             pass  # lockstep begins with the first frame
         case _:
+            what, sender = _SAID.get(kind, ("path state", robot))
+            agent.admission.malformed(what, sender)
             return False
     return True

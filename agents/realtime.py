@@ -23,17 +23,19 @@ import can
 from agents.agent import Agent
 from agents.bus_health import BusHealth
 from agents.guard import Phase
-from agents.loop import give
+from agents.loop import did_not_start, give
+from bridge.access import LAUNCHER
 from bridge.barrier import Hellos
 from bridge.can_bus.convert import can_id_of, to_frame, to_message
 from bridge.can_bus.echo import Echoes, hands_back
-from bridge.clock import monotonic_of
+from bridge.clock import implausible_start, monotonic_of
 from bridge.frame import ERR, Frame
 from bridge.link import Link, Publisher
 from bridge.messages import Go
 from bridge.process import Stop
-from configs.errors import InfrastructureError
 
+ARRIVALS_PER_TICK = 64
+"""Messages that are looked at in one tick, and two more for every in-neighbour: the rest waits."""
 BACKLOG_S = 1.0
 """Longest time for dropping what the bus gathered; no interface keeps more than this takes."""
 
@@ -66,6 +68,7 @@ class RealtimeLoop:
         self._hellos = hellos
         self._health = BusHealth(agent.brief.robot, agent.brief.host.bus_error_limit_ns)
         self._echoes = Echoes() if hands_back(agent.brief.bus) else None
+        self._most_arrivals = ARRIVALS_PER_TICK + 2 * len(agent.brief.hears)
         self._power_up_ns = 0
         self._sent_ns = 0  # when torques were sent that have no feedback yet; 0: there are none
         self.counters = Counters()
@@ -77,19 +80,31 @@ class RealtimeLoop:
             self._drop_backlog()
             self._hellos.say()
             arrival = self._link.receive(0.02)
-            while arrival is not None:
+            # Others say hello all the time: wait for nothing here, or ours would not be said.
+            for _ in range(self._most_arrivals):
+                if arrival is None:
+                    break
                 if arrival.tag != "go":
                     self.counters.undecodable += not give(self._agent, arrival)
-                elif (go := Go.decode(arrival.payload)) is not None:
-                    return monotonic_of(go.epoch_ns)
-                # Others say hello all the time: wait for nothing here, or ours would not be said.
+                elif (epoch_ns := self._epoch_ns(arrival.payload)) is not None:
+                    return epoch_ns
                 arrival = self._link.receive(0.0)
             if time.monotonic() > deadline:
-                raise InfrastructureError(
-                    f"{self._robot}: the run did not start within"
-                    f" {self._schedule.start_deadline_s:g} s"
-                )
+                raise did_not_start(self._agent)
         return None
+
+    def _epoch_ns(self, payload: bytes) -> int | None:
+        """When tick 0 is by this machine's monotonic clock, None if that can't be."""
+        refusals = self._agent.admission.refusals
+        go = Go.decode(payload)
+        if go is None:
+            refusals.note("go", LAUNCHER, "not well formed")
+            return None
+        epoch_ns = monotonic_of(go.epoch_ns)
+        if far := implausible_start(epoch_ns, self._schedule.longest_start_s):
+            refusals.note("go", LAUNCHER, "clocks", far)
+            return None
+        return epoch_ns
 
     def run(self, epoch_ns: int, stop: Stop) -> None:
         """Run from the countdown to the closing tick, or until told to stop.
@@ -112,8 +127,8 @@ class RealtimeLoop:
             if self._sent_ns and tick > 0:
                 self.counters.misses += 1
                 agent.round_trip_s = nan
-            while (arrival := self._link.receive(0.0)) is not None:
-                self.counters.undecodable += not give(agent, arrival)
+            agent.admission.now_ns = now_ns - epoch_ns
+            self._hear_peers()
             frames = agent.step(tick) if not stop.requested else agent.leave()
             overdue = now_ns >= due_ns + period_ns and agent.phase is Phase.DRIVING
             if overdue:
@@ -136,6 +151,14 @@ class RealtimeLoop:
         with suppress(can.CanError, OSError):
             while self._bus.recv(0.0) is not None and time.monotonic() < deadline:
                 pass
+
+    def _hear_peers(self) -> None:
+        """Take what the network brought; of a flood no more than a tick has room for."""
+        for _ in range(self._most_arrivals):
+            arrival = self._link.receive(0.0)
+            if arrival is None:
+                return
+            self.counters.undecodable += not give(self._agent, arrival)
 
     def _send(self, frames: Sequence[Frame], tick: int) -> None:
         send, health = self._bus.send, self._health

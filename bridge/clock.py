@@ -13,6 +13,20 @@ def wall_of(monotonic_ns: int) -> int:
     return monotonic_ns + time.time_ns() - time.monotonic_ns()
 
 
+def implausible_start(epoch_ns: int, within_s: float) -> str | None:
+    """Why a run doesn't begin at this monotonic instant, None if it may.
+
+    Args:
+        epoch_ns: tick 0 by this machine's monotonic clock.
+        within_s: farther from now than this nobody would wait for.
+    """
+    away_s = (epoch_ns - time.monotonic_ns()) * 1e-9
+    if abs(away_s) <= within_s:
+        return None
+    direction = "from now" if away_s > 0 else "ago"
+    return f"tick 0 would be {abs(away_s):.6g} s {direction}: the machines' clocks differ"
+
+
 def monotonic_of(wall_ns: int) -> int:
     """What this machine's monotonic clock reads when the wall clock reads `wall_ns`."""
     return wall_ns + time.monotonic_ns() - time.time_ns()

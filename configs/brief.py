@@ -13,10 +13,14 @@ radians, wheel order is (right, left), times are integer nanoseconds.
 from dataclasses import dataclass, field
 from math import inf
 
+from configs.reach import Reach
+
 Settings = tuple[tuple[str, str | int | float | bool], ...]
 """Keyword arguments as sorted pairs, so that a brief stays hashable and immutable."""
 OURS = "fleetloop"
 """The python-can interface whose buses the plant's process holds itself."""
+LEAD_TICKS = 16
+"""In lockstep a bus may be this many ticks ahead of the slowest."""
 
 
 # --- reference paths: Γ_0(s) of equation (1) ------------------------------------------------------
@@ -170,6 +174,7 @@ class Coordination:
     v_hat_0: float
     age_limit_s: float  # a neighbour's value is extrapolated at most this far
     silence_limit_s: float  # after this long a silent neighbour leaves the sums
+    ahead_limit_s: float = 0.5  # in real time: who is dated further ahead isn't believed
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,6 +200,11 @@ class Schedule:
     def period_s(self) -> float:
         """The control period h."""
         return self.period_ns * 1e-9
+
+    @property
+    def longest_start_s(self) -> float:
+        """No run begins later than this after everybody was told so [s]."""
+        return self.start_deadline_s + self.countdown_ticks * self.period_s
 
     def shares(self, tick: int) -> bool:
         """Whether path states are due at this tick."""
@@ -306,6 +316,7 @@ class AgentBrief:
     wheels: Wheels
     gains: Gains
     coordination: Coordination
+    reach: Reach  # what neighbours can say
     path: ReferencePath
     offset: FormationOffset
     hears: tuple[str, ...]  # in-neighbours, sorted: a_ij = 1

@@ -38,6 +38,7 @@ from configs.brief import (
     WireModel,
     WorldOffset,
 )
+from configs.reach import Reach, reach_of
 from configs.scenario import Scenario
 from configs.splines import Ends, chord_lengths, quintic_spline
 
@@ -104,7 +105,9 @@ def agent_brief(
             v_hat_0=coordination.v_hat_0,
             age_limit_s=coordination.age_limit_s,
             silence_limit_s=coordination.silence_limit_s,
+            ahead_limit_s=coordination.ahead_limit_s,
         ),
+        reach=reach(scenario),
         path=reference_path(scenario.path),
         offset=formation_offset(robot.offset),
         hears=graph.hears[name],
@@ -116,6 +119,19 @@ def agent_brief(
         phase_ns=round(scenario.names.index(name) * ticks.period_ns / len(scenario.names)),
         bus=bus,
         network=network,
+    )
+
+
+def reach(scenario: Scenario) -> Reach:
+    """How far the path variables and speed estimates of a run can come."""
+    coordination, leader = scenario.coordination, scenario.leader
+    return reach_of(
+        [robot.s_0 for robot in scenario.robot],
+        [coordination.v_hat_0, leader.speed_m_s, *(step.speed_m_s for step in leader.steps)],
+        mu_0=coordination.mu_0,
+        p=coordination.p,
+        q=coordination.q,
+        most_heard=max(map(len, scenario.topology.hears.values())),
     )
 
 

@@ -206,6 +206,9 @@ class CoordinationSection(Section):
     mu_0: Finite = 0.0
     age_limit_s: Positive = Field(2.0, description="a neighbour's value is carried on this far")
     silence_limit_s: Positive = Field(2.0, description="then a silent neighbour stops counting")
+    ahead_limit_s: Positive = Field(
+        0.5, description="in real time, a neighbour dated further ahead isn't believed"
+    )
 
 
 def _changes(name: str, model: type[Section]) -> type[Section]:

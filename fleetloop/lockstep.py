@@ -195,7 +195,7 @@ class InProcessRun:
     @property
     def notices(self) -> dict[str, list[str]]:
         """What happened between robots and their drives, in words."""
-        notices = {agent.brief.robot: agent.guard.notices() for agent in self._agents}
+        notices = {agent.brief.robot: agent.notices() for agent in self._agents}
         return {robot: said for robot, said in notices.items() if said}
 
     def run(self, stop: Stop) -> None:

@@ -15,7 +15,7 @@ from bridge.access import LAUNCHER
 from bridge.barrier import Hellos, await_hellos
 from bridge.can_bus.ends import DriveEnd
 from bridge.can_bus.hub import Hub
-from bridge.clock import monotonic_of
+from bridge.clock import implausible_start, monotonic_of
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import Go, PoseFix, Progress, Report, Rows
 from bridge.process import LAUNCHER_GONE, Stop, cpu_ns, go_realtime, serve, settle_memory
@@ -34,6 +34,8 @@ PLANT_PRIORITY = 45
 GO_SHARE = 1.25
 """Multiple of the start deadline that the plant waits for the go: whoever misses a peer names it
 first."""
+ARRIVALS_PER_ROBOT = 16
+"""Poses of a robot that isn't emulated that are looked at in one tick: the rest waits."""
 EARLY = -1
 """Tick of the poses that only prove the link, before the run."""
 
@@ -197,17 +199,24 @@ def _serve_until_go(
 ) -> int:
     """Say hello and serve the buses until the launcher says when tick 0 is."""
     limit_s = GO_SHARE * brief.schedule.start_deadline_s
+    wrong: str | None = None
     deadline = time.monotonic() + limit_s
     while time.monotonic() < deadline and not stop.requested:
         hellos.say()
         end.serve(0.02)
         while (arrival := link.receive(0.0)) is not None:
             go = Go.decode(arrival.payload) if arrival.tag == "go" else None
-            if go is not None:
-                return monotonic_of(go.epoch_ns)
+            if go is None:
+                continue
+            epoch_ns = monotonic_of(go.epoch_ns)
+            wrong = implausible_start(epoch_ns, brief.schedule.longest_start_s)
+            if wrong is None:
+                return epoch_ns
     if stop.requested:
         return time.monotonic_ns()
-    raise InfrastructureError(f"plant: not ready after {limit_s:g} s: no go from the launcher")
+    raise InfrastructureError(
+        f"plant: not ready after {limit_s:g} s: {wrong or 'no go from the launcher'}"
+    )
 
 
 def _record(
@@ -216,11 +225,13 @@ def _record(
     """A row of each robot that isn't emulated."""
     if not others:
         return
-    while (arrival := link.receive(0.0)) is not None:
-        fix = PoseFix.decode(arrival.payload) if arrival.tag != "go" else None
-        for other in others:
-            if fix is not None and other.robot == arrival.tag:
-                other.take(fix)
+    robots = {other.robot: other for other in others}
+    for _ in range(ARRIVALS_PER_ROBOT * len(others)):
+        arrival = link.receive(0.0)
+        if arrival is None:
+            break
+        if (other := robots.get(arrival.tag)) is not None:
+            other.take(PoseFix.decode(arrival.payload))
     for other, buffer in zip(others, rows, strict=True):
         buffer.add(tick, other.row(tick * period_s))
 

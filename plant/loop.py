@@ -4,7 +4,7 @@
                    or `plant.wire_bus` do between questions and answers; and on to its tick k + 1
 
 Robots of different buses meet only in their controllers' messages, for which each controller waits
-by tick. So a bus need not wait for all others at every tick: it may be up to `WINDOW_TICKS` ahead
+by tick. So a bus need not wait for all others at every tick: it may be up to `LEAD_TICKS` ahead
 of the slowest, which keeps all cores at work and changes no value. Held to a speed, all go tick by
 tick together.
 
@@ -24,14 +24,13 @@ from bridge.link import Publisher
 from bridge.messages import PoseFix, Progress
 from bridge.process import Stop
 from bridge.telemetry import RowBuffer, Tap
-from configs.brief import PlantBrief
+from configs.brief import LEAD_TICKS, PlantBrief
 from configs.errors import InfrastructureError, PeerLostError
 from plant.buses import Ask, IdealBus
 from plant.emulation import Emulation, emulations
 from plant.unit import Unit
 from plant.wire_bus import WireBus
 
-WINDOW_TICKS = 16
 REPORT_EVERY_NS = 100_000_000
 WAIT_S = 0.1
 """Longest wait for an answer before somebody who doesn't answer is looked for."""
@@ -149,7 +148,7 @@ class LockstepLoop:
         self._schedule = schedule = brief.schedule
         self._period_ns, self._ticks = schedule.period_ns, schedule.ticks
         self._tick_wall_ns = int(schedule.period_ns / brief.speed) if brief.speed > 0.0 else 0
-        self._window = 0 if self._tick_wall_ns else WINDOW_TICKS
+        self._window = 0 if self._tick_wall_ns else LEAD_TICKS
         self._limit_s = ANSWER_SHARE * schedule.tick_deadline_s
         self._hub = hub
         self._report = report

@@ -37,7 +37,9 @@ class Bench:
         self.mute: set[tuple[int, Command]] = set()  # what drives don't say
         self.pose: tuple[float, float, float] | None = (1.95, 0.05, 1.57)  # None: it is silent
         self.agent.take_pose(PoseFix(-1, 0, 1.95, 0.05, 1.57))
-        self.agent.take_path("r1", PathState(-1, -1, 0.0, 0.6)) if brief.hears else None
+        self.agent.take_path(
+            "r1", PathState(-1, -brief.schedule.period_ns, 0.0, 0.6)
+        ) if brief.hears else None
 
     def _keep(self, _first: int, _count: int, rows: bytes, _final: bool) -> None:
         self.rows += AGENT_ROW.iter_unpack(rows)

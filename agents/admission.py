@@ -1,0 +1,133 @@
+"""What of the messages that arrive is believed: one can be well formed and still be impossible.
+
+    message       is refused if
+    path state    its time isn't its tick's, or nothing is shared at that tick
+                  lockstep: its tick is over, was said, or is further ahead than a bus may be
+                  real time: dated more than `ahead_limit_s` ahead of now, older than
+                  `silence_limit_s`, or not newer than what was heard before
+                  s or v̂ are beyond what the scenario can reach (`configs.reach`)
+    pose          likewise of its date; a place or heading beyond this world
+    leader speed  faster than the scenario
+
+Ticks below 0 say where somebody starts; once control has begun they are refused. What is refused is
+counted by its sender, changes nothing, and so makes the sender silent: in lockstep the wait for it
+names it, in real time it leaves the sums.
+"""
+
+from bridge.messages import LeaderSpeed, PathState, PoseFix
+from bridge.refusals import Refusals
+from configs.brief import LEAD_TICKS, AgentBrief
+from configs.reach import within_world
+
+LOCALISATION = "the localisation system"
+LEADER = "the leader"
+_AHEAD_TICKS = LEAD_TICKS + 2
+"""A state is said a tick before it is due, and this robot may be between two ticks."""
+
+
+class Admission:
+    """Judges the messages of one robot. Told the time, never asks for it."""
+
+    def __init__(self, brief: AgentBrief) -> None:
+        schedule = brief.schedule
+        self.refusals = Refusals()
+        self.tick = -schedule.countdown_ticks - 1
+        """The last tick that was computed."""
+        self.now_ns = self.tick * schedule.period_ns
+        """Scenario time by the wall clock; in real time whoever keeps the clock says it."""
+        self._schedule = schedule
+        self._period_ns = schedule.period_ns
+        self._reach = brief.reach
+        self._delay_ticks = schedule.pose_delay_ticks
+        self._ahead_ns = round(brief.coordination.ahead_limit_s * 1e9) + 2 * schedule.period_ns
+        self._old_ns = round(brief.coordination.silence_limit_s * 1e9)
+        self._newest_ns: dict[str, int] = {}
+
+    def path(self, robot: str, state: PathState) -> bool:
+        """Whether a path state may be used."""
+        wrong = self._path_date(robot, state)
+        if wrong is None and (far := self._reach.beyond(state.t_ns * 1e-9, state.s, state.v_hat)):
+            wrong = "reach", far
+        if wrong is not None:
+            self.refusals.note("path state", robot, *wrong)
+            return False
+        if state.tick >= 0:
+            self._newest_ns[robot] = state.t_ns
+        return True
+
+    def pose(self, fix: PoseFix) -> bool:
+        """Whether a pose may be used."""
+        wrong = self._pose_date(fix)
+        if wrong is None and not within_world(fix.x_m, fix.y_m, fix.theta_rad):
+            wrong = "reach", f"({fix.x_m:.6g} m, {fix.y_m:.6g} m, {fix.theta_rad:.6g} rad)"
+        if wrong is not None:
+            self.refusals.note("pose", LOCALISATION, *wrong)
+            return False
+        if fix.tick >= 0:
+            self._newest_ns[LOCALISATION] = fix.t_ns
+        return True
+
+    def leader(self, speed: LeaderSpeed) -> bool:
+        """Whether a leader's speed may be used."""
+        for _, value in speed.steps:
+            if far := self._reach.too_fast(value, "v_r"):
+                self.refusals.note("speed", LEADER, "reach", far)
+                return False
+        return True
+
+    def malformed(self, what: str, sender: str) -> None:
+        """Count a message that was none."""
+        self.refusals.note(what, sender, "not well formed")
+
+    def _path_date(self, robot: str, state: PathState) -> tuple[str, str] | None:
+        tick, t_ns = state.tick, state.t_ns
+        if t_ns != tick * self._period_ns:
+            return "time", f"tick {tick} is not at {t_ns * 1e-9:.6g} s"
+        if tick < 0:
+            return self._start()
+        if not self._schedule.shares(tick):
+            return "tick", f"nothing is shared at tick {tick}"
+        if self._schedule.realtime:
+            return self._distance(t_ns) or self._order(t_ns, self._newest_ns.get(robot))
+        return self._due(tick) or self._order(t_ns, self._newest_ns.get(robot))
+
+    def _pose_date(self, fix: PoseFix) -> tuple[str, str] | None:
+        tick, t_ns = fix.tick, fix.t_ns
+        if tick < 0:
+            return self._start()
+        if not 0 <= t_ns - tick * self._period_ns < self._period_ns:
+            return "time", f"tick {tick} is not at {t_ns * 1e-9:.6g} s"
+        if self._schedule.realtime:
+            return self._distance(t_ns)
+        if not self._schedule.localises(tick):
+            return "tick", f"no pose is taken at tick {tick}"
+        wrong = self._due(tick, self._delay_ticks)
+        return wrong or self._order(t_ns, self._newest_ns.get(LOCALISATION))
+
+    def _start(self) -> tuple[str, str] | None:
+        return ("start", "dated before the run, which has begun") if self.tick >= 0 else None
+
+    def _due(self, tick: int, delay_ticks: int = 0) -> tuple[str, str] | None:
+        """In lockstep: between what is over and what nobody can know yet."""
+        ahead = tick - max(self.tick, -1)
+        if ahead > _AHEAD_TICKS:
+            return "ahead", f"dated {ahead * self._period_ns * 1e-9:.6g} s ahead"
+        if ahead + delay_ticks <= 0:
+            return "back", f"tick {tick} came when tick {self.tick} was over"
+        return None
+
+    def _distance(self, t_ns: int) -> tuple[str, str] | None:
+        """In real time: near enough to now."""
+        ahead_ns = t_ns - self.now_ns
+        if ahead_ns > self._ahead_ns:
+            return "ahead", f"dated {ahead_ns * 1e-9:.6g} s ahead"
+        if -ahead_ns > self._old_ns:
+            return "back", f"dated {-ahead_ns * 1e-9:.6g} s back"
+        return None
+
+    def _order(self, t_ns: int, newest_ns: int | None) -> tuple[str, str] | None:
+        if newest_ns is None or t_ns > newest_ns:
+            return None
+        if t_ns == newest_ns:
+            return "twice", f"that of {t_ns * 1e-9:.6g} s came twice"
+        return "order", f"that of {t_ns * 1e-9:.6g} s came after that of {newest_ns * 1e-9:.6g} s"
