@@ -229,6 +229,8 @@ def check(
             help="A scenario file or the name of a shipped one; none: list them.",
         ),
     ] = None,
+    clock: ClockOption = None,
+    seed: SeedOption = None,
     overrides: SetOption = None,
     deployment: DeploymentOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
@@ -244,9 +246,8 @@ def check(
     elif scenario is None:
         list_scenarios(as_json=as_json)
     else:
-        raise typer.Exit(
-            check_scenario(scenario, _changes(overrides), deployment=deployment, as_json=as_json)
-        )
+        changes = _changes(overrides, clock=clock, seed=seed)
+        raise typer.Exit(check_scenario(scenario, changes, deployment=deployment, as_json=as_json))
 
 
 @app.command()
