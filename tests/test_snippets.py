@@ -39,10 +39,14 @@ def test_commands_that_are_shown_are_understood() -> None:
         name, *rest = words
         while isinstance(command, click.Group) and rest:
             known = command.commands
+            if rest[0].startswith("-"):
+                break
             assert rest[0] in known, f"{where}: {' '.join(words)}: no such verb"
             command, name, rest = known[rest[0]], rest[0], rest[1:]
         # Verbs named in passing come without their arguments.
-        if rest:
+        if rest and rest[0].startswith("-") and isinstance(command, click.Group):
+            assert any(rest[0] in param.opts for param in command.params), f"{where}: {words}"
+        elif rest:
             try:
                 command.make_context(name, list(rest))
             except click.UsageError as error:
