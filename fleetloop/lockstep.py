@@ -43,12 +43,16 @@ class _Mind:
 class _Lane:
     """One bus with the controllers of its robots."""
 
-    __slots__ = ("frames", "minds", "name")
+    __slots__ = ("minds", "name")
 
     def __init__(self, name: str, units: Sequence[Unit], minds: Mapping[str, _Mind]) -> None:
         self.name = name
         self.minds = {unit.brief.robot: minds[unit.brief.robot] for unit in units}
-        self.frames = 0
+
+    @property
+    def frames(self) -> int:
+        """How many frames crossed the bus."""
+        raise NotImplementedError
 
     def tick(self) -> None:
         """One tick of the bus."""
@@ -58,12 +62,17 @@ class _Lane:
 class _IdealLane(_Lane):
     """A bus on which frames take no time."""
 
-    __slots__ = ("_minds", "_steps")
+    __slots__ = ("_crossed", "_minds", "_steps")
 
     def __init__(self, name: str, bus: IdealBus, minds: Mapping[str, _Mind]) -> None:
         super().__init__(name, bus.units, minds)
         self._steps = bus.steps()
         self._minds = [(mind.agent, mind.clock) for mind in self.minds.values()]
+        self._crossed = 0
+
+    @property
+    def frames(self) -> int:
+        return self._crossed
 
     def tick(self) -> None:
         steps = self._steps
@@ -82,7 +91,7 @@ class _IdealLane(_Lane):
                             answers += agent.step(tick)
                 if not frames:
                     answers += agent.step(clock.passed())
-            self.frames += len(frames) + len(answers)
+            self._crossed += len(frames) + len(answers)
             ask = steps.send(answers)
 
 
@@ -97,11 +106,14 @@ class _WireLane(_Lane):
         self._steps = bus.steps()
         self._pending: dict[str, list[tuple[int, Frame]]] = {robot: [] for robot in self.minds}
 
+    @property
+    def frames(self) -> int:
+        return self._wire.crossed
+
     def tick(self) -> None:
         steps, pending = self._steps, self._pending
         ask = next(steps)
         while ask is not None:
-            self.frames += len(ask.passed)
             for robot, heard in pending.items():
                 heard += [p.as_heard_by(robot) for p in ask.passed if p.heard_by(robot)]
             robot = ask.asked

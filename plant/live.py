@@ -30,6 +30,12 @@ class IdealLive:
         self._zero_ns = zero_ns
         self._step_ns = step_ns
 
+    @property
+    def crossed(self) -> int:
+        """How many frames crossed the bus."""
+        counters = self._end.counters(self._name)
+        return counters.from_drives + counters.from_clients
+
     def next_ns(self) -> int | None:
         """When something happens of itself: never, but for the ticks."""
         return None
@@ -75,6 +81,11 @@ class WireLive:
         self._name = name
         self._bus = bus
         self._hub = hub
+
+    @property
+    def crossed(self) -> int:
+        """How many frames crossed the bus."""
+        return self._bus.crossed
 
     def next_ns(self) -> int | None:
         """When the next frame ends or drive acts."""

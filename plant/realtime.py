@@ -85,9 +85,8 @@ class RealtimeLoop:
         while self._end.clients() and time.monotonic() < deadline and not stop.requested:
             self._serve(0.01, power_up_ns)
         self.counters.wall_ns = max(time.monotonic_ns() - epoch_ns, 0)
-        for bus in self._buses:
-            crossed = self._end.counters(bus)
-            self.counters.frames[bus] = crossed.from_drives + crossed.from_clients
+        for name, bus in self._buses.items():
+            self.counters.frames[name] = bus.crossed
 
     def _serve(self, wait_s: float, power_up_ns: int) -> None:
         """Serve the buses until something came or is due, at most `wait_s`."""

@@ -95,6 +95,8 @@ class WireBus:
         self._freed: list[tuple[Key, int]] = []
         self.refused = 0
         """Frames of clients that found no room."""
+        self.crossed = 0
+        """Frames that ended on the wire, whoever sent them."""
 
     # --- lockstep --------------------------------------------------------------------------------
 
@@ -218,6 +220,7 @@ class WireBus:
 
     def _deliver(self, event: Delivered) -> None:
         end_ns, sender, frame = event.end_ns, event.sender, event.frame
+        self.crossed += 1
         key = self._key_of.get(sender)
         self._passed.append(Passed(end_ns, frame, key))
         self._tap(end_ns, (frame,), FROM_DRIVE if key is None else 0)

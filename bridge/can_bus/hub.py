@@ -123,6 +123,7 @@ class Hub:
         """
         bus = self._buses[name]
         bus.stamp_ns = stamp_ns
+        bus.counters.from_drives += sum(passed.of_drive for passed in frames)
         for client in bus.clients.copy():
             heard = [p.as_heard_by(client.key) for p in frames if p.heard_by(client.key)]
             if client.own:

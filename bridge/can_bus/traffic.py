@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from bridge.frame import Frame
+from bridge.frame import ERR, Frame
 
 Key = str | int
 """A client of a bus: the name of the robot that it controls in lockstep, else a number."""
@@ -38,6 +38,11 @@ class Passed(NamedTuple):
     key: Key | None = None
     to: Key | None = None
     apart: Mapping[Key, Frame] = _NOBODY
+
+    @property
+    def of_drive(self) -> bool:
+        """Whether it is a frame that a drive sent."""
+        return self.key is None and not self.frame.can_id & ERR
 
     def heard_by(self, key: Key) -> bool:
         """Whether a client hears it from the bus; its own frames it doesn't."""

@@ -165,6 +165,14 @@ def test_the_load_of_a_robot_at_1_khz_is_forty_percent() -> None:
     assert load == pytest.approx(0.40, abs=0.02)
 
 
+def test_what_crossed_the_wire_is_counted_whoever_sent_it() -> None:
+    driven = Driven(lambda _: torques(0.0, 0.0))
+    asks = driven.ticks(20)
+    ended = [passed for ask in asks for passed in ask.passed]
+    assert driven.bus.crossed >= len(ended) > 20 * 4 - 4
+    assert driven.bus.crossed <= 20 * 4 + 2 * 2  # encoders, torques; heartbeats
+
+
 def test_error_frames_reach_the_clients_and_the_frame_is_sent_again() -> None:
     from bridge.can_bus.disturbances import Disturbance, Kind
     from bridge.frame import ERR

@@ -1,5 +1,6 @@
 """Runs over processes: the same record as in one process, bit for bit."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,9 @@ def test_processes_and_one_process_leave_the_same_record_bit_for_bit(
     assert completed(c, "two_robots", *overrides)[0] == 0
     assert print_comparison(a, b, as_json=False) == 0
     assert print_comparison(a, c, as_json=False) == 0
+    frames = [json.loads((x / "summary.json").read_text())["frames_per_bus"] for x in (a, b, c)]
+    assert frames[0] == frames[1] == frames[2]
+    assert min(frames[0].values()) > 4 * 2000
     ticks = 4000 if WIRE in overrides else 2000
     assert f"identical: {ticks} ticks of 2 robots" in capsys.readouterr().out
     recorded = ["record.mcap", *(f"can/{bus}.{kind}" for bus in ("r1", "r2") for kind in KINDS)]

@@ -269,3 +269,22 @@ def test_with_bit_timing_an_error_frame_is_for_the_wire(runtime_folder) -> None:
     serving.serve()
     assert [frame for _, frame in serving.hub.say("r1")] == [Frame(ERR | 4, bytes(8))]
     serving.close()
+
+
+def test_with_bit_timing_what_drives_sent_is_counted_and_error_frames_are_not(
+    runtime_folder,
+) -> None:
+    serving = Serving(10)
+    serving.join().frames(Frame(0x00E, bytes(4)))
+    serving.serve()
+    passed = [
+        Passed(1, Frame(0x009, bytes(8))),
+        Passed(2, Frame(0x029, bytes(8))),
+        Passed(3, Frame(0x00E, bytes(4)), key="r1"),
+        Passed(4, Frame(ERR | 4, bytes(8))),
+        Passed(5, Frame(ERR | 4, bytes(8)), to="r1"),
+    ]
+    serving.hub.pass_on("r1", 6, passed)
+    counters = serving.hub.counters("r1")
+    assert (counters.from_drives, counters.from_clients) == (2, 1)
+    serving.close()
