@@ -6,8 +6,8 @@ over. Who drives it, over sockets or by calls, changes nothing of what happens.
 
     IdealBus    frames take no time: the drives' frames of an instant are the question, the answer
                 reaches them at the same instant; replies go out at once and are a question again,
-                up to `MAX_QUESTIONS` a tick: what is said beyond them waits for the next tick, so
-                that nobody who never stops asking can stop time
+                until `MOST_A_TICK` frames were heard: the rest waits for the next tick, so that
+                nobody who never stops asking can stop time
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -31,7 +31,7 @@ class Ask(NamedTuple):
 
 
 _new = tuple.__new__  # of a question, past its constructor: this is the hot path
-MAX_QUESTIONS = 32
+MOST_A_TICK = 1024
 _Answer = TypeVar("_Answer")
 Steps = Generator[Ask | None, Sequence[_Answer], None]
 Begin = Callable[[int], None]
@@ -69,17 +69,17 @@ class IdealBus:
             if late:
                 frames, late = [*frames, *late], []
             answers = yield _new(Ask, (bus_ns, frames, (), "", ()))
-            asked = 1
+            heard = 0
             while answers:
+                heard += len(answers)
                 tap(bus_ns, answers, 0)
                 replies = self._hear(answers, bus_ns)
                 if not replies:
                     break
                 tap(bus_ns, replies, FROM_DRIVE)
-                if asked == MAX_QUESTIONS:
+                if heard >= MOST_A_TICK:
                     late = replies
                     break
-                asked += 1
                 answers = yield Ask(bus_ns, replies)
             if 0 <= tick < last:
                 t_s = tick * period_ns * 1e-9

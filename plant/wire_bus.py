@@ -126,11 +126,14 @@ class WireBus:
 
     def take(self, said: Sequence[Said]) -> None:
         """What clients said goes to their transmit queues now."""
+        refused: dict[Key, int] = {}
         for key, frame in said:
             node = self._hosts.get(key) or self._host(key)
             if not self.wire.submit(node, frame, self._now_ns):
-                self.refused += 1
-                self._freed.append((key, 1))
+                refused[key] = refused.get(key, 0) + 1
+        if refused:
+            self.refused += sum(refused.values())
+            self._freed += refused.items()
 
     def depart(self, key: Key) -> None:
         """A client has left."""

@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Mapping
 
 from bridge.can_bus import packet as wire
-from bridge.can_bus.traffic import Key, Said, Stamped
+from bridge.can_bus.traffic import Key, Said, Spoken, Stamped
 from bridge.frame import Frame
 
 BACKLOG = 100_000
@@ -61,12 +61,12 @@ class Bus:
         self.listener = listener
         self.queue = queue
         self.controllers = controllers
-        self.said: list[Said] = []
+        self.said: Spoken[Said] = Spoken()
         self.departed: list[Key] = []
         self.stamp_ns = -1  # not powered up yet
         self.clients: list[Connection] = []
         self.held: list[Connection] = []  # not read until what was said is taken
-        self.taken: list[Frame] = []
+        self.taken: Spoken[Frame] = Spoken()
         self.owing = 0
         self.counters = Counters()
 

@@ -12,11 +12,11 @@ they like: what they send is taken at the next instant, what they don't read is 
 a bound (`connection`). A client's frames go to all other clients of its bus, and back to itself
 only if it asked for that. One thread, one epoll, no clock but for the bound.
 
-Whoever sends more than `UNTAKEN` frames of a bus before these are taken is not read until they are:
-its transmit buffer is full then, and nothing is lost. What is no packet, and what is no frame of
-classic CAN, is counted and goes nowhere; the good frames of a packet do. On a bus where frames take
-no time there is nothing on the wire that an error frame could destroy: it goes to all other
-clients, and not to the drives.
+What clients say is taken `TURN` frames at a time (`traffic.Spoken`). Who says so much that as many
+as `UNTAKEN` wait is not read until they are taken: its transmit buffer is full then, and nothing is
+lost. What is no packet, and what is no frame of classic CAN, is counted and goes nowhere; the good
+frames of a packet do. Where frames take no time there is nothing on the wire that an error frame
+could destroy: it goes to all other clients, and not to the drives.
 
 A bus with a `queue` has bit timing: the hub then carries and doesn't forward. Who emulates the wire
 takes with `say` who sent what, gives with `pass_on` what ended when and who had sent it, and tells
@@ -147,7 +147,7 @@ class Hub:
     def say(self, name: str) -> list[Said]:
         """What the clients of a bus with bit timing sent since the last call, in order."""
         bus = self._buses[name]
-        said, bus.said = bus.said, []
+        said = bus.said.take()
         if bus.held:
             self._release(bus)
         return said
@@ -196,14 +196,12 @@ class Hub:
 
     def heard(self) -> list[str]:
         """Buses with something to take."""
-        return [name for name, bus in self._buses.items() if bus.taken or bus.said]
+        return [name for name, bus in self._buses.items() if bus.taken.now or bus.said.now]
 
     def take(self, name: str) -> list[Frame]:
         """What the clients of a bus sent since the last take, in order."""
         bus = self._buses[name]
-        taken = bus.taken
-        if taken:
-            bus.taken = []
+        taken = bus.taken.take()
         if bus.held:
             self._release(bus)
         return taken
@@ -337,11 +335,12 @@ class Hub:
         if frames:
             bus.counters.from_clients += len(frames)
             if bus.queue:
-                bus.said += [Said(client.key, frame) for frame in frames]
+                bus.said.put([Said(client.key, frame) for frame in frames], at_once=client.paced)
             else:
                 if client.own or len(bus.clients) > 1:
                     self._forward(client, frames)
-                bus.taken += _without_errors(frames) if not client.paced else frames
+                heard = frames if client.paced else _without_errors(frames)
+                bus.taken.put(heard, at_once=client.paced)
             if len(bus.taken) + len(bus.said) >= UNTAKEN and not client.paced:
                 client.held = True
                 bus.held.append(client)

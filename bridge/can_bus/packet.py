@@ -124,6 +124,11 @@ def decode(packet: bytes) -> Packet | None:
         if n_1 <= MAX_DATA and n_2 <= MAX_DATA and id_1 <= ID_MASK_11 and id_2 <= ID_MASK_11:
             both = (_new(Frame, (id_1, data_1[:n_1])), _new(Frame, (id_2, data_2[:n_2])))
             return _new(Packet, (kind, flags, count, stamp, both, "", room, (), 0))
+    if size == _ONE.size and packet[0] == FRAMES and packet[2] == 1 and packet[3] == 0:
+        kind, flags, count, room, stamp, can_id, n, data = _ONE.unpack(packet)
+        if n <= MAX_DATA and can_id <= ID_MASK_11:
+            one = (_new(Frame, (can_id, data[:n])),)
+            return _new(Packet, (kind, flags, count, stamp, one, "", room, (), 0))
     if size < _HEADER.size:
         return None
     kind, flags, count, room, stamp = _HEADER.unpack_from(packet)

@@ -1,10 +1,13 @@
 """Frames on a bus with bit timing: when they ended, and whose they were."""
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections import deque
+from collections.abc import Iterable, Mapping
+from typing import Generic, NamedTuple, TypeVar
 
 from bridge.frame import ERR, Frame
 
+TURN = 1024
+"""Frames that others than controllers get onto a bus at a time."""
 Key = str | int
 """A client of a bus: the name of the robot that it controls in lockstep, else a number."""
 
@@ -51,3 +54,37 @@ class Passed(NamedTuple):
     def as_heard_by(self, key: Key) -> Stamped:
         """What it hears, and when that ended."""
         return Stamped(self.end_ns, self.apart.get(key, self.frame) if self.apart else self.frame)
+
+
+_Item = TypeVar("_Item")
+
+
+class Spoken(Generic[_Item]):
+    """What the clients of a bus sent and nobody has taken yet, in order.
+
+    What a controller says in lockstep is taken at once. The others get `TURN` frames through at a
+    time, so that who says very much makes nobody wait: no bus carries more in a tick.
+    """
+
+    __slots__ = ("_late", "now")
+
+    def __init__(self) -> None:
+        self.now: list[_Item] = []  # what will be taken next
+        self._late: deque[_Item] = deque()
+
+    def __len__(self) -> int:
+        return len(self.now) + len(self._late)
+
+    def put(self, items: Iterable[_Item], *, at_once: bool) -> None:
+        """Add what a client said."""
+        if at_once or (len(self.now) < TURN and not self._late):
+            self.now += items
+        else:
+            self._late.extend(items)
+
+    def take(self) -> list[_Item]:
+        """What is next to take."""
+        now, self.now = self.now, []
+        if late := self._late:
+            self.now = [late.popleft() for _ in range(min(TURN, len(late)))]
+        return now

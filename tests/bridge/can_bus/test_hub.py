@@ -12,7 +12,7 @@ from bridge.can_bus import hub as hub_module
 from bridge.can_bus import packet as wire
 from bridge.can_bus import places
 from bridge.can_bus.hub import Hub
-from bridge.can_bus.traffic import Passed
+from bridge.can_bus.traffic import TURN, Passed
 from bridge.frame import ERR, RTR, Frame
 
 SECRET = "told to nobody else"
@@ -210,6 +210,29 @@ def test_replies_of_drives_to_very_many_requests_reach_the_controller(serving) -
     while reader.is_alive():
         serving.hub.collect(0.01)
     assert heard == replies
+
+
+def test_what_a_controller_says_is_taken_at_once_and_what_others_say_a_turn_at_a_time(
+    serving,
+) -> None:
+    controller = serving.join(f"r1\0{SECRET}", wire.PACED)
+    stranger = serving.join()
+    said = [Frame(n % 0x700, n.to_bytes(4, "big")) for n in range(10_000)]
+    for first in range(0, len(said), 1000):
+        stranger.frames(*said[first : first + 1000])
+        serving.serve()
+    controller.frames(Frame(0x70E, b""))
+    serving.serve()
+    first = serving.hub.take("r1")
+    assert Frame(0x70E, b"") in first
+    first.remove(Frame(0x70E, b""))
+    assert len(first) < 2 * TURN
+    taken = first
+    while serving.hub.heard():
+        more = serving.hub.take("r1")
+        assert len(more) <= TURN
+        taken += more
+    assert taken == said
 
 
 def test_who_says_more_than_is_taken_is_not_read_until_it_is(
