@@ -54,10 +54,10 @@ def write_report(run: Path, record: Record | None = None) -> Path:
     folder = path.parent / FIGURES
     try:
         folder.mkdir(exist_ok=True)
-        for item, data in figures:
-            (folder / f"{item.name}.png").write_bytes(data)
     except OSError as error:
-        raise InfrastructureError(f"can't write the figures of {run}: {error}") from error
+        raise InfrastructureError(f"can't make {folder}: {error.strerror or error}") from error
+    for item, data in figures:
+        run_folder.write(folder / f"{item.name}.png", data)
     page = path.parent / PAGE
     run_folder.write(page, _page(summary, scenario, record, figures))
     return page

@@ -42,14 +42,20 @@ def create(scenario_name: str, out: Path | None, *, now: datetime) -> Path:
     return folder
 
 
-def write(path: Path, text: str) -> None:
-    """Write a file of the run.
+def write(path: Path, content: str | bytes) -> None:
+    """Write a file of the run: all of it is there, or what was there before.
 
     Raises:
         InfrastructureError: disk full, no right, ...
     """
+    data = content.encode() if isinstance(content, str) else content
+    part = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        path.write_text(text, "utf-8")
+        try:
+            part.write_bytes(data)
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
     except OSError as error:
         raise InfrastructureError(f"can't write {path}: {error.strerror or error}") from error
 
