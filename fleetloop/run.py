@@ -77,7 +77,6 @@ def run_scenario(source: str, options: Options) -> int:
         note(f"{scenario.name}: {line}")
     started = datetime.now(UTC).astimezone()
     folder = run_folder.create(scenario.name, options.out, now=started)
-    run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
     with (
         stop_on_signals() as stop,
         RunProgress(scenario.name, scenario.ends_at_s, quiet=options.as_json) as progress,
@@ -87,6 +86,7 @@ def run_scenario(source: str, options: Options) -> int:
             progress.show(state.t_ns * 1e-9, state.wall_ns * 1e-9)
 
         try:
+            run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
             if options.in_process:
                 stats = _in_process(scenario, folder, on_progress, stop)
             else:

@@ -61,9 +61,9 @@ def write(path: Path, content: str | bytes) -> None:
 
 
 def remove_if_unused(folder: Path) -> None:
-    """Remove the folder of a run that never started: it holds nothing but the scenario."""
-    if [item.name for item in folder.iterdir()] == [SCENARIO]:
-        (folder / SCENARIO).unlink()
+    """Remove the folder of a run that never started: it holds the scenario at most."""
+    if {item.name for item in folder.iterdir()} <= {SCENARIO}:
+        (folder / SCENARIO).unlink(missing_ok=True)
         folder.rmdir()
 
 

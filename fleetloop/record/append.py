@@ -88,10 +88,10 @@ class AppendedFile:
 
     def discard(self) -> None:
         """Close it and remove it: nothing of it is of use."""
-        is_file = stat.S_ISREG(os.fstat(self._fd).st_mode)
         self.close()
-        if is_file:
-            self._path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            if stat.S_ISREG(self._path.lstat().st_mode):
+                self._path.unlink()
 
     def _put(self, piece: bytes | bytearray) -> None:
         tail, view = self._tail, memoryview(piece)

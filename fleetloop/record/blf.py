@@ -92,7 +92,11 @@ class BlfFile:
         self._flushed_frames = 0  # those of the pending ones that are in the file
         self._objects = 0
         self._uncompressed = _HEADER_SIZE
-        self._file.append(self._header(0, 0, 0))
+        try:
+            self._file.append(self._header(0, 0, 0))
+        except OSError:
+            self._file.discard()
+            raise
 
     def write(self, frames: Array) -> None:
         """Append frames; complete containers go into the file."""

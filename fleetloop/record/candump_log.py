@@ -43,10 +43,10 @@ class CandumpLog:
             self.flush()
 
     def flush(self) -> None:
-        """Put everything so far into the file; what can't be put there is lost."""
-        kept, self._kept = self._kept, bytearray()
-        if kept:
-            self._file.append(kept)
+        """Put everything so far into the file."""
+        if self._kept:
+            self._file.append(bytes(self._kept))
+            self._kept.clear()
 
     def close(self) -> None:
         """Flush and close. Idempotent."""
