@@ -13,10 +13,11 @@ import contextlib
 import ctypes
 import json
 import os
+import resource
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeVar
@@ -36,6 +37,8 @@ CLOSE_S = 1.0
 _PROBE_S = 1.0
 _FIRST_RETRY_S, _LAST_RETRY_S = 0.02, 0.3
 _ATTEMPT_S, _LISTEN_S = 5.0, 10.0
+_HANDSHAKE_S, _SILENT_S = 2.0, 3600
+_LEAST_PENDING, _MOST_PENDING, _LEAST_SESSIONS = 100, 4096, 1000
 _PORT_TRIES = 5
 _POLLED_DEPTH = 4096
 """Messages that wait for who polls; many times more than any schedule lets be on their way."""
@@ -322,14 +325,16 @@ def _listen(
     for _ in range(tries):
         at = endpoint or _loopback()
         config = _config("router")
-        _set(config, "listen/endpoints", [at, *([outside.endpoint] if outside else [])])
+        _set(config, "listen/endpoints", [at, *([_hasty(outside.endpoint)] if outside else [])])
         if outside is not None and outside.tls is not None:
             _set(config, "transport/link/tls", _mutual_tls(outside.tls, "listen"))
+        _accept_many(config, len(access.rights))
         _set(config, "transport/auth/usrpwd/dictionary_file", str(dictionary))
         config.insert_json5("access_control", access.access_control())
         with _few_threads(_OWN):
             session = _open_bounded(config, _LISTEN_S)
         if not isinstance(session, str):
+            _await_first_words([at, *([outside.endpoint] if outside else [])])
             return RouterLink(session, at)
         reason = session or f"nothing within {_LISTEN_S:g} s"
     where = " and ".join(
@@ -338,6 +343,42 @@ def _listen(
     raise InfrastructureError(
         f"can't listen at {where}: already in use, or no such address ({reason})"
     )
+
+
+def _hasty(endpoint: str) -> str:
+    """The same with a bound on how long a handshake of TLS may take."""
+    milliseconds = int(_HANDSHAKE_S * 1e3)
+    return f"{endpoint}#tls_handshake_timeout_ms={milliseconds}" if "tls/" in endpoint else endpoint
+
+
+def _accept_many(config: zenoh.Config, identities: int) -> None:
+    """Let those who open connections and say nothing keep nobody out.
+
+    Each costs a descriptor until `_HANDSHAKE_S`; those beyond the limit are hung up on, and whoever
+    means it tries again at once (`_client`). A quarter of the descriptors stays out of their reach.
+    """
+    descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    pending = min(max(descriptors // 4, 2 * identities, _LEAST_PENDING), _MOST_PENDING)
+    _set(config, "transport/unicast/accept_timeout", int(_HANDSHAKE_S * 1e3))
+    _set(config, "transport/unicast/accept_pending", pending)
+    _set(config, "transport/unicast/max_sessions", _LEAST_SESSIONS + 2 * identities)
+
+
+def _await_first_words(endpoints: Sequence[str]) -> None:
+    """Let the kernel keep connections until their first bytes: who listens here, speaks second.
+
+    The sockets are Zenoh's, which has no setting for it; where they can't be had or the kernel
+    doesn't do it they stay as they are.
+    """
+    ports = {int(port) for at in endpoints if (port := at.rpartition(":")[2]).isdecimal()}
+    for descriptor in Path("/proc/self/fd").iterdir():
+        with contextlib.suppress(OSError):
+            if not str(descriptor.readlink()).startswith("socket:"):
+                continue
+            with socket.socket(fileno=os.dup(int(descriptor.name))) as listener:
+                listens = listener.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
+                if listens and listener.getsockname()[1] in ports:
+                    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_DEFER_ACCEPT, _SILENT_S)
 
 
 def _mutual_tls(files: TlsFiles, side: str) -> dict[str, object]:

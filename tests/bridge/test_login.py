@@ -3,12 +3,13 @@
 import socket
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
 from certificates import certificates
 
-from bridge import access
+from bridge import access, zenoh_link
 from bridge.zenoh_link import RouterLink, open_client, open_router
 from configs.brief import NetworkLink, Outside, TlsFiles
 from configs.errors import InfrastructureError
@@ -99,6 +100,47 @@ def test_who_listens_and_says_nothing_or_hangs_up_is_told_apart(outside: Outside
     with socket.create_server(("127.0.0.1", 0)) as silent:
         login = NetworkLink(RUN, f"tcp/127.0.0.1:{silent.getsockname()[1]}", "agent-r1", "word")
         assert refusal(login, 0.5).endswith("no answer from there")
+
+
+@contextmanager
+def half_open(endpoint: str, count: int, word: bytes) -> Iterator[None]:
+    """So many connections that say no more than `word`."""
+    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    with ExitStack() as held:
+        for _ in range(count):
+            connection = held.enter_context(socket.create_connection((host, int(port)), 5.0))
+            connection.sendall(word)
+        yield
+
+
+def logs_in(login: NetworkLink) -> bool:
+    with open_client(login, 5.0):
+        return True
+
+
+@pytest.mark.parametrize("word", [b"", b"x"])
+def test_connections_that_go_no_further_keep_nobody_out(
+    router: RouterLink, plan: access.AccessPlan, word: bytes
+) -> None:
+    login = NetworkLink(RUN, router.endpoint, "agent-r1", "word")
+    with half_open(router.endpoint, 150, word):  # Zenoh alone takes 100, for ten seconds
+        assert logs_in(login)
+
+
+def test_silent_connections_to_a_listener_with_tls_keep_nobody_out(
+    router: RouterLink, outside: Outside, folder: Path
+) -> None:
+    tls = files(folder, "agent-r1")
+    with half_open(outside.endpoint, 150, b""):
+        assert logs_in(NetworkLink(RUN, outside.endpoint, "agent-r1", "word", tls))
+
+
+def test_whoever_means_it_gets_in_though_more_wait_than_may(
+    plan: access.AccessPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(zenoh_link, "_MOST_PENDING", 20)
+    with open_router(None, plan, tmp_path) as router, half_open(router.endpoint, 60, b"x"):
+        assert logs_in(NetworkLink(RUN, router.endpoint, "agent-r1", "word"))
 
 
 def test_plain_tcp_to_a_listener_with_tls_is_named(router: RouterLink, outside: Outside) -> None:
