@@ -4,7 +4,6 @@
 """
 
 import base64
-import json
 from collections.abc import Iterable, Sequence
 from html import escape
 from importlib import resources
@@ -27,6 +26,7 @@ from fleetloop.results import (
     spread_line,
 )
 from fleetloop.summary import RunStats, Summary, summarise
+from fleetloop.summary_file import read_summary
 
 PAGE = "report.html"
 FIGURES = "figures"
@@ -64,9 +64,8 @@ def write_report(run: Path, record: Record | None = None) -> Path:
 
 
 def _summary(folder: Path, record: Record, scenario: Scenario) -> Summary:
-    try:
-        summary: Summary = json.loads((folder / run_folder.SUMMARY).read_text("utf-8"))
-    except (OSError, ValueError):
+    summary = read_summary(folder)
+    if summary is None:
         reason = f"the run left no {run_folder.SUMMARY}"
         return summarise(record, scenario, RunStats("unknown", ended="aborted", reason=reason))
     return summary
