@@ -88,7 +88,7 @@ def _page(
     return template.substitute(
         title=escape(f"Fleetloop: {scenario.name}"),
         subtitle=escape(scenario.description),
-        lost=escape(_lost(record)),
+        lost=escape(f"The record isn't all there: {record.shortage()}." if record.lost else ""),
         verdict=escape(summary["verdict"]),
         reason=escape(summary["reason"]),
         robots=_table(robot_header(summary), robot_rows(summary)),
@@ -100,12 +100,6 @@ def _page(
         facts=_table(("", ""), _facts(summary)),
         scenario=escape(record.scenario_toml),
     )
-
-
-def _lost(record: Record) -> str:
-    if not record.lost:
-        return ""
-    return f"The record isn't all there: {record.lost}. In it are {record.extent()}."
 
 
 def _facts(summary: Summary) -> Iterable[tuple[str, str]]:

@@ -123,6 +123,8 @@ def trouble_lines(summary: Summary) -> Iterator[str]:
         yield from (f"{robot}: {notice}" for notice in notices)
     for bus, trouble in summary["bus_troubles"].items():
         yield f"BUS {bus}: {trouble}"
+    if summary["record_lost"]:
+        yield f"RECORD not all there: {summary['record_lost']}"
 
 
 def realtime_lines(summary: Summary) -> Iterator[str]:

@@ -242,8 +242,6 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options)
     except RecordError as error:
         say(f"{stats.ended}: {stats.reason}; {error}")
         return EXIT_CODES["aborted" if stats.ended == "completed" else stats.ended]
-    if recorded.lost:
-        note(f"{record}: {recorded.lost}; in it are {recorded.extent()}")
     summary = summarise(recorded, scenario, stats)
     unsaved: InfrastructureError | None = None
     try:

@@ -97,10 +97,10 @@ def read_record(run: Path, *, partial: bool) -> Record:
     """
     record = Record.open(record_of(run), damaged=partial)
     if record.lost:
-        text = f"{record.path}: {record.lost}; in it are {record.extent()}"
+        text = f"{record.path}: {record.shortage()}"
         if not partial:
             raise IncompleteError(f"{text}; --partial takes that")
-        note(f"{text}")
+        note(text)
     return record
 
 

@@ -85,6 +85,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         "s_spread": _spread_of(record.controller),
         "expectations": expected,
         "cut_short": cut_short,
+        "record_lost": record.shortage(),
         "stopped_robots": stats.stopped_robots,
         "notices": stats.notices,
         "overruns": stats.overruns,

@@ -87,6 +87,7 @@ class _Summary(BaseModel):
     s_spread: _Spread | None
     expectations: list[_Expectation]
     cut_short: dict[str, str]
+    record_lost: str
     stopped_robots: dict[str, str]
     notices: dict[str, list[str]]
     overruns: int

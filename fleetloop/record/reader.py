@@ -60,6 +60,10 @@ class Record:
         plant, controller = rows(Kind.PLANT), rows(Kind.CONTROLLER)
         return cls(path, robots, plant, controller, found.head.scenario_toml, found.lost)
 
+    def shortage(self) -> str:
+        """What isn't in it and how much is; empty if it is all there."""
+        return f"{self.lost}; in it are {self.extent()}" if self.lost else ""
+
     def extent(self) -> str:
         """How much is there: ticks of every robot, and up to what time; alike robots together."""
         alike: dict[str, list[str]] = {}
