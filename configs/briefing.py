@@ -292,7 +292,7 @@ def _drive_model(scenario: Scenario, number: int) -> DriveModel:
         overspeed_ratio=drive.overspeed_ratio,
         torque_limiters=limited,
         heartbeat_period_ns=round(drive.heartbeat_period_s * 1e9),
-        encoder_period_ns=round(scenario.clock.control_period_s * 1e9),
+        encoder_period_ns=round((drive.encoder_period_s or scenario.clock.control_period_s) * 1e9),
         torques_period_ns=round(drive.torques_period_s * 1e9),
         watchdog_ns=round(drive.watchdog_s * 1e9),
         zero_torque_on_disarm=drive.zero_torque_on_disarm,

@@ -101,6 +101,7 @@ def _periods(scenario: Scenario) -> Iterator[Problem]:
 
 _WHOLE_MILLISECONDS = (
     "heartbeat_period_s",
+    "encoder_period_s",
     "torques_period_s",
     "error_period_s",
     "iq_period_s",
@@ -120,9 +121,10 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
     if least_s > most_s:
         yield Problem("drive.command_latency_s", [least_s, most_s], "least before most")
     for key in _WHOLE_MILLISECONDS:
-        period_s = getattr(drive, key)
+        period_s = getattr(drive, key) or 0.0
         if abs(period_s * 1e3 - round(period_s * 1e3)) > 1e-6:
             yield Problem(f"drive.{key}", period_s, "whole milliseconds, as drives have them")
+    yield from _encoder_period(scenario)
     if drive.under_voltage_V >= drive.over_voltage_V:
         above = f"must be below drive.over_voltage_V = {drive.over_voltage_V:g}"
         yield Problem("drive.under_voltage_V", drive.under_voltage_V, above)
@@ -143,6 +145,19 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
             f"must be below half of encoder.pll_rate_Hz = {encoder.pll_rate_Hz:g}, as drives want"
             " it: twice the bandwidth times the loop period is a gain below 1",
         )
+
+
+def _encoder_period(scenario: Scenario) -> Iterator[Problem]:
+    period_s, control_s = scenario.drive.encoder_period_s, scenario.clock.control_period_s
+    if period_s is None:
+        return
+    ratio = control_s / period_s
+    if ratio < 1.0 - 1e-6:
+        right = f"at most clock.control_period_s = {control_s:g}: a tick needs news of both wheels"
+        yield Problem("drive.encoder_period_s", period_s, right)
+    elif scenario.clock.mode == "lockstep" and abs(ratio - round(ratio)) > 1e-6:
+        right = f"must divide clock.control_period_s = {control_s:g}, the tick of lockstep"
+        yield Problem("drive.encoder_period_s", period_s, right)
 
 
 def _nodes(scenario: Scenario) -> Iterator[Problem]:

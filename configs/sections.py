@@ -327,6 +327,11 @@ class Drive(Section):
     right_node: Node = 0
     left_node: Node = 1
     heartbeat_period_s: Positive = 0.1
+    encoder_period_s: Positive | None = Field(
+        None,
+        description="of encoder frames, whole milliseconds, at most one control period, which it is"
+        " if not given; in lockstep on ideal buses they come with the ticks",
+    )
     torques_period_s: NotNegative = Field(
         0.0, description="this message and the next five: whole milliseconds; 0: only on request"
     )

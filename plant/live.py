@@ -1,7 +1,8 @@
 """One bus in real time: its robots' drives and bodies, moved to whatever the wall clock says.
 
 IdealLive   frames take no time: who sends torques is answered at once, what is cyclic goes out
-            with the ticks; any bus that is carried by somebody else is one of these as well
+            with the ticks, or in its own time where encoder frames come more often than these; any
+            bus that is carried by somebody else is one of these as well
 WireLive    a bus of ours with bit timing: frames end when the wire says, drives answer cyclically
 """
 
@@ -29,6 +30,7 @@ class IdealLive:
         self._end = end
         self._zero_ns = zero_ns
         self._step_ns = step_ns
+        self._drives = [drive for unit in units for drive in unit.drives]
 
     @property
     def crossed(self) -> int:
@@ -36,9 +38,9 @@ class IdealLive:
         counters = self._end.counters(self._name)
         return counters.from_drives + counters.from_clients
 
-    def next_ns(self) -> int | None:
-        """When something happens of itself: never, but for the ticks."""
-        return None
+    def next_ns(self) -> int:
+        """When a drive has something to say."""
+        return min(drive.next_due_ns for drive in self._drives)
 
     def hear(self, now_ns: int) -> None:
         """Take what others sent, and answer."""
@@ -55,7 +57,10 @@ class IdealLive:
             self._end.deliver(self._name, now_ns, replies)
 
     def advance(self, now_ns: int) -> None:
-        """Bodies move when somebody asks."""
+        """Let drives say what is due; bodies move when somebody asks."""
+        if self.next_ns() <= now_ns:
+            self._move(now_ns)
+            self.speak(now_ns)
 
     def tick(self, bus_ns: int) -> None:
         """Be where a tick is."""
@@ -87,7 +92,7 @@ class WireLive:
         """How many frames crossed the bus."""
         return self._bus.crossed
 
-    def next_ns(self) -> int | None:
+    def next_ns(self) -> int:
         """When the next frame ends or drive acts."""
         return self._bus.next_ns()
 

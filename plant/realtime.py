@@ -48,7 +48,11 @@ class RealtimeLoop:
         self._end = end
         self._report = report
         self._buses = live_buses(brief, units, end, hub, taps)
-        self._wires = [bus for bus in self._buses.values() if isinstance(bus, WireLive)]
+        often = any(
+            robot.drive.encoder_period_ns < brief.schedule.period_ns for robot in brief.robots
+        )
+        self._acting = [bus for bus in self._buses.values() if often or isinstance(bus, WireLive)]
+        """Buses on which something happens between two ticks."""
         self._poses = dict(zip(units, poses, strict=True))
         self._rows = dict(zip(units, rows, strict=True))
         self._tick = -brief.schedule.countdown_ticks
@@ -90,16 +94,14 @@ class RealtimeLoop:
 
     def _serve(self, wait_s: float, power_up_ns: int) -> None:
         """Serve the buses until something came or is due, at most `wait_s`."""
-        for wire in self._wires:
-            next_ns = wire.next_ns()
-            if next_ns is not None:
-                left_ns = next_ns + power_up_ns - time.monotonic_ns()
-                wait_s = min(wait_s, max(left_ns, 0) * 1e-9)
+        for acting in self._acting:
+            left_ns = acting.next_ns() + power_up_ns - time.monotonic_ns()
+            wait_s = min(wait_s, max(left_ns, 0) * 1e-9)
         self._end.serve(wait_s)
         for bus in self._end.heard():
             self._buses[bus].hear(time.monotonic_ns() - power_up_ns)
-        for wire in self._wires:
-            wire.advance(time.monotonic_ns() - power_up_ns)
+        for acting in self._acting:
+            acting.advance(time.monotonic_ns() - power_up_ns)
 
     def _keep_tick(self, power_up_ns: int) -> None:
         """What a tick brings, bus by bus; who sends torques meanwhile doesn't wait for all."""

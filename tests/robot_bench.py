@@ -15,7 +15,8 @@ from configs.loading import load
 
 NOWHERE = NetworkLink("test", "", "", "")
 AT_ONCE = "drive.boot_s=0.0"  # a reboot takes no time
-SCENARIO = load("two_robots", (AT_ONCE,))
+BARE = AT_ONCE, "expect=[]"
+SCENARIO = load("two_robots", BARE)
 SET_TORQUE = 0x0E
 ZERO = bytes(4)
 
@@ -24,7 +25,7 @@ class Bench:
     """An agent of two_robots with its two drives standing still, and its neighbour's voice."""
 
     def __init__(self, robot: str = "r2", *overrides: str, **changes) -> None:
-        scenario = load("two_robots", (AT_ONCE, *overrides)) if overrides else SCENARIO
+        scenario = load("two_robots", (*BARE, *overrides)) if overrides else SCENARIO
         brief: AgentBrief = agent_brief(scenario, robot, network=NOWHERE, bus=())
         brief = replace(brief, **changes)
         model = plant_brief(scenario, network=NOWHERE).robots[0].drive

@@ -273,3 +273,10 @@ def test_own_commands_that_an_interface_hands_back_are_not_somebody_elses(monkey
     rig.wire.others = {S // 10: [Frame(0x00E, bytes(4))] * 3}
     rig.run()
     assert rig.bench.agent.guard.notices() == ["right drive (node 0): 3 commands of somebody else"]
+
+
+def test_drives_that_say_more_often_where_they_are_are_no_second_drive(monkeypatch) -> None:
+    rig = Rig(monkeypatch, *REARM, "drive.encoder_period_s=0.001", duration_s=1.5)
+    rig.run()
+    assert rig.events == []
+    assert rig.bench.agent.brief.drives.encoder_period_ns == 1_000_000

@@ -93,6 +93,12 @@ def test_the_schema_in_the_package_is_the_schema_of_the_types() -> None:
         ("drive.protocol='canopen'", "drive.protocol", "odrive"),
         ("drive.left_node=0", "drive.left_node", "differ from drive.right_node"),
         ("drive.iq_period_s=0.0015", "drive.iq_period_s", "whole milliseconds"),
+        ("drive.encoder_period_s=0.0005", "drive.encoder_period_s", "whole milliseconds"),
+        (
+            "drive.encoder_period_s=0.002",
+            "drive.encoder_period_s",
+            "at most clock.control_period_s",
+        ),
         ("drive.under_voltage_V=40.0", "drive.under_voltage_V", "below drive.over_voltage_V = 30"),
         ("drive.derate_from_C=130.0", "drive.derate_from_C", "below drive.derate_to_C = 120"),
         ("drive.firmware='0.5.6'", "drive.firmware", "0.6.10"),

@@ -173,6 +173,16 @@ def test_what_crossed_the_wire_is_counted_whoever_sent_it() -> None:
     assert driven.bus.crossed <= 20 * 4 + 2 * 2  # encoders, torques; heartbeats
 
 
+def test_encoder_frames_have_a_period_of_their_own() -> None:
+    driven = Driven(
+        lambda _: torques(0.0, 0.0), "clock.control_period_s=0.005", "drive.encoder_period_s=0.001"
+    )
+    asks = driven.ticks(4)
+    ended = [passed.frame.can_id for ask in asks for passed in ask.passed]
+    assert ended.count(identifier(0, Command.GET_ENCODER_ESTIMATES)) == 3 * 5 + 1
+    assert driven.tick_number == -driven.schedule.countdown_ticks + 4
+
+
 def test_error_frames_reach_the_clients_and_the_frame_is_sent_again() -> None:
     from bridge.can_bus.disturbances import Disturbance, Kind
     from bridge.frame import ERR
