@@ -126,12 +126,12 @@ def serve(
     `orphaned` is called, in a thread of its own, as soon as there is none.
     """
     if sys.stdin.isatty():
-        print(f"{name}: started by `fleetloop run`, not by hand", file=sys.stderr)  # noqa: T201
+        _tell(f"{name}: started by `fleetloop run`, not by hand")
         return 2
     keep_to_itself()
     brief = _read_brief(sys.stdin.buffer)
     if not isinstance(brief, kind):
-        print(f"{name}: no {kind.__name__} on standard input", file=sys.stderr)  # noqa: T201
+        _tell(f"{name}: no {kind.__name__} on standard input")
         return 2
     name_process(name)
     stop = Stop()
@@ -152,7 +152,7 @@ def serve(
             return error.exit_code
         word = None if peer_lost else str(error)
     if word and stop.reason == LAUNCHER_GONE:
-        print(f"{name}: {LAUNCHER_GONE}; {word}", file=sys.stderr)  # noqa: T201
+        _tell(f"{name}: {LAUNCHER_GONE}; {word}")
     return 0
 
 
@@ -234,4 +234,10 @@ def _say(status: Status, name: str) -> None:
     try:
         os.write(1, status.to_line())
     except OSError:
-        print(f"{name}: {status.error}", file=sys.stderr)  # noqa: T201
+        _tell(f"{name}: {status.error}")
+
+
+def _tell(text: str) -> None:
+    """Say it on the terminal, if there is one."""
+    with contextlib.suppress(OSError, ValueError):
+        print(text, file=sys.stderr, flush=True)  # noqa: T201

@@ -1,5 +1,28 @@
-"""`python -m fleetloop` is `fleetloop`."""
+"""`fleetloop`: what has to be right before anything heavy is imported, then the command line.
 
-from fleetloop.cli import main
+Until a verb takes signals itself, nothing is open that would have to be closed: a signal ends the
+process at once and silently, wherever an import may be.
+"""
 
-main()
+import _signal  # type: ignore[import-not-found]  # `signal` takes imports of its own
+import os
+
+INTERRUPTED = 130
+
+for _number in (_signal.SIGINT, _signal.SIGTERM):
+    if _signal.getsignal(_number) != _signal.SIG_IGN:
+        _signal.signal(_number, lambda *_: os._exit(INTERRUPTED))
+
+
+def main() -> None:
+    """Run the command line."""
+    from fleetloop import streams
+
+    streams.settle()
+    from fleetloop.cli import main as command_line
+
+    command_line()
+
+
+if __name__ == "__main__":
+    main()

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 
 from configs.briefing import robot_briefs
@@ -16,7 +15,7 @@ from configs.overrides import Overrides
 from configs.scenario import Scenario
 from configs.stability import Finding, findings
 from fleetloop.bus_load import bus_findings
-from fleetloop.terminal import say
+from fleetloop.terminal import ResultConsole, say, say_json
 
 FINE, UNSOUND, WRONG = 0, 1, 2
 _MARKS = {"ok": "[green]ok[/]", "warning": "[yellow]warning[/]", "error": "[red]error[/]"}
@@ -37,11 +36,11 @@ def check_scenario(
     except ScenarioError as error:
         if not as_json:
             raise
-        say(_json(problems=_problems(error)))
+        _say_json(problems=_problems(error))
         return WRONG
     unsound = any(finding.level == "error" for finding in found)
     if as_json:
-        say(_json(findings=found))
+        _say_json(findings=found)
         return UNSOUND if unsound else FINE
     graph = scenario.topology
     table = Table(
@@ -52,7 +51,7 @@ def check_scenario(
     )
     for finding in found:
         table.add_row(_MARKS[finding.level], finding.title, finding.text)
-    Console().print(table)
+    ResultConsole().print(table)
     say("would not work as it is" if unsound else "sound")
     return UNSOUND if unsound else FINE
 
@@ -85,11 +84,13 @@ def _json_value(value: object) -> object:
         return str(value)
 
 
-def _json(*, findings: Sequence[Finding] = (), problems: Sequence[dict[str, object]] = ()) -> str:
+def _say_json(
+    *, findings: Sequence[Finding] = (), problems: Sequence[dict[str, object]] = ()
+) -> None:
     sound = not problems and all(finding.level != "error" for finding in findings)
     listed = [asdict(finding) for finding in findings]
     whole = {"sound": sound, "problems": list(problems), "findings": listed}
-    return json.dumps(whole, indent=2, ensure_ascii=False)
+    say_json(whole)
 
 
 def place_findings(scenario: Scenario, deployment: Deployment) -> list[Finding]:
@@ -108,15 +109,15 @@ def list_scenarios(*, as_json: bool) -> None:
     """Print the shipped scenarios."""
     if as_json:
         each = [{"name": name, "description": load(name).description} for name in shipped()]
-        say(json.dumps({"shipped": each}, indent=2, ensure_ascii=False))
+        say_json({"shipped": each})
         return
     table = Table(box=None, show_header=False, padding=(0, 1))
     for name in shipped():
         table.add_row(name, load(name).description)
     say("Shipped scenarios, for `fleetloop run NAME` and `fleetloop check NAME`:")
-    Console().print(table)
+    ResultConsole().print(table)
 
 
 def print_schema() -> None:
     """Print the JSON Schema of scenario files."""
-    say(json.dumps(json_schema(), indent=2))
+    say_json(json_schema())

@@ -5,7 +5,6 @@ Exit status: 0 held, 1 an expectation failed or was not reached, two runs differ
 """
 
 import os
-import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -382,7 +381,6 @@ def _common(
 
 def main() -> None:
     """Run the command line; every error that a user can cause is one line and an exit status."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     status: str | int | None = 0
     try:
         app()

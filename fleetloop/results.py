@@ -6,15 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from rich import box
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from bridge.profile import PARTS
 from fleetloop.summary import ERRORS, FINAL_S, Summary
-from fleetloop.terminal import say
+from fleetloop.terminal import ResultConsole, say
 
 _MARKS = {True: "held", False: "FAILED", None: "not reached"}
+_RULE = box.Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
+"""`box.SIMPLE_HEAD` in ASCII."""
 HOLDS_PERCENT = 2.0
 """More misses than this, and the machine is said not to hold the rate."""
 _SYMBOLS = {"x_e_m": ("x_e", "m"), "y_e_m": ("y_e", "m"), "theta_e_rad": ("θ_e", "rad")}
@@ -22,14 +23,18 @@ _SYMBOLS = {"x_e_m": ("x_e", "m"), "y_e_m": ("y_e", "m"), "theta_e_rad": ("θ_e"
 
 def print_results(summary: Summary, folder: Path) -> None:
     """Print the table of a run, its verdict, and where its files are."""
-    console = Console(file=sys.stdout, highlight=False)
+    console = ResultConsole(file=sys.stdout, highlight=False)
 
     def line(text: str, style: str | None = None) -> None:
         console.print(text, style=style, soft_wrap=True, markup=False)
 
     if summary["robots"]:
         title = f"{summary['scenario']}: path following, {summary['mode']}"
-        table = Table(title=title, box=box.SIMPLE_HEAD, pad_edge=False)
+        table = Table(
+            title=title,
+            box=_RULE if console.options.ascii_only else box.SIMPLE_HEAD,
+            pad_edge=False,
+        )
         first, *others = robot_header(summary, break_lines=True)
         table.add_column(first, no_wrap=True)
         for header in others:
@@ -69,7 +74,7 @@ def _profile(profile: dict[str, dict[str, float]]) -> Table:
     """Processor time per tick, processes by parts."""
     parts = [part for part in PARTS if any(part in shares for shares in profile.values())]
     title = "processor time per tick [µs]; bus with its system calls, Zenoh with its threads"
-    table = Table(title=title, box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(title=title, box=_rules(), pad_edge=False)
     table.add_column("process", no_wrap=True)
     for name in (*parts, "all"):
         table.add_column(name, justify="right")
@@ -178,3 +183,7 @@ def _cells(values: dict[str, Any]) -> list[str]:
 
 def _time(value: float | None) -> str:
     return "not" if value is None else f"{value:.2f} s"
+
+
+def _rules() -> box.Box:
+    return _RULE if ResultConsole().options.ascii_only else box.SIMPLE_HEAD

@@ -26,7 +26,7 @@ from fleetloop.record.scan import RecordError
 from fleetloop.results import print_report, print_results
 from fleetloop.signals import stop_on_signals
 from fleetloop.summary import RunStats, Summary, summarise, to_json
-from fleetloop.terminal import RunProgress, note, say
+from fleetloop.terminal import RunProgress, note, say, say_json
 
 EXIT_CODES = {"held": 0, "failed": 1, "not checked": 1, "aborted": 3, "interrupted": 130}
 
@@ -249,7 +249,7 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options)
     except InfrastructureError as error:
         unsaved = error  # results first
     if options.as_json:
-        say(to_json(summary | {"folder": str(folder)}).rstrip())
+        say_json(summary | {"folder": str(folder)})
     else:
         print_results(summary, folder)
     if unsaved is not None:

@@ -1,25 +1,52 @@
-"""Ctrl-C, SIGTERM and a closed terminal, as a request for an orderly stop."""
+"""Ctrl-C, SIGTERM and a closed terminal: as a request for an orderly stop, or as an exception."""
 
 import signal
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from types import FrameType
+from typing import ParamSpec, TypeVar
 
 from bridge.process import Stop
+
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
 
 
 @contextmanager
 def stop_on_signals() -> Iterator[Stop]:
-    """Signals ask for an orderly stop while this lasts."""
+    """Signals ask for an orderly stop while this lasts; under `nohup` a closed terminal doesn't."""
     stop = Stop()
 
     def request(number: int, _: FrameType | None) -> None:
         stop.request(f"interrupted by {signal.Signals(number).name}")
 
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        numbers.append(signal.SIGHUP)
     before = {number: signal.signal(number, request) for number in numbers}
     try:
         yield stop
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def interruptible(verb: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
+    """Ctrl-C and SIGTERM raise `KeyboardInterrupt` while this verb runs."""
+
+    @wraps(verb)
+    def run(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
+        before = {}
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                if signal.getsignal(number) is not signal.SIG_IGN:
+                    before[number] = signal.signal(number, signal.default_int_handler)
+        try:
+            return verb(*args, **kwargs)
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    return run

@@ -4,21 +4,47 @@ On a terminal a progress bar with the real-time factor moves; elsewhere a plain 
 seconds, so that a CI log shows life and nothing else.
 """
 
+import json
 import sys
 import time
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn
+from rich.text import Text
+
+from fleetloop.streams import forget_output, spelled_for
 
 PLAIN_EVERY_S = 5.0
 
 
 def say(text: str) -> None:
-    """Print a result."""
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()
+    """Print a result; that nobody reads it any more is no failure."""
+    try:
+        sys.stdout.write(text + "\n")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        forget_output()
+
+
+def say_json(value: object) -> None:
+    """Print a result for programs: in UTF-8, or in ASCII where the stream has another encoding."""
+    unicode = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
+    say(json.dumps(value, indent=2, ensure_ascii=not unicode))
+
+
+class ResultConsole(Console):
+    """Standard output for tables; that nobody reads it any more is no failure."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """As the stream will show it."""
+        return super().render_str(spelled_for(self.file, text), **options)
+
+    def on_broken_pipe(self) -> None:
+        """Go on in silence."""
+        self.quiet = True
+        forget_output()
 
 
 def note(text: str) -> None:

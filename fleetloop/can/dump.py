@@ -9,7 +9,6 @@ a silence, when nobody reads any more, or by a signal (exit status 130).
 
 import contextlib
 import io
-import os
 import sys
 import time
 from collections import Counter
@@ -25,6 +24,8 @@ from fleetloop.can import error_frames, filters, text
 from fleetloop.can.cansimple import words
 from fleetloop.can.client import Heard, Listener, open_bus
 from fleetloop.can.filters import Filter
+from fleetloop.signals import interruptible
+from fleetloop.streams import forget_output
 from fleetloop.terminal import note
 
 ANY = "any"
@@ -119,6 +120,7 @@ class Printer:
         return shown
 
 
+@interruptible
 def dump(targets: Sequence[str], options: Options) -> int:
     """Print the frames of buses, each named as `BUS[,filter]*`; return the exit status.
 
@@ -143,7 +145,7 @@ def dump(targets: Sequence[str], options: Options) -> int:
             except BrokenPipeError:
                 listener.abandoned = True
             if listener.abandoned:
-                _forget_output()
+                forget_output()
                 return 0
             for farewell in listener.farewells:
                 note(f"fleetloop: {farewell}")
@@ -205,11 +207,3 @@ def _descriptor(stream: TextIO) -> int | None:
         return stream.fileno()
     except (io.UnsupportedOperation, ValueError):
         return None
-
-
-def _forget_output() -> None:
-    """Nobody reads: what is still buffered must not raise when the interpreter ends."""
-    with contextlib.suppress(OSError, ValueError):
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
-        os.close(nowhere)

@@ -25,6 +25,7 @@ from configs.errors import InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.echo import EchoGuard
 from fleetloop.can.far_bus import FarBus
+from fleetloop.signals import interruptible
 from fleetloop.terminal import note, say
 
 SEND_S = 0.01
@@ -190,6 +191,7 @@ class Gateway:
         counters.passes(now_s)
 
 
+@interruptible
 def join(channel: str, far_bus: FarBus, *, retry_s: float = 0.0, with_rates: bool = False) -> int:
     """Join a bus to another until its run ends or a signal comes; return the exit status.
 

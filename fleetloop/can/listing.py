@@ -15,6 +15,7 @@ from bridge.can_bus import places
 from configs.errors import InfrastructureError
 from fleetloop.can.census import Census, Node
 from fleetloop.can.client import Listener, open_bus
+from fleetloop.signals import interruptible
 from fleetloop.terminal import note, say
 
 _CONNECTED = "03"
@@ -38,6 +39,7 @@ class BusReport:
     problem: str = ""
 
 
+@interruptible
 def list_buses(*, seconds: float, bit_rate: int, as_json: bool) -> int:
     """Listen to all buses for `seconds` and print what there is; return the exit status."""
     try:

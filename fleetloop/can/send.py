@@ -13,11 +13,13 @@ from bridge.can_bus.convert import to_message
 from configs.errors import InfrastructureError
 from fleetloop.can import text
 from fleetloop.can.client import open_bus
+from fleetloop.signals import interruptible
 
 FULL_S = 2.0
 """How long a full bus may take to have room again."""
 
 
+@interruptible
 def send(
     channel: str,
     frames: Sequence[str],

@@ -22,6 +22,7 @@ from bridge.can_bus.interface import BusClosedError, FleetloopBus
 from configs.errors import InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.slcan_adapter import Adapter
+from fleetloop.signals import interruptible
 from fleetloop.terminal import note, say
 
 KEPT_BYTES = 64 * 1024
@@ -124,6 +125,7 @@ class Port:
             del self._kept[:written]
 
 
+@interruptible
 def offer(channel: str, link: Path | None) -> int:
     """Offer a bus until its run ends or a signal comes; return the exit status.
 
