@@ -129,6 +129,7 @@ def serve(
         _tell(f"{name}: started by `fleetloop run`, not by hand")
         return 2
     keep_to_itself()
+    status_line = reserve_stdout()
     brief = _read_brief(sys.stdin.buffer)
     if not isinstance(brief, kind):
         _tell(f"{name}: no {kind.__name__} on standard input")
@@ -148,12 +149,23 @@ def serve(
         if peer_lost:
             stop.requested_soon()
         if stop.reason != LAUNCHER_GONE:
-            _say(Status(str(error), error.exit_code, type(error).__name__), name)
+            _say(status_line, Status(str(error), error.exit_code, type(error).__name__), name)
             return error.exit_code
         word = None if peer_lost else str(error)
     if word and stop.reason == LAUNCHER_GONE:
         _tell(f"{name}: {LAUNCHER_GONE}; {word}")
     return 0
+
+
+def reserve_stdout() -> int:
+    """Give standard output a descriptor of its own, and return it.
+
+    What libraries write to descriptor 1, as Zenoh does with its log, goes to standard error.
+    """
+    own = os.dup(1)
+    with contextlib.suppress(OSError):  # standard error may be closed
+        os.dup2(2, 1)
+    return own
 
 
 def name_process(name: str) -> None:
@@ -230,9 +242,9 @@ def _watch_lifeline(stop: Stop, orphaned: Callable[[], None]) -> None:
     os._exit(3)
 
 
-def _say(status: Status, name: str) -> None:
+def _say(descriptor: int, status: Status, name: str) -> None:
     try:
-        os.write(1, status.to_line())
+        os.write(descriptor, status.to_line())
     except OSError:
         _tell(f"{name}: {status.error}")
 

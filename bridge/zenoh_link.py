@@ -25,7 +25,9 @@ from typing import Self, TypeVar
 import zenoh
 from zenoh.handlers import Callback, FifoChannel
 
+from bridge import zenoh_log
 from bridge.access import AccessPlan
+from bridge.denials import Denials, directives, is_ours
 from bridge.link import Arrival, Inbox, Publisher
 from bridge.login import Obstacle, obstacle
 from configs.brief import NetworkLink, Outside, TlsFiles
@@ -216,9 +218,11 @@ class PolledLink(ZenohLink):
 class RouterLink(ZenohLink):
     """The launcher's link: its session is the router."""
 
-    def __init__(self, session: zenoh.Session, endpoint: str) -> None:
+    def __init__(self, session: zenoh.Session, endpoint: str, denials: Denials) -> None:
         super().__init__(session)
         self.endpoint = endpoint
+        self.denials = denials
+        """Whom the router refused, from its log."""
 
 
 def open_client(network: NetworkLink, timeout_s: float) -> ZenohLink:
@@ -293,15 +297,18 @@ def open_router(
     Raises:
         InfrastructureError: an endpoint is taken or can't be listened on.
     """
+    denials = Denials()
+    zenoh_log.begin(directives(every_message=outside is not None))
     dictionary = folder / "users"
     dictionary.touch(mode=0o600)
     dictionary.write_text(access.dictionary(), "utf-8")
-    try:
-        link = _listen(endpoint, access, dictionary, outside)
-    finally:
-        dictionary.unlink()
-    with link:
-        yield link
+    with zenoh_log.listening(denials.take, is_ours):
+        try:
+            session, at = _listen(endpoint, access, dictionary, outside)
+        finally:
+            dictionary.unlink()
+        with RouterLink(session, at, denials) as link:
+            yield link
 
 
 @contextlib.contextmanager
@@ -319,7 +326,7 @@ def _few_threads(tx: str) -> Iterator[None]:
 
 def _listen(
     endpoint: str | None, access: AccessPlan, dictionary: Path, outside: Outside | None
-) -> RouterLink:
+) -> tuple[zenoh.Session, str]:
     tries = 1 if endpoint else _PORT_TRIES
     reason = ""
     for _ in range(tries):
@@ -335,7 +342,7 @@ def _listen(
             session = _open_bounded(config, _LISTEN_S)
         if not isinstance(session, str):
             _await_first_words([at, *([outside.endpoint] if outside else [])])
-            return RouterLink(session, at)
+            return session, at
         reason = session or f"nothing within {_LISTEN_S:g} s"
     where = " and ".join(
         [endpoint or "any loopback port", *([outside.endpoint] if outside is not None else [])]
@@ -392,7 +399,7 @@ def _mutual_tls(files: TlsFiles, side: str) -> dict[str, object]:
 
 
 def _config(mode: str) -> zenoh.Config:
-    zenoh.init_log_from_env_or("off")
+    zenoh_log.begin()
     config = zenoh.Config()
     _set(config, "mode", mode)
     _set(config, "scouting/multicast/enabled", False)

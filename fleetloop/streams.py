@@ -33,8 +33,19 @@ def settle() -> None:
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # the lowest number is free
     if sys.stdin is None:
         sys.stdin = open(_INPUT, encoding="utf-8", closefd=False)  # noqa: SIM115
-    sys.stdout = _again(_Results, sys.stdout, _OUTPUT)
+    sys.stdout = _again(_Results, _without_log(sys.stdout), _OUTPUT)
     sys.stderr = _again(_Notes, sys.stderr, _ERROR)
+
+
+def _without_log(stream: TextIO | None) -> TextIO | None:
+    """Standard output where Zenoh's log is not: it writes to descriptor 1 if RUST_LOG is set."""
+    if not os.environ.get("RUST_LOG") or not isinstance(stream, io.TextIOWrapper):
+        return stream
+    from bridge.process import reserve_stdout
+
+    stream.flush()
+    own = io.BufferedWriter(io.FileIO(reserve_stdout(), "w", closefd=False))
+    return io.TextIOWrapper(own, stream.encoding, line_buffering=stream.line_buffering)
 
 
 def register() -> None:

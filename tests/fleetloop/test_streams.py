@@ -80,6 +80,16 @@ def test_processes_of_a_run_do_without_streams_too(tmp_path: Path) -> None:
     assert (tmp_path / "run" / "summary.json").exists()
 
 
+@pytest.mark.system
+def test_zenohs_log_goes_to_standard_error_that_of_the_roles_too(tmp_path: Path) -> None:
+    verb = [arg for arg in IN_PROCESS if arg != "--in-process"]
+    done = fleetloop(*verb, "--json", "--out=run", cwd=tmp_path, RUST_LOG="info")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["scenario"] == "two_robots"
+    zenohs = [line for line in done.stderr.splitlines() if b"Using ZID" in line]
+    assert len(zenohs) == 5  # launcher, plant, recorder, two controllers
+
+
 @pytest.mark.parametrize("args", [IN_PROCESS, ("check", "paper"), ("check", "paper", "--json")])
 def test_a_reader_that_left_is_no_failure(args: tuple[str, ...], tmp_path: Path) -> None:
     unread, output = os.pipe()

@@ -1,0 +1,185 @@
+"""Whom a router refused what, and how often: read from Zenoh's log, which alone says it.
+
+    login    a password that is wrong, a user that is unknown, no login at all; of TLS, whose
+             identity nobody knows then, only why
+    rights   somebody who came with the certificate of somebody else; what somebody put, and
+             where somebody listened, without the right to
+
+A login is a sequence of lines about one connection (TLS, InitSyn, OpenSyn), the last of them with
+the user's name. Rights are looked up in advance when a key is declared, which says nothing, and
+then again for every message, which does. What is kept is bounded.
+"""
+
+import re
+from collections import Counter
+from typing import TypeVar
+
+_LOGINS = "zenoh_transport::unicast::establishment::accept=trace,zenoh_link_tls::unicast=debug"
+_RIGHTS = "zenoh::net::routing::interceptor::access_control"
+MOST = 50
+"""Kinds of refusals that are told apart."""
+_REMEMBERED = 4096
+_LINE = re.compile(r"\S+Z +(?P<level>[A-Z]+) +(?P<thread>.*?ThreadId\(\d+\)) (?P<where>\S+): ")
+_TLS = re.compile(r"Accepted TLS connection on \S+: (?P<peer>\S+)\. Common Name: (?P<name>.+)\.$")
+_SYN = re.compile(r"Establishment Accept (?P<kind>Init|Open)Syn: \S+ => \w+/(?P<peer>\S+)\. Rec")
+_ZID = re.compile(r" zid: (?P<zid>[0-9a-f]+),")
+_LOGIN = re.compile(r"ext_auth: Some\(ZExtZBuf \{.*?slices: \[\[(?P<bytes>[0-9a-f, ]*)\]")
+_WRONG = re.compile(r"UsrPwd extension - Recv \w+Syn\. (?P<why>Invalid \w+|Expected extension)")
+_WHY = {
+    "Invalid password": "wrong password",
+    "Invalid user": "no identity of this run",
+    "Expected extension": "no user and password given",
+}
+_HANDSHAKE = re.compile(r"(?P<why>.+?)\. Hint: increase the system open file limit")
+_STRANGER = re.compile(r"(?P<zid>[0-9a-f]+) did not match any configured ACL subject")
+_DENIED = re.compile(
+    r"(?P<zid>[0-9a-f]+)(?P<at_first> on \S+)? is unauthorized to"
+    r" (?P<what>Put|Delete|Declare Subscriber) \(ingress\) on (?P<key>.+)$"
+)
+_CACHING = re.compile(r"ACL \(ingress\): caching permissions for `(?P<key>.+)`")
+_DOING = {"Put": "put on", "Delete": "delete of", "Declare Subscriber": "listening on"}
+_USRPWD, _BUFFER = 0x2, 0x40
+_Value = TypeVar("_Value")
+
+
+def directives(*, every_message: bool) -> str:
+    """What the log must say, for RUST_LOG; of denied puts it says 2 µs worth for every message."""
+    return f"{_LOGINS},{_RIGHTS}={'trace' if every_message else 'info'}"
+
+
+def is_ours(line: str) -> bool:
+    """Whether a line is in the log for this module alone, whatever else RUST_LOG asks for."""
+    found = _LINE.match(line)
+    return (
+        found is not None
+        and found["level"] in ("TRACE", "DEBUG")
+        and found["where"].endswith(("establishment::accept", "tls::unicast", "access_control"))
+    )
+
+
+class Denials:
+    """Counts them; one for each router."""
+
+    def __init__(self) -> None:
+        self._counts: Counter[str] = Counter()
+        self._new: list[str] = []
+        self._names: dict[str, str] = {}  # common name of a certificate, by peer
+        self._zids: dict[str, str] = {}  # by peer
+        self._users: dict[str, tuple[str, str]] = {}  # user and peer, by Zenoh's identity
+        self._latest = ("", "")  # user and peer of the login that is looked at
+        self._caching: dict[str, str] = {}  # the key whose permissions a thread looks up in advance
+
+    def take(self, line: str) -> None:
+        """Read a line of the log."""
+        found = _LINE.match(line)
+        if found is None:
+            return
+        text = line[found.end() :]
+        if "access_control" in found["where"]:
+            self._take_rights(found["thread"], text)
+        elif "tls" in found["where"]:
+            if accepted := _TLS.match(text):
+                _remember(self._names, accepted["peer"], accepted["name"])
+            elif failed := _HANDSHAKE.match(text):
+                self._count(f"refused a connection over TLS: {failed['why']}")
+        elif syn := _SYN.match(text):
+            self._take_syn(syn["kind"], syn["peer"], text)
+        elif wrong := _WRONG.match(text):
+            user, peer = self._latest
+            who = f"the login of {_shown(user)}" if user else "a login"
+            self._count(f"refused {who} from {_host(peer)}: {_WHY[wrong['why']]}")
+
+    def notes(self) -> list[str]:
+        """All refusals so far, each with its count if it is more than one."""
+        return [
+            f"{text} ({count} times)" if count > 1 else text for text, count in self._counts.items()
+        ]
+
+    def news(self) -> list[str]:
+        """The kinds of refusals that are new since the last call."""
+        news, self._new = self._new, []
+        return news
+
+    def logins_of(self, user: str) -> list[str]:
+        """What was refused to who wanted to be `user`."""
+        return [note for note in self.notes() if f"the login of {_shown(user)} " in note]
+
+    def _take_syn(self, kind: str, peer: str, text: str) -> None:
+        if kind == "Init":
+            self._latest = ("", peer)
+            if zid := _ZID.search(text):
+                _remember(self._zids, peer, zid["zid"])
+            return
+        login = _LOGIN.search(text)
+        user = _user_of(bytes.fromhex(login["bytes"].replace(", ", ""))) if login else ""
+        self._latest = (user, peer)
+        if (zid_of_peer := self._zids.pop(peer, "")) and user:
+            _remember(self._users, zid_of_peer, (user, peer))
+
+    def _take_rights(self, thread: str, text: str) -> None:
+        if caching := _CACHING.match(text):
+            _remember(self._caching, thread, caching["key"])
+        elif stranger := _STRANGER.match(text):
+            user, peer = self._users.get(stranger["zid"], ("", ""))
+            name = self._names.get(peer)
+            came = f"with the certificate of {_shown(name)}" if name else "without a right"
+            self._count(
+                f"{_shown(user)} from {_host(peer)} came {came}: may neither say nor hear anything"
+            )
+        elif denied := _DENIED.search(text):
+            if denied["at_first"] and self._caching.get(thread) == denied["key"]:
+                return
+            user, peer = self._users.get(denied["zid"], ("", ""))
+            what = f"{_DOING[denied['what']]} {_plain(denied['key'])}"
+            self._count(f"denied to {_shown(user)} from {_host(peer)}: {what}")
+
+    def _count(self, text: str) -> None:
+        if text not in self._counts:
+            if len(self._counts) >= MOST:
+                text = "refused much else"
+            if text not in self._counts:
+                self._new.append(text)
+        self._counts[text] += 1
+
+
+def _remember(known: dict[str, _Value], key: str, value: _Value) -> None:
+    if len(known) >= _REMEMBERED:
+        del known[next(iter(known))]
+    known[key] = value
+
+
+def _user_of(login: bytes) -> str:
+    """The user's name in the extension of an OpenSyn: header, length, then length and name."""
+    if len(login) < 2 or login[0] & 0x0F != _USRPWD or not login[0] & _BUFFER:
+        return ""
+    try:
+        _, at = _number(login, 1)
+        length, at = _number(login, at)
+    except IndexError:
+        return ""
+    return login[at : at + length].decode("utf-8", "replace")
+
+
+def _number(data: bytes, at: int) -> tuple[int, int]:
+    """A number of 7 bits a byte, and where it ends."""
+    value = shift = 0
+    while data[at] & 0x80:
+        value |= (data[at] & 0x7F) << shift
+        at, shift = at + 1, shift + 7
+    return value | data[at] << shift, at + 1
+
+
+def _plain(text: str) -> str:
+    """What a stranger chose, fit for a terminal."""
+    shown = text if len(text) <= 120 else text[:117] + "..."
+    return "".join(
+        letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in shown
+    )
+
+
+def _shown(name: str) -> str:
+    return f"'{_plain(name)}'" if name else "somebody"
+
+
+def _host(peer: str) -> str:
+    return peer.rpartition(":")[0] or "somewhere"
