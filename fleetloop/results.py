@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -165,7 +166,9 @@ def claim(expect: dict[str, Any]) -> str:
     found = expect["found"]
     shown = "nothing"
     if found is not None:
-        shown = ", ".join(f"{k} {found[k]:.3g}" for k in ("max_abs", "min", "max") if k in expect)
+        shown = ", ".join(
+            f"{k} {_number(found[k], '.3g')}" for k in ("max_abs", "min", "max") if k in expect
+        )
     if expect["held"] is None:
         shown += f"; seen to {expect['seen_to_s']:.6g} s only"
     robots = f" of {', '.join(expect['robots'])}" if "robots" in expect else ""
@@ -177,8 +180,13 @@ def claim(expect: dict[str, Any]) -> str:
 
 def _cells(values: dict[str, Any]) -> list[str]:
     settles = [_time(values["settle_s"][name]) for name in ERRORS]
-    finals = [f"{values['final_max'][name]:.5f}" for name in ERRORS]
+    finals = [_number(values["final_max"][name], ".5f") for name in ERRORS]
     return [*settles, *finals, f"{values['peak_torque_N_m']:.2f}"]
+
+
+def _number(value: float | None, spec: str) -> str:
+    """A number, or that it is none: of what a law that diverged says nothing is known."""
+    return "no number" if value is None or not isfinite(value) else format(value, spec)
 
 
 def _time(value: float | None) -> str:

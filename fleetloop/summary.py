@@ -102,8 +102,16 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
 
 
 def to_json(summary: Summary) -> str:
-    """summary.json's text."""
-    return json.dumps(summary, indent=2, ensure_ascii=False) + "\n"
+    """summary.json's text; what is no finite number, as after a law that diverged, is null."""
+    return json.dumps(_finite(summary), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def settle_s(t: np.ndarray, values: np.ndarray, band: float = SETTLE_BAND) -> float | None:

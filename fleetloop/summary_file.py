@@ -22,7 +22,7 @@ def _of_every_error(values: dict[str, Any]) -> dict[str, Any]:
 
 class _Worst(BaseModel):
     settle_s: Annotated[dict[str, float | None], AfterValidator(_of_every_error)]
-    final_max: Annotated[dict[str, float], AfterValidator(_of_every_error)]
+    final_max: Annotated[dict[str, float | None], AfterValidator(_of_every_error)]
     peak_torque_N_m: float
 
 
@@ -38,9 +38,9 @@ class _Spread(BaseModel):
 
 
 class _Found(BaseModel):
-    max_abs: float
-    min: float
-    max: float
+    max_abs: float | None
+    min: float | None
+    max: float | None
 
 
 class _Expectation(BaseModel):

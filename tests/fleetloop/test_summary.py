@@ -1,5 +1,6 @@
 """Numbers of a run."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ from configs.loading import load
 from configs.sections import Expect
 from fleetloop.figures import all_figures
 from fleetloop.record.reader import Record
-from fleetloop.summary import RunStats, Summary, settle_s, summarise
+from fleetloop.results import robot_rows
+from fleetloop.summary import RunStats, Summary, settle_s, summarise, to_json
 
 T = np.arange(0.0, 10.0, 0.1)
 
@@ -84,3 +86,14 @@ def test_figures_bear_a_robot_without_any_row(uneven_run: Path) -> None:
         record.controller["r2"][:0],
     )
     assert len(all_figures(record, load("two_robots"))) == 9
+
+
+def test_what_is_no_number_is_null_in_the_file_and_said_in_the_table() -> None:
+    errors = dict.fromkeys(("x_e_m", "y_e_m", "theta_e_rad"), None)
+    robot = {"settle_s": errors, "final_max": dict.fromkeys(errors, np.nan), "peak_torque_N_m": 0.0}
+    said = {"robots": {"r1": robot}, "found": [np.inf, 1.0, "text", None]}
+    read = json.loads(to_json(said), parse_constant=pytest.fail)
+    assert read["found"] == [None, 1.0, "text", None]
+    assert read["robots"]["r1"]["final_max"] == errors
+    for summary in (said, read):
+        assert next(iter(robot_rows(summary)))[4:] == ["no number"] * 3 + ["0.00"]
