@@ -86,7 +86,11 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         "expectations": expected,
         "cut_short": cut_short,
         "record_lost": record.shortage(),
-        "stopped_robots": stats.stopped_robots,
+        "stopped_robots": {
+            robot: stats.stopped_robots[robot]
+            for robot in scenario.names
+            if robot in stats.stopped_robots
+        },
         "notices": stats.notices,
         "overruns": stats.overruns,
         "frames_per_bus": stats.frames_per_bus,
