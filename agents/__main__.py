@@ -18,14 +18,13 @@ from agents.loop import Counters, LockstepLoop, give
 from agents.realtime import Counters as Clock
 from agents.realtime import RealtimeLoop
 from bridge import keys
-from bridge.access import LAUNCHER
 from bridge.barrier import Hellos, await_hellos
 from bridge.can_bus.convert import to_message
 from bridge.can_bus.opening import open_bus
+from bridge.launcher import follow_launcher
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import Report, Rows
 from bridge.process import (
-    LAUNCHER_GONE,
     Stop,
     cpu_ns,
     go_realtime,
@@ -51,7 +50,7 @@ def run(brief: AgentBrief, stop: Stop) -> str:
     name_process(f"agent {brief.robot}")
     with open_polled(brief.network, brief.schedule.start_deadline_s) as link:
         if brief.detached:
-            link.on_gone(keys.live(brief.network.run, LAUNCHER), partial(stop.end, LAUNCHER_GONE))
+            follow_launcher(link, brief.network.run, stop)
         with open_bus(brief.robot, brief.bus) as bus:
             return _run(brief, stop, link, bus)
 

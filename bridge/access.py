@@ -20,10 +20,10 @@ each process is bound to its identity by a random password that it alone is give
                 hears  its lines down
                 sees   the token of the relay
 
-Plant and controllers may watch the launcher's token: on other machines, its end is how they learn
-that the run is over. Who comes from another machine has a password that was agreed on before, or a
-certificate whose common name is the identity; then the password is no secret and proves nothing.
-The plant hears the poses of the robots that it doesn't emulate.
+Plant and controllers may watch the launcher's token and hear its last word: on other machines that
+is how they learn that the run is over, and why. Who comes from another machine has a password that
+was agreed on before, or a certificate whose common name is the identity; then the password is no
+secret and proves nothing. The plant hears the poses of the robots that it doesn't emulate.
 
 The launcher's own session is inside the router and isn't subject to the rules. Flows are named from
 the router's side: a process that publishes is an ingress put, and it must be told (egress
@@ -120,7 +120,7 @@ def plan(
     `certified`.
     """
     rights: dict[str, Rights] = {}
-    launcher = (keys.live(run, LAUNCHER),)
+    launcher, its_word = (keys.live(run, LAUNCHER),), keys.report(run, LAUNCHER)
     for robot in robots:
         process = f"agent/{robot}"
         heard = [keys.path(run, other) for other in hears[robot]]
@@ -128,7 +128,7 @@ def plan(
             heard.append(keys.leader_speed(run))
         rights[agent_user(robot)] = Rights(
             puts=(keys.path(run, robot), keys.telemetry(run, robot), *_control(run, process)),
-            hears=(keys.pose(run, robot), keys.go(run), *heard),
+            hears=(keys.pose(run, robot), keys.go(run), its_word, *heard),
             token=keys.live(run, process),
             watches=launcher,
         )
@@ -138,7 +138,7 @@ def plan(
     witnesses = [keys.pose(run, robot) for robot in robots if robot in witnessed]
     rights[PLANT] = Rights(
         puts=(*poses, *truths, *_control(run, PLANT)),
-        hears=(keys.go(run), *witnesses),
+        hears=(keys.go(run), its_word, *witnesses),
         token=keys.live(run, PLANT),
         watches=launcher,
     )

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from agents.__main__ import run
+from bridge.launcher import RUN_ENDED
 from bridge.process import LAUNCHER_GONE, keep_to_itself
 from configs.briefing import agent_brief
 from configs.deployment import agent_role, load_deployment
@@ -49,6 +50,8 @@ def run_agent(source: str, robot: str, deployment_file: Path, overrides: Overrid
     with stop_on_signals() as stop:
         early = run(brief, stop)
     if early == LAUNCHER_GONE:
-        raise InfrastructureError(f"{role}: {early}, or the network to it: drives disarmed")
-    note(f"{role}: {early or 'end of the run'}")
-    return INTERRUPTED if early else ENDED
+        early += ", or the network to it"
+    elif not early.startswith(RUN_ENDED):
+        note(f"{role}: {early or 'end of the run'}")
+        return INTERRUPTED if early else ENDED
+    raise InfrastructureError(f"{role}: {early}: drives disarmed")

@@ -50,6 +50,9 @@ from fleetloop.spawn import Orders, spawn
 WATCH_EVERY_S = 0.05
 GO_AHEAD_NS = 200_000_000
 """In real time, from the go to power-up: for the go to reach everybody."""
+_MOST_OTHERS = 3
+WORD_S = 0.2
+"""The reason of the end is so far ahead of the end of the launcher's token."""
 DRAIN_S = 2.0
 """How long the recorder may take to write what is still on its way, once all others have ended."""
 
@@ -67,6 +70,7 @@ class Outcome:
     teardown_s: float = 0.0
     cpu_ns: int = 0  # of the launcher, since everybody was ready
     reports: dict[str, Report] = field(default_factory=dict)
+    notices: dict[str, list[str]] = field(default_factory=dict)  # about a process, by the launcher
 
 
 class ProcessRun:
@@ -81,6 +85,7 @@ class ProcessRun:
         speed: float,
         profile: bool,
         on_progress: Callable[[Progress], None],
+        on_notice: Callable[[str, str], None] = lambda *_: None,
         deployment: Deployment | None = None,
     ) -> None:
         self._scenario = scenario
@@ -91,6 +96,7 @@ class ProcessRun:
         self._record = record
         self._speed = speed
         self._on_progress = on_progress
+        self._on_notice = on_notice
         self._robots = scenario.names
         self._processes = roles_of(scenario)
         self._children: list[Child] = []
@@ -109,7 +115,11 @@ class ProcessRun:
         began = time.monotonic()
         try:
             with self._started() as link:
-                failure = self._await_ready(link, stop)
+                try:
+                    failure = self._await_ready(link, stop)
+                except InfrastructureError as error:
+                    self._tell_elsewhere(link, str(error))
+                    raise
                 if failure is None and not stop.requested:
                     self.outcome.startup_s = time.monotonic() - began
                     began_ns = cpu_ns()
@@ -118,6 +128,8 @@ class ProcessRun:
                 ending = time.monotonic()
                 self._end(link, stop, failure)
                 self.outcome.teardown_s = time.monotonic() - ending
+            if refusals := link.denials.notes():
+                self.outcome.notices["router"] = refusals
         finally:
             end(self._children, grace_s=0.0)
         return self.outcome
@@ -151,7 +163,7 @@ class ProcessRun:
                 open_.enter_context(Relay(link, folder, scenario.buses, granted))
             yield link
 
-    def _await_ready(self, link: Link, stop: Stop) -> Failure | None:
+    def _await_ready(self, link: RouterLink, stop: Stop) -> Failure | None:
         """Say the leader's speed until all tokens are there, then go until the plant ticks."""
         run = self._run
         go = link.publisher(keys.go(run))
@@ -168,27 +180,31 @@ class ProcessRun:
                 return None
             if (failure := self._cause()) is not None:
                 if failure.rank >= GAVE_UP and (absent := self._elsewhere.absent()):
-                    raise InfrastructureError(f"not there: {', '.join(absent)}; {failure.text}")
+                    raise InfrastructureError(
+                        f"not there: {_with_refusals(absent, link)}; {failure.text}"
+                    )
                 return failure
             if time.monotonic() > deadline:
                 absent = self._elsewhere.absent() or sorted(set(self._processes) - self._alive)
                 absent = absent or ["the plant's first tick"]
                 raise InfrastructureError(
-                    f"not ready within {ticks.start_deadline_s:g} s: {', '.join(absent)}"
+                    f"not ready within {ticks.start_deadline_s:g} s: {_with_refusals(absent, link)}"
                 )
             if ready and not gone:
                 gone = True
                 hellos.add(go, Go(wall_of(time.monotonic_ns() + countdown_ns)).encode())
             self._take(link.receive(hellos.say()))
+            self._tell_refusals(link)
         return None
 
     # --- run ---------------------------------------------------------------------------------
 
-    def _watch(self, link: Link, stop: Stop) -> Failure | None:
+    def _watch(self, link: RouterLink, stop: Stop) -> Failure | None:
         """Follow the run until the plant and all controllers have ended."""
         actors = [child for child in self._children if child.name != "recorder"]
         while not stop.requested:
             self._take(link.receive(WATCH_EVERY_S))
+            self._tell_refusals(link)
             if (failure := self._cause()) is not None:
                 return self._root_of(failure, link, actors)
             if all(child.ended() for child in actors) and self._elsewhere.ended():
@@ -203,6 +219,10 @@ class ProcessRun:
                 self._settle(link, actors, 0.3)
                 return self._cause() or silent
         return None
+
+    def _tell_refusals(self, link: RouterLink) -> None:
+        for text in link.denials.news():
+            self._on_notice("router", text)
 
     def _child(self, name: str) -> Child | None:
         """The process of that name, None if it is not one of this machine."""
@@ -297,6 +317,8 @@ class ProcessRun:
         if failure is not None and failure.name == recorder.name:
             # What it doesn't take any more would keep all others waiting.
             recorder.kill()
+        if outcome.ended != "completed":
+            self._tell_elsewhere(link, outcome.reason)
         # Without launcher those elsewhere stop, if they haven't.
         link.withdraw_live(keys.live(self._run, access.LAUNCHER))
         if outcome.ended != "completed":
@@ -329,8 +351,27 @@ class ProcessRun:
         except FleetloopError as error:
             self.outcome.reason += f"; {error}"
 
+    def _tell_elsewhere(self, link: Link, reason: str) -> None:
+        """Why the run ends, before the launcher's token goes."""
+        if self._elsewhere.ended():
+            return
+        word = Report({"reason": reason}).encode()
+        link.publisher(keys.report(self._run, access.LAUNCHER)).put(word)
+        deadline = time.monotonic() + WORD_S
+        while not self._elsewhere.ended() and (left_s := deadline - time.monotonic()) > 0.0:
+            self._take(link.receive(min(left_s, WATCH_EVERY_S)))
+
     def _hear_from_elsewhere(self, link: Link) -> None:
         """Let those on other machines say their last word; what they don't say in time is lost."""
         deadline = time.monotonic() + DRAIN_S
         while not self._elsewhere.ended() and (left_s := deadline - time.monotonic()) > 0.0:
             self._take(link.receive(min(left_s, WATCH_EVERY_S)))
+
+
+def _with_refusals(absent: Sequence[str], link: RouterLink) -> str:
+    """Who is not there, and what the router refused to somebody who wanted to be it."""
+    named = {role: link.denials.logins_of(access.user_of(role)) for role in absent}
+    texts = [f"{role} ({'; '.join(found)})" if found else role for role, found in named.items()]
+    told = {note for found in named.values() for note in found}
+    others = [note for note in link.denials.notes() if note not in told]
+    return "; ".join([", ".join(texts), *others[:_MOST_OTHERS]])

@@ -119,6 +119,7 @@ def _over_processes(
         speed=options.speed,
         profile=options.profile,
         on_progress=on_progress,
+        on_notice=lambda process, text: note(f"{process}: {text}"),
         deployment=deployment,
     )
     return _stats(run.run(stop), realtime=scenario.clock.mode == "realtime")
@@ -218,6 +219,8 @@ def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
             stats.stopped_robots[process.removeprefix("agent/")] = str(stopped)
         if notices := report.values.get("notices"):
             stats.notices[process.removeprefix("agent/")] = str(notices).split("\n")
+    for process, said in outcome.notices.items():
+        stats.notices.setdefault(process.removeprefix("agent/"), []).extend(said)
     if (plant := outcome.reports.get("plant")) is not None:
         stats.stopped_robots |= _under("stopped.", plant)  # the cause of what its controller says
     return stats

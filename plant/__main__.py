@@ -11,14 +11,14 @@ from contextlib import nullcontext
 from functools import partial
 
 from bridge import keys
-from bridge.access import LAUNCHER
 from bridge.barrier import Hellos, await_hellos
 from bridge.can_bus.ends import DriveEnd
 from bridge.can_bus.hub import Hub
 from bridge.clock import implausible_start, monotonic_of
+from bridge.launcher import follow_launcher
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import Go, PoseFix, Progress, Report, Rows
-from bridge.process import LAUNCHER_GONE, Stop, cpu_ns, go_realtime, serve, settle_memory
+from bridge.process import Stop, cpu_ns, go_realtime, serve, settle_memory
 from bridge.profile import Sampler
 from bridge.telemetry import PLANT_ROW, FrameBuffer, RowBuffer
 from bridge.zenoh_link import open_client
@@ -45,8 +45,7 @@ def run(brief: PlantBrief, stop: Stop) -> str:
     listeners = {bus: socket.socket(fileno=fd) for bus, fd in brief.listeners}
     with open_client(brief.network, brief.schedule.start_deadline_s) as link:
         if brief.detached:
-            gone = partial(stop.end, LAUNCHER_GONE)
-            link.on_gone(keys.live(brief.network.run, LAUNCHER), gone)
+            follow_launcher(link, brief.network.run, stop)
         queue = brief.wire.txqueuelen if brief.wire else 0
         hub = Hub(listeners, stop.wake_fd, queue=queue, controllers=_controllers(brief))
         end: DriveEnd = hub

@@ -95,6 +95,7 @@ def test_a_controller_elsewhere_drives_its_robot_to_the_end_of_the_run(tmp_path,
     for rows in (*record.plant.values(), *record.controller.values()):
         assert rows["tick"].tolist() == list(range(300))
     assert set(run.summary()["realtime"]["robots"]) == {"r1", "r2"}
+    assert "router" not in run.summary()["notices"]
 
 
 def multicast_goes_nowhere() -> bool:
@@ -129,7 +130,10 @@ def test_a_controller_elsewhere_stops_when_the_launcher_does(
     finally:
         run.kill()
     assert status == 3
-    assert "agent/r2: the launcher is gone, or the network to it: drives disarmed" in said
+    why = "the launcher is gone, or the network to it"
+    if number == signal.SIGINT:
+        why = "the run was ended: interrupted by SIGINT"
+    assert f"agent/r2: {why}: drives disarmed" in said
 
 
 def test_a_controller_elsewhere_that_is_killed_ends_the_run_with_its_name(tmp_path, agents) -> None:
@@ -145,6 +149,26 @@ def test_a_controller_elsewhere_that_is_killed_ends_the_run_with_its_name(tmp_pa
     assert status == 3
     assert "agent/r2: lost; it, its machine or the network to it is gone" in out
     assert run.survivors() == []
+
+
+def test_when_one_controller_is_lost_those_elsewhere_are_told_who(tmp_path, agents) -> None:
+    (tmp_path / "users").write_text("agent-r1:one\nagent-r2:two\n")
+    (tmp_path / "users").chmod(0o600)
+    where = deployment(tmp_path, extra='users = "users"\n')
+    where.write_text(where.read_text().replace(', "agent/r1"', ""))
+    agents += [Agent(robot, where) for robot in ("r1", "r2")]
+    run = start(tmp_path, where)
+    try:
+        run.await_bus_time(1.5)
+        agents[0].process.kill()
+        assert run.end(within_s=10.0)[0] == 3
+        status, said = agents[1].end(within_s=5.0)
+    finally:
+        run.kill()
+    assert status == 3
+    assert (
+        "agent/r2: the run was ended: agent/r1: lost; it, its machine or the network to it" in said
+    )
 
 
 def test_a_controller_elsewhere_that_is_interrupted_says_so_and_leaves_its_drives_idle(
@@ -182,10 +206,44 @@ def test_a_wrong_password_is_refused_within_the_start_deadline(tmp_path, agents)
         assert re.search(r"the router at tcp/localhost:\d+: it refused the login: not the", said)
         status, out = run.end()
         assert status == 3
-        assert re.search(r"fleetloop: not (there|ready within 6 s): agent/r2[;\n]", out), out
+        refused = r"refused the login of 'agent-r2' from [0-9.:\[\]]+: wrong password \(2 times\)"
+        assert re.search(rf"not (there|ready within 6 s): agent/r2 \({refused}\)", out), out
+        assert re.search(r"router: refused the login of 'agent-r2' from .*: wrong password\n", out)
     finally:
         run.kill()
     assert psutil.Process().children() == []
+
+
+INTRUDER = """
+import sys
+from bridge import keys
+from bridge.zenoh_link import open_client
+from configs.brief import NetworkLink
+with open_client(NetworkLink("", sys.argv[1], "bench", "word"), 10.0) as link:
+    for _ in range(5):
+        link.publisher(keys.path(sys.argv[2], "r1")).put(b"forged")
+"""
+
+
+def test_a_denied_put_leaves_whom_and_how_often_in_log_and_summary(tmp_path: Path) -> None:
+    (tmp_path / "users").write_text("bench:word\n")
+    (tmp_path / "users").chmod(0o600)
+    where = tmp_path / "where.toml"
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    guest = f'[network]\nendpoint = "{endpoint}"\nusers = "users"\nguests = {{ bench = ["*"] }}\n'
+    where.write_text(guest)
+    run = start(tmp_path, where, "--duration", "4")
+    try:
+        run.await_bus_time(1.3)
+        program = [sys.executable, "-c", INTRUDER, endpoint, SCENARIO[0]]
+        subprocess.run(program, check=True, timeout=30)
+        status, out = run.end()
+        assert status == 0, out
+    finally:
+        run.kill()
+    what = f"denied to 'bench' from 127.0.0.1: put on fleetloop/{SCENARIO[0]}/robot/r1/path"
+    assert f"router: {what}\n" in out
+    assert run.summary()["notices"]["router"] == [f"{what} (5 times)"]
 
 
 def test_the_plant_may_be_elsewhere_too(tmp_path) -> None:
