@@ -44,6 +44,8 @@ from configs.errors import ScenarioError
 
 FLUSH_S = 10.0
 """How long a hub that doesn't read may keep waiting who gathers what it sends."""
+PATIENCE_S = 1.0
+"""How long a hub that doesn't read may keep a sender waiting who gives no time itself."""
 _LOG = logging.getLogger("can.fleetloop")  # as python-can's own interfaces name theirs
 _IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ignore_config"})
 
@@ -181,8 +183,13 @@ class FleetloopBus(can.BusABC):
 
         On a bus with bit timing it waits in this node's transmit queue until it wins the bus.
 
+        Args:
+            msg: what to send.
+            timeout: how long to wait for room, in the queue as well; None: not at all for the
+                queue, as on SocketCAN, and up to `PATIENCE_S` for a process that is busy.
+
         Raises:
-            can.CanOperationError: no classic frame, the bus is gone, or no room within `timeout`.
+            can.CanOperationError: no classic frame, the bus is gone, or no room in time.
         """
         try:
             frame = to_frame(msg)
@@ -294,9 +301,10 @@ class FleetloopBus(can.BusABC):
         """Take a place in the transmit queue, waiting at most `timeout`; None: not at all."""
         deadline = time.monotonic() + (timeout or 0.0)
         while (self._said - self._gone) & 0xFFFF_FFFF >= self._queue:
-            left_s = deadline - time.monotonic()
-            # A paced client holds the bus's time: waiting would be for ever.
-            if left_s <= 0.0 or self._paced or not self._receive(left_s):
+            left_s = max(deadline - time.monotonic(), 0.0)
+            # That a frame has left is told by what is there to read, also for who only sends. A
+            # paced client holds the bus's time: waiting would be for ever.
+            if self._paced or not self._receive(left_s):
                 raise can.CanOperationError(
                     f"bus {self.channel!r}: transmit queue full, {self._queue} frames wait",
                     errno.ENOBUFS,
@@ -315,9 +323,12 @@ class FleetloopBus(can.BusABC):
             return
 
     def _send_late(self, data: bytes, timeout: float | None) -> None:
-        if timeout and self._line.await_room(timeout):
+        deadline = time.monotonic() + (PATIENCE_S if timeout is None else timeout)
+        while (left_s := deadline - time.monotonic()) > 0.0 and self._line.await_room(left_s):
             try:
                 self._send_now(data)
+            except BlockingIOError:
+                continue  # another thread was faster
             except OSError as error:
                 raise self._gone_with(error) from error
             return

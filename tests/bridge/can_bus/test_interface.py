@@ -579,6 +579,16 @@ def test_a_full_transmit_queue_raises_enobufs_until_frames_have_left_it(timed) -
             bus.send(message)
 
 
+def test_who_only_sends_finds_room_again_when_its_frames_have_left(timed) -> None:
+    with timed.join() as bus:
+        for n in range(50):  # of a queue of 10
+            bus.send(can.Message(arbitration_id=0x123, is_extended_id=False, data=[n]))
+            timed.hub.serve(0.5)
+            ((key, frame),) = timed.hub.say("r1")
+            assert frame.data == bytes([n])
+            timed.hub.left_queue("r1", key, 1)
+
+
 def test_with_bit_timing_what_a_client_says_reaches_nobody_before_the_wire_carried_it(
     timed,
 ) -> None:
