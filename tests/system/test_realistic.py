@@ -1,13 +1,15 @@
 """Real drives and buses: the formation holds, processes and reference agree, buses are recorded."""
 
 import json
+from contextlib import ExitStack
 from pathlib import Path
 
 import can
 import cantools
 import pytest
-from system.processes import completed
+from system.processes import completed, running
 
+from bridge.can_bus import places
 from fleetloop.diff import print_comparison
 
 pytestmark = pytest.mark.system
@@ -33,6 +35,30 @@ def test_processes_leave_the_same_record_as_the_reference_with_all_of_it_on(
     assert print_comparison(a, b, as_json=False) == 0
     for bus in ("r1", "r2", "r3", "r4"):
         assert (a / "can" / f"{bus}.log").read_bytes() == (b / "can" / f"{bus}.log").read_bytes()
+
+
+def test_who_only_listens_changes_nothing_and_who_says_paced_is_not_waited_for(
+    tmp_path: Path, capsys
+) -> None:
+    a, b = tmp_path / "a", tmp_path / "b"
+    args = ("realistic", "--duration", "4", "--set", "expect=[]")
+    heard = 0
+    with running(a, *args, "--speed", "2", bus_time_s=0.1) as run, ExitStack() as listeners:
+        path = next(places.base_folder().glob("*/r1.can"))
+        for options in ({}, {"gathered": True}, {"receive_own_messages": True}):
+            listener = can.Bus(interface="fleetloop", channel=str(path), **options)
+            listeners.enter_context(listener)
+        with pytest.raises(can.CanInitializationError, match="controllers that the run itself"):
+            can.Bus(interface="fleetloop", channel=str(path), paced="r1")
+        with pytest.raises(can.CanOperationError, match="end of the run"):
+            while listener.recv(10.0) is not None:
+                heard += 1
+        status, out = run.end()
+    assert status == 0, out
+    assert heard > 1000
+    assert completed(b, *args, "--in-process")[0] == 0
+    assert print_comparison(a, b, as_json=False) == 0
+    assert "identical: 800 ticks of 4 robots" in capsys.readouterr().out
 
 
 def test_every_bus_is_recorded_and_each_frame_is_one_of_the_vendors_dbc(tmp_path: Path) -> None:

@@ -282,6 +282,7 @@ def test_what_is_no_classic_frame_is_counted_and_goes_nowhere(
         assert other.hear().kind == wire.WELCOME
         assert [other.hear().frames for _ in good] == [(frame,) for frame in good]
     assert serving.hub.counters("r1").garbage == 1
+    assert "1 × what is no frame" in serving.hub.troubles()["r1"]
     assert serving.hub.counters("r1").from_clients == 2
     serving.close()
 
