@@ -9,9 +9,10 @@
     pose          likewise of its date; a place or heading beyond this world
     leader speed  faster than the scenario
 
-Ticks below 0 say where somebody starts; once control has begun they are refused. What is refused is
-counted by its sender, changes nothing, and so makes the sender silent: in lockstep the wait for it
-names it, in real time it leaves the sums.
+Ticks below 0 say where somebody starts; once control has begun they mean nothing, and those that
+were still on their way aren't counted. What is refused is counted by its sender, changes nothing,
+and so makes the sender silent: in lockstep the wait for it names it, in real time it leaves the
+sums.
 """
 
 from bridge.messages import LeaderSpeed, PathState, PoseFix
@@ -45,6 +46,8 @@ class Admission:
 
     def path(self, robot: str, state: PathState) -> bool:
         """Whether a path state may be used."""
+        if state.tick < 0 <= self.tick:
+            return False
         wrong = self._path_date(robot, state)
         if wrong is None and (far := self._reach.beyond(state.t_ns * 1e-9, state.s, state.v_hat)):
             wrong = "reach", far
@@ -57,6 +60,8 @@ class Admission:
 
     def pose(self, fix: PoseFix) -> bool:
         """Whether a pose may be used."""
+        if fix.tick < 0 <= self.tick:
+            return False
         wrong = self._pose_date(fix)
         if wrong is None and not within_world(fix.x_m, fix.y_m, fix.theta_rad):
             wrong = "reach", f"({fix.x_m:.6g} m, {fix.y_m:.6g} m, {fix.theta_rad:.6g} rad)"
@@ -84,7 +89,7 @@ class Admission:
         if t_ns != tick * self._period_ns:
             return "time", f"tick {tick} is not at {t_ns * 1e-9:.6g} s"
         if tick < 0:
-            return self._start()
+            return None
         if not self._schedule.shares(tick):
             return "tick", f"nothing is shared at tick {tick}"
         if self._schedule.realtime:
@@ -94,7 +99,7 @@ class Admission:
     def _pose_date(self, fix: PoseFix) -> tuple[str, str] | None:
         tick, t_ns = fix.tick, fix.t_ns
         if tick < 0:
-            return self._start()
+            return None
         if not 0 <= t_ns - tick * self._period_ns < self._period_ns:
             return "time", f"tick {tick} is not at {t_ns * 1e-9:.6g} s"
         if self._schedule.realtime:
@@ -103,9 +108,6 @@ class Admission:
             return "tick", f"no pose is taken at tick {tick}"
         wrong = self._due(tick, self._delay_ticks)
         return wrong or self._order(t_ns, self._newest_ns.get(LOCALISATION))
-
-    def _start(self) -> tuple[str, str] | None:
-        return ("start", "dated before the run, which has begun") if self.tick >= 0 else None
 
     def _due(self, tick: int, delay_ticks: int = 0) -> tuple[str, str] | None:
         """In lockstep: between what is over and what nobody can know yet."""

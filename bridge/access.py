@@ -25,6 +25,12 @@ is how they learn that the run is over, and why. Who comes from another machine 
 was agreed on before, or a certificate whose common name is the identity; then the password is no
 secret and proves nothing. The plant hears the poses of the robots that it doesn't emulate.
 
+Whoever may say something may still not say it at any length or rate: the router drops what is
+longer than anything honest on that key (`bridge.messages.MOST_BYTES`). In real time, where the
+newest wins, it also drops what comes faster than `MOST_PER_PERIOD` times as often as the schedule
+says. In lockstep every message counts and two may arrive together, so there is no rate for it to
+keep: there hearers keep but few of each (`bridge.zenoh_link.POLLED_DEPTH`), and count.
+
 The launcher's own session is inside the router and isn't subject to the rules. Flows are named from
 the router's side: a process that publishes is an ingress put, and it must be told (egress
 declare_subscriber) that somebody listens; a process that hears is an ingress declare_subscriber and
@@ -37,7 +43,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from bridge import keys
+from bridge.messages import MOST_BYTES
 
+MOST_PER_PERIOD = 8.0
+"""Path states and poses of one robot within the period in which the schedule has one."""
+LEAST_HZ = 100.0
+"""No rate is limited below this: what comes in a burst isn't too much."""
 PLANT = "plant"
 RECORDER = "recorder"
 LAUNCHER = "launcher"
@@ -71,6 +82,7 @@ class AccessPlan:
     rights: Mapping[str, Rights]
     passwords: Mapping[str, str] = field(repr=False)
     certified: frozenset[str] = frozenset()  # identities that must show a certificate
+    most_hz: Mapping[str, float] = field(default_factory=dict)  # by key; others at any rate
 
     def dictionary(self) -> str:
         """Zenoh's user dictionary: `user:password` lines."""
@@ -99,6 +111,33 @@ class AccessPlan:
             }
         )
 
+    def low_pass_filter(self) -> str:
+        """Zenoh's `low_pass_filter` section as JSON: how long messages on each key may be."""
+        by_limit: dict[int, list[str]] = {}
+        for rights in self.rights.values():
+            for key in rights.puts:
+                by_limit.setdefault(MOST_BYTES[keys.kind(key)], []).append(key)
+        return json.dumps(
+            [
+                {
+                    "id": f"most-{limit}",
+                    "flows": ["ingress"],
+                    "messages": ["put"],
+                    "key_exprs": list(dict.fromkeys(allowed)),
+                    "size_limit": limit,
+                }
+                for limit, allowed in sorted(by_limit.items())
+            ]
+        )
+
+    def downsampling(self) -> str:
+        """Zenoh's `downsampling` section as JSON: how often messages on each key may come."""
+        if not self.most_hz:
+            return "[]"
+        rules = [{"key_expr": key, "freq": rate} for key, rate in self.most_hz.items()]
+        limits = {"id": "most-often", "flows": ["ingress"], "messages": ["put"], "rules": rules}
+        return json.dumps([limits])
+
 
 def plan(
     run: str,
@@ -111,13 +150,15 @@ def plan(
     guests: Mapping[str, str] | None = None,
     bus_guests: Collection[str] = (),
     certified: bool = False,
+    share_period_s: float | None = None,
+    localisation_period_s: float | None = None,
 ) -> AccessPlan:
     """The rights of a run from its graph: `hears[i]` are the robots that i hears, `leader` h_i.
 
     What crosses the `buses` is recorded. Somebody else says the poses of the robots in `witnessed`:
     they aren't emulated. `guests` are the passwords of identities on other machines (all others are
     given random ones), who must show a certificate with their identity as its common name if
-    `certified`.
+    `certified`. Periods are of real time; with one, what comes much more often is dropped.
     """
     rights: dict[str, Rights] = {}
     launcher, its_word = (keys.live(run, LAUNCHER),), keys.report(run, LAUNCHER)
@@ -160,7 +201,13 @@ def plan(
         )
     known = dict(guests or {})
     passwords = {user: known.get(user) or secrets.token_urlsafe(24) for user in rights}
-    return AccessPlan(rights, passwords, frozenset(known if certified else ()))
+    most_hz = {
+        key: max(MOST_PER_PERIOD / period_s, LEAST_HZ)
+        for key_of, period_s in ((keys.path, share_period_s), (keys.pose, localisation_period_s))
+        if period_s is not None
+        for key in (key_of(run, robot) for robot in robots)
+    }
+    return AccessPlan(rights, passwords, frozenset(known if certified else ()), most_hz)
 
 
 def _control(run: str, process: str) -> tuple[str, str]:

@@ -2,6 +2,8 @@
 
     login    a password that is wrong, a user that is unknown, no login at all; of TLS, whose
              identity nobody knows then, only why
+    deafness somebody who took nothing of what he asked for while others waited to say more: the
+             router cuts him off before everybody else stands still
     rights   somebody who came with the certificate of somebody else; what somebody put, and
              where somebody listened, without the right to
 
@@ -15,6 +17,7 @@ from collections import Counter
 from typing import TypeVar
 
 _LOGINS = "zenoh_transport::unicast::establishment::accept=trace,zenoh_link_tls::unicast=debug"
+_DEAFNESS = "zenoh_transport::unicast::universal::tx=error"
 _RIGHTS = "zenoh::net::routing::interceptor::access_control"
 MOST = 50
 """Kinds of refusals that are told apart."""
@@ -32,6 +35,7 @@ _WHY = {
 }
 _HANDSHAKE = re.compile(r"(?P<why>.+?)\. Hint: increase the system open file limit")
 _STRANGER = re.compile(r"(?P<zid>[0-9a-f]+) did not match any configured ACL subject")
+_DEAF = re.compile(r"Unable to push non droppable network message to (?P<zid>[0-9a-f]+)\.")
 _DENIED = re.compile(
     r"(?P<zid>[0-9a-f]+)(?P<at_first> on \S+)? is unauthorized to"
     r" (?P<what>Put|Delete|Declare Subscriber) \(ingress\) on (?P<key>.+)$"
@@ -44,7 +48,7 @@ _Value = TypeVar("_Value")
 
 def directives(*, every_message: bool) -> str:
     """What the log must say, for RUST_LOG; of denied puts it says 2 µs worth for every message."""
-    return f"{_LOGINS},{_RIGHTS}={'trace' if every_message else 'info'}"
+    return f"{_LOGINS},{_DEAFNESS},{_RIGHTS}={'trace' if every_message else 'info'}"
 
 
 def is_ours(line: str) -> bool:
@@ -67,6 +71,9 @@ class Denials:
         self._zids: dict[str, str] = {}  # by peer
         self._users: dict[str, tuple[str, str]] = {}  # user and peer, by Zenoh's identity
         self._latest = ("", "")  # user and peer of the login that is looked at
+        self._deaf: dict[str, bool] = {}
+        self.cut_off: set[str] = set()
+        """Users one of whose sessions was cut off because it did not read."""
         self._caching: dict[str, str] = {}  # the key whose permissions a thread looks up in advance
 
     def take(self, line: str) -> None:
@@ -77,6 +84,8 @@ class Denials:
         text = line[found.end() :]
         if "access_control" in found["where"]:
             self._take_rights(found["thread"], text)
+        elif deaf := _DEAF.match(text):
+            self._take_deaf(deaf["zid"])
         elif "tls" in found["where"]:
             if accepted := _TLS.match(text):
                 _remember(self._names, accepted["peer"], accepted["name"])
@@ -115,6 +124,17 @@ class Denials:
         self._latest = (user, peer)
         if (zid_of_peer := self._zids.pop(peer, "")) and user:
             _remember(self._users, zid_of_peer, (user, peer))
+
+    def _take_deaf(self, zid: str) -> None:
+        """Said for every message that could not be sent, until the session has ended."""
+        if zid not in self._deaf:
+            _remember(self._deaf, zid, True)
+            user, peer = self._users.get(zid, ("", ""))
+            self.cut_off.add(user)
+            self._count(
+                f"cut off {_shown(user)} from {_host(peer)}: it did not read what it asked for, and"
+                " everybody else would have waited for it"
+            )
 
     def _take_rights(self, thread: str, text: str) -> None:
         if caching := _CACHING.match(text):

@@ -105,6 +105,13 @@ def guest_of(place: str) -> tuple[str, str] | None:
     return chunks[2], "/".join(chunks[4:])
 
 
+def kind(key: str) -> str:
+    """What is said on a key: path, pose, truth, ..., or of the control plane progress, report."""
+    chunks = key.split("/")
+    plane = chunks[2]
+    return plane[1:] if plane.startswith("@") else chunks[-1]
+
+
 def process_of(key: str) -> str:
     """The process that a key of the control plane speaks of."""
     return key.split("/", 3)[3]

@@ -3,11 +3,21 @@
 Promises of every link: a message put on a key reaches every link that subscribes to it once, in the
 order of its publisher, and never the link that put it; nothing is lost while both live; `receive`
 waits a bounded time and wakes at once. `bridge.zenoh_link` carries it over Zenoh.
+
+Memory is bounded: of what waits for a reader each subscription has its own room, so that who floods
+his own key crowds out nobody else. What finds no room is dropped and counted.
 """
 
+import threading
+from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import NamedTuple, Protocol, Self
+
+ROOM_BYTES = 1 << 18
+"""Of one subscription, if the subscriber asks for no other."""
+_OVERHEAD_BYTES = 256
+"""What a message takes besides its payload."""
 
 
 class Arrival(NamedTuple):
@@ -31,8 +41,8 @@ class Link(Protocol):
     def publisher(self, key: str, *, express: bool = True) -> Publisher:
         """A publisher on `key`; not express, its messages may travel with others a little later."""
 
-    def subscribe(self, key: str, tag: str) -> None:
-        """Queue what is put on `key`, marked with `tag`."""
+    def subscribe(self, key: str, tag: str, *, room_bytes: int = ROOM_BYTES) -> None:
+        """Queue what is put on `key`, marked with `tag`, as long as there is room."""
 
     def receive(self, timeout_s: float) -> Arrival | None:
         """The next message, waiting at most `timeout_s`; 0 polls."""
@@ -58,20 +68,85 @@ class Link(Protocol):
         """Close."""
 
 
+class Mailbox:
+    """The room of one subscription. Filled from whatever thread, emptied by one."""
+
+    __slots__ = ("_given", "_lock", "_room", "_taken", "dropped", "tag")
+
+    def __init__(self, tag: str, room_bytes: int) -> None:
+        self.tag = tag
+        self.dropped = 0
+        self._room = room_bytes
+        self._given = self._taken = 0
+        self._lock = threading.Lock()
+
+    def admit(self, payload_bytes: int) -> bool:
+        """Whether there is room for a message; a single one always finds some."""
+        size = payload_bytes + _OVERHEAD_BYTES
+        with self._lock:
+            held = self._given - self._taken
+            if held and held + size > self._room:
+                self.dropped += 1
+                return False
+            self._given += size
+        return True
+
+    def take(self, payload_bytes: int) -> None:
+        """A message has been taken out."""
+        self._taken += payload_bytes + _OVERHEAD_BYTES
+
+
 class Inbox:
     """Arrivals in order, from whatever thread, with a bounded wait."""
 
-    __slots__ = ("_queue", "put")
+    __slots__ = ("_boxes", "_latest", "_lock", "_queue")
 
     def __init__(self) -> None:
-        self._queue: SimpleQueue[Arrival] = SimpleQueue()
-        self.put = self._queue.put
+        self._queue: SimpleQueue[tuple[Arrival, Mailbox | None]] = SimpleQueue()
+        self._boxes: list[Mailbox] = []
+        self._latest: dict[tuple[str, str], bytes] = {}  # by tag and key, of what is queued
+        self._lock = threading.Lock()
+
+    def mailbox(self, tag: str, room_bytes: int) -> Callable[[str, Callable[[], bytes], int], None]:
+        """How a subscriber puts its messages: key, how to get the payload, and its length."""
+        box = Mailbox(tag, room_bytes)
+        self._boxes.append(box)
+        put = self._queue.put
+
+        def take(key: str, payload: Callable[[], bytes], size: int) -> None:
+            if box.admit(size):
+                put((Arrival(tag, key, payload()), box))
+
+        return take
+
+    def put_latest(self, arrival: Arrival) -> None:
+        """Queue a message that replaces one of the same tag and key, if that still waits."""
+        tag, key, payload = arrival
+        with self._lock:
+            waits = (tag, key) in self._latest
+            self._latest[tag, key] = payload
+        if not waits:
+            self._queue.put((arrival, None))
+
+    def dropped(self) -> dict[str, int]:
+        """By tag, how many messages found no room."""
+        dropped: dict[str, int] = {}
+        for box in self._boxes:
+            if box.dropped:
+                dropped[box.tag] = dropped.get(box.tag, 0) + box.dropped
+        return dropped
 
     def receive(self, timeout_s: float) -> Arrival | None:
         """The next arrival, waiting at most `timeout_s`; 0 polls."""
         try:
             if timeout_s <= 0.0:
-                return self._queue.get_nowait()
-            return self._queue.get(timeout=timeout_s)
+                arrival, box = self._queue.get_nowait()
+            else:
+                arrival, box = self._queue.get(timeout=timeout_s)
         except Empty:
             return None
+        if box is not None:
+            box.take(len(arrival.payload))
+            return arrival
+        with self._lock:
+            return arrival._replace(payload=self._latest.pop((arrival.tag, arrival.key)))

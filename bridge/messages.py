@@ -2,7 +2,9 @@
 
 A message is a msgpack array that begins with the version of its layout. Decoding is bounded: too
 long, the wrong types, a wrong length, an unknown version or a number that isn't finite give None,
-never an exception; the caller counts it. Times are scenario time in ns.
+never an exception; the caller counts it. Text is for people: what doesn't print, such as a
+terminal's escapes, is replaced. Times are scenario time in ns. A message may be well formed and
+still be impossible: that is for those to say who know the run.
 
     message        layout                                        key
     PathState      [1, tick, t_ns, s, v_hat]                     robot/<name>/path
@@ -21,7 +23,22 @@ from typing import Any, NamedTuple
 import msgpack
 
 VERSION = 1
-MAX_BYTES = 1 << 20
+MAX_BYTES = 1 << 18
+"""Of any message."""
+MOST_BYTES = {
+    "path": 128,
+    "pose": 128,
+    "progress": 128,
+    "truth": 1 << 16,
+    "telemetry": 1 << 16,
+    "traffic": 1 << 16,
+    "report": MAX_BYTES,
+    "up": 1 << 16,
+}
+"""Of what others than the launcher say, by `bridge.keys.kind`: several times what they need."""
+MAX_TEXT = 1 << 15
+"""Characters of a text in a report."""
+_MAX_VALUES, _MAX_NAME = 4096, 128
 _MAX_STEPS = 10_000
 _MAX_INT = 1 << 63
 
@@ -162,8 +179,12 @@ class Report(NamedTuple):
         return value if isinstance(value, int | float) else 0
 
     def encode(self) -> bytes:
-        """Bytes for the wire."""
-        return _pack((VERSION, dict(self.values)))
+        """Bytes for the wire; a text that is too long loses its end."""
+        values = {
+            name: value[:MAX_TEXT] if isinstance(value, str) else value
+            for name, value in self.values.items()
+        }
+        return _pack((VERSION, values))
 
     @classmethod
     def decode(cls, payload: bytes) -> "Report | None":
@@ -171,9 +192,17 @@ class Report(NamedTuple):
         fields = _unpack(payload, 2)
         if fields is None or not isinstance(fields[1], dict):
             return None
-        values: dict[Any, Any] = fields[1]
-        for name, value in values.items():
-            if not isinstance(name, str) or not isinstance(value, int | float | str):
+        if len(fields[1]) > _MAX_VALUES:
+            return None
+        values: dict[str, Value] = {}
+        for name, value in fields[1].items():
+            if type(name) is not str or len(name) > _MAX_NAME:
+                return None
+            if type(value) is str and len(value) <= MAX_TEXT:
+                values[printable(name)] = printable(value)
+            elif _ints([value]) or _finite([value]):
+                values[printable(name)] = value
+            else:
                 return None
         return cls(values)
 
@@ -192,6 +221,13 @@ class Go(NamedTuple):
         """The message in the bytes, None if there is none."""
         fields = _unpack(payload, 2)
         return cls(fields[1]) if fields is not None and _ints(fields[1:]) else None
+
+
+def printable(text: str) -> str:
+    """Text as it may be shown: lines, but nothing that a terminal would obey or hide."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
 def _pack(fields: tuple[object, ...]) -> bytes:

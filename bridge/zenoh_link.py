@@ -23,13 +23,14 @@ from types import TracebackType
 from typing import Self, TypeVar
 
 import zenoh
-from zenoh.handlers import Callback, FifoChannel
+from zenoh.handlers import Callback, RingChannel
 
 from bridge import zenoh_log
 from bridge.access import AccessPlan
 from bridge.denials import Denials, directives, is_ours
-from bridge.link import Arrival, Inbox, Publisher
+from bridge.link import ROOM_BYTES, Arrival, Inbox, Publisher
 from bridge.login import Obstacle, obstacle
+from bridge.messages import MAX_BYTES
 from configs.brief import NetworkLink, Outside, TlsFiles
 from configs.errors import InfrastructureError
 
@@ -42,12 +43,22 @@ _ATTEMPT_S, _LISTEN_S = 5.0, 10.0
 _HANDSHAKE_S, _SILENT_S = 2.0, 3600
 _LEAST_PENDING, _MOST_PENDING, _LEAST_SESSIONS = 100, 4096, 1000
 _PORT_TRIES = 5
-_POLLED_DEPTH = 4096
-"""Messages that wait for who polls; many times more than any schedule lets be on their way."""
+POLLED_DEPTH = 64
+"""Messages on a key that wait for who polls, the newest: more than any schedule lets be on their
+way (`configs.brief.LEAD_TICKS`)."""
 _YIELDS = 20
 _PAUSE_S, _LONGEST_PAUSE_S = 50e-6, 2e-3
-_ONE_THREAD = "(app: (worker_threads: 1), net: {0}, acc: {0}, rx: {0}, tx: {1})"
-_APP, _OWN = "(handover: app)", "(worker_threads: 1)"
+_ONE_THREAD = (
+    "(app: (worker_threads: 1), net: (handover: app), acc: (handover: app), rx: (handover: app),"
+    " tx: (handover: app))"
+)
+_ROUTER_THREADS = (
+    "(app: (worker_threads: 1), net: (handover: app), acc: (handover: app),"
+    " rx: (worker_threads: 2), tx: (worker_threads: 1))"
+)
+_WAIT_BEFORE_CLOSE = "transport/link/tx/queue/congestion_control/block/wait_before_close"
+UNREAD_S = 0.5
+"""Who doesn't read for this long what he asked for, while others wait to say more, is cut off."""
 _Kept = TypeVar("_Kept")
 
 
@@ -72,12 +83,13 @@ class ZenohLink:
             allowed_destination=zenoh.Locality.REMOTE,
         )
 
-    def subscribe(self, key: str, tag: str) -> None:
-        """Queue what others put on `key`, marked with `tag`."""
-        put = self._inbox.put
+    def subscribe(self, key: str, tag: str, *, room_bytes: int = ROOM_BYTES) -> None:
+        """Queue what others put on `key`, marked with `tag`; what finds no room is counted."""
+        put = self._inbox.mailbox(tag, room_bytes)
 
         def take(sample: zenoh.Sample) -> None:
-            put(Arrival(tag, str(sample.key_expr), sample.payload.to_bytes()))
+            payload = sample.payload
+            put(str(sample.key_expr), payload.to_bytes, len(payload))
 
         self._declared.append(
             self._session.declare_subscriber(
@@ -132,8 +144,12 @@ class ZenohLink:
 
     def watch_live(self, key_expr: str, tag: str) -> None:
         """Queue b"1" for every token that is there or comes, b"0" for every one that goes."""
-        put = self._inbox.put
+        put = self._inbox.put_latest
         self.each_live(key_expr, lambda key, alive: put(Arrival(tag, key, b"1" if alive else b"0")))
+
+    def dropped(self) -> dict[str, int]:
+        """By tag, how many messages found no room because nobody took those before them."""
+        return self._inbox.dropped()
 
     stuck = False
     """A session of this process did not close in time: the process must end without its leave."""
@@ -180,21 +196,20 @@ class PolledLink(ZenohLink):
         self._polled: list[tuple[str, str, Callable[[], zenoh.Sample | None]]] = []
         self.receive = self._receive
 
-    def subscribe(self, key: str, tag: str) -> None:
-        """Keep what others put on `key`, marked with `tag`."""
+    def subscribe(self, key: str, tag: str, **_: int) -> None:
+        """Keep the last `POLLED_DEPTH` that others put on `key`, marked with `tag`.
+
+        Never more, whatever their size: of what arrives here the router bounds that.
+        """
         subscriber = self._session.declare_subscriber(
-            key, FifoChannel(_POLLED_DEPTH), allowed_origin=zenoh.Locality.REMOTE
+            key, RingChannel(POLLED_DEPTH), allowed_origin=zenoh.Locality.REMOTE
         )
         self._declared.append(subscriber)
         self._polled.append((tag, key, subscriber.try_recv))
 
     def _receive(self, timeout_s: float) -> Arrival | None:
-        polled = self._polled
-        for tag, key, look in polled:
-            if (sample := look()) is not None:
-                return Arrival(tag, key, sample.payload.to_bytes())
-        if timeout_s <= 0.0:
-            return None
+        if (arrival := self._look()) is not None or timeout_s <= 0.0:
+            return arrival
         deadline = time.monotonic() + timeout_s
         looks, pause_s = 0, _PAUSE_S
         while (left_s := deadline - time.monotonic()) > 0.0:
@@ -204,9 +219,17 @@ class PolledLink(ZenohLink):
                 time.sleep(min(pause_s, left_s))
                 pause_s = min(1.5 * pause_s, _LONGEST_PAUSE_S)
             looks += 1
-            for tag, key, look in polled:
-                if (sample := look()) is not None:
-                    return Arrival(tag, key, sample.payload.to_bytes())
+            if (arrival := self._look()) is not None:
+                return arrival
+        return None
+
+    def _look(self) -> Arrival | None:
+        """What waits on one of the keys; whose turn it was, waits for all others' next time."""
+        polled = self._polled
+        for n, (tag, key, look) in enumerate(polled):
+            if (sample := look()) is not None:
+                polled.append(polled.pop(n))
+                return Arrival(tag, key, sample.payload.to_bytes())
         return None
 
     def close(self) -> None:
@@ -245,7 +268,7 @@ def _client(network: NetworkLink, timeout_s: float) -> zenoh.Session:
     pause_s = _FIRST_RETRY_S
     while True:
         left_s = min(max(deadline - time.monotonic(), _FIRST_RETRY_S), _ATTEMPT_S)
-        with _few_threads(_APP):
+        with _few_threads(_ONE_THREAD):
             session = _open_bounded(_login_config("client", network, left_s), left_s + 1.0)
         if not isinstance(session, str):
             return session
@@ -287,12 +310,17 @@ def _login_config(mode: str, network: NetworkLink, timeout_s: float) -> zenoh.Co
 
 @contextlib.contextmanager
 def open_router(
-    endpoint: str | None, access: AccessPlan, folder: Path, outside: Outside | None = None
+    endpoint: str | None,
+    access: AccessPlan,
+    folder: Path,
+    outside: Outside | None = None,
+    *,
+    unread_s: float = UNREAD_S,
 ) -> Iterator[RouterLink]:
     """Be the router at `endpoint`, or at a free loopback port if None, and enforce `access`.
 
     Those on other machines come in at `outside`. `folder` must be private: the user dictionary is
-    written there while the router opens.
+    written there while the router opens. Who doesn't read is cut off after `unread_s`.
 
     Raises:
         InfrastructureError: an endpoint is taken or can't be listened on.
@@ -304,7 +332,7 @@ def open_router(
     dictionary.write_text(access.dictionary(), "utf-8")
     with zenoh_log.listening(denials.take, is_ours):
         try:
-            session, at = _listen(endpoint, access, dictionary, outside)
+            session, at = _listen(endpoint, access, dictionary, outside, unread_s)
         finally:
             dictionary.unlink()
         with RouterLink(session, at, denials) as link:
@@ -312,12 +340,12 @@ def open_router(
 
 
 @contextlib.contextmanager
-def _few_threads(tx: str) -> Iterator[None]:
+def _few_threads(threads: str) -> Iterator[None]:
     """Around the first session of a process: Zenoh reads it then, and children don't inherit it."""
     if "ZENOH_RUNTIME" in os.environ:
         yield
         return
-    os.environ["ZENOH_RUNTIME"] = _ONE_THREAD.format(_APP, tx)
+    os.environ["ZENOH_RUNTIME"] = threads
     try:
         yield
     finally:
@@ -325,7 +353,11 @@ def _few_threads(tx: str) -> Iterator[None]:
 
 
 def _listen(
-    endpoint: str | None, access: AccessPlan, dictionary: Path, outside: Outside | None
+    endpoint: str | None,
+    access: AccessPlan,
+    dictionary: Path,
+    outside: Outside | None,
+    unread_s: float,
 ) -> tuple[zenoh.Session, str]:
     tries = 1 if endpoint else _PORT_TRIES
     reason = ""
@@ -338,7 +370,10 @@ def _listen(
         _accept_many(config, len(access.rights))
         _set(config, "transport/auth/usrpwd/dictionary_file", str(dictionary))
         config.insert_json5("access_control", access.access_control())
-        with _few_threads(_OWN):
+        config.insert_json5("low_pass_filter", access.low_pass_filter())
+        config.insert_json5("downsampling", access.downsampling())
+        _set(config, _WAIT_BEFORE_CLOSE, int(unread_s * 1e6))
+        with _few_threads(_ROUTER_THREADS):
             session = _open_bounded(config, _LISTEN_S)
         if not isinstance(session, str):
             _await_first_words([at, *([outside.endpoint] if outside else [])])
@@ -407,6 +442,7 @@ def _config(mode: str) -> zenoh.Config:
     _set(config, "scouting/delay", 0)
     _set(config, "transport/shared_memory/enabled", False)
     _set(config, "transport/link/tx/lease", LEASE_MS)
+    _set(config, "transport/link/rx/max_message_size", 2 * MAX_BYTES)
     return config
 
 

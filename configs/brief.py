@@ -531,3 +531,5 @@ class RecorderBrief:
     hello_every_s: float
     network: NetworkLink
     runtime_folder: str  # holds the buses' sockets; goes when the launcher was killed
+    ticks: int  # of the run: nobody has rows of later ones
+    last_frame_ns: int  # bus time after which no frame ends

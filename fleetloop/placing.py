@@ -108,7 +108,8 @@ def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.
     Raises:
         ScenarioError: the deployment's credentials lack somebody.
     """
-    graph, network = scenario.topology, deployment.network
+    graph, network, clock = scenario.topology, deployment.network, scenario.clock
+    realtime = clock.mode == "realtime"
     return access.plan(
         run,
         scenario.names,
@@ -119,6 +120,8 @@ def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.
         guests=guests(scenario, deployment),
         bus_guests=tuple(bus_guests(deployment)),
         certified=network is not None and network.tls is not None,
+        share_period_s=clock.share_period_s if realtime else None,
+        localisation_period_s=clock.localisation_period_s if realtime else None,
     )
 
 

@@ -5,29 +5,41 @@ outlives the launcher for as long as it takes to complete the file. Started by `
 """
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 from bridge import keys
 from bridge.barrier import Hellos, await_hellos
 from bridge.can_bus import places
+from bridge.frame import MAX_DATA
 from bridge.link import Arrival
-from bridge.messages import Progress, Report, Rows
+from bridge.messages import Progress, Report, Rows, Value
 from bridge.process import Stop, cpu_ns, serve
-from bridge.telemetry import AGENT_ROW, FRAME_ROW, PLANT_ROW
+from bridge.refusals import Refusals
+from bridge.telemetry import AGENT_ROW, BLOCK_FRAMES, BLOCK_TICKS, FRAME_ROW, PLANT_ROW
 from bridge.zenoh_link import open_client
 from configs.brief import RecorderBrief
+from fleetloop.record.can_log import frames_of
 from fleetloop.record.run_record import RunRecord
 from fleetloop.record.writer import Source
 
 QUIET_S = 0.3
 """Once asked to stop, the recorder takes what still comes until nothing came for this long."""
 PROGRESS_EVERY_S = 0.25
+AHEAD_TICKS = 1 << 17
+"""How far a source's rows may be ahead of the slowest's; they wait in memory."""
+ROOM_BYTES = 1 << 26
+"""Of what waits of one source: a slow disk may take its time."""
+_WHOSE = {"plant": "the plant for {}", "controller": "{}'s controller", "can": "bus {}"}
 _ROW_SIZES = {"plant": PLANT_ROW.size, "controller": AGENT_ROW.size, "can": FRAME_ROW.size}
 
 
 class _Recorder:
     def __init__(self, brief: RecorderBrief, record: RunRecord) -> None:
         self._record = record
+        self._ticks = brief.ticks
+        self._last_frame_ns = brief.last_frame_ns
+        self.refusals = Refusals()
         sources = {f"{kind}/{r}" for r in brief.robots for kind in ("plant", "controller")}
         sources |= {f"can/{bus}" for bus in brief.buses}
         self.unheard = set(sources)
@@ -38,8 +50,10 @@ class _Recorder:
     def take(self, arrival: Arrival) -> None:
         kind, _, robot = arrival.tag.partition("/")
         rows = Rows.decode(arrival.payload, _ROW_SIZES[kind])
-        if rows is None:
-            self.undecodable += 1
+        wrong = "not well formed" if rows is None else self._wrong(kind, robot, rows)
+        if rows is None or wrong is not None:
+            self.undecodable += rows is None
+            self._refuse(arrival.tag, wrong or "")
             return
         self.unheard.discard(arrival.tag)
         if rows.length and kind == "can":
@@ -48,6 +62,44 @@ class _Recorder:
             self._take_rows(robot, "plant" if kind == "plant" else "controller", rows)
         if rows.final:
             self.unfinished.discard(arrival.tag)
+
+    def note_dropped(self, dropped: Mapping[str, int]) -> None:
+        """Count what found no room, by source."""
+        for tag, count in dropped.items():
+            self._refuse(tag, f"{ROOM_BYTES >> 20} MiB of it waited already", count)
+
+    def _refuse(self, tag: str, why: str, count: int = 1) -> None:
+        kind, _, name = tag.partition("/")
+        what = "frame block" if kind == "can" else "row block"
+        self.refusals.note(what, _WHOSE[kind].format(name), why.partition(" ")[0], why, count)
+
+    def _wrong(self, kind: str, robot: str, rows: Rows) -> str | None:
+        """Why a block can't be of this run, None if it can."""
+        if kind == "can":
+            return self._wrong_frames(rows)
+        if not rows.length:
+            return None  # a hello, or nothing more to say
+        source: Source = "plant" if kind == "plant" else "controller"
+        expected = self._record.next_tick(robot, source)
+        if expected is None:
+            return f"tick {rows.first_tick} after its last"
+        if rows.first_tick != expected:
+            return f"begins at tick {rows.first_tick}, expected {expected}"
+        if rows.length > BLOCK_TICKS or rows.first_tick + rows.length > self._ticks:
+            return f"{rows.length} rows from tick {rows.first_tick} on; the run has {self._ticks}"
+        if rows.first_tick - self._record.written > AHEAD_TICKS:
+            return f"ahead of others by more than {AHEAD_TICKS} ticks"
+        return None
+
+    def _wrong_frames(self, rows: Rows) -> str | None:
+        frames = frames_of(rows.rows)
+        if rows.length > BLOCK_FRAMES:
+            return f"{rows.length} frames, at most {BLOCK_FRAMES} travel together"
+        if len(frames) and frames["length"].max() > MAX_DATA:
+            return f"{frames['length'].max()} bytes of data in a frame"
+        if len(frames) and frames["stamp_ns"].max() > self._last_frame_ns:
+            return f"a frame at {frames['stamp_ns'].max() * 1e-9:.6g} s of bus time"
+        return None
 
     def _take_rows(self, robot: str, source: Source, rows: Rows) -> None:
         if rows.length:
@@ -73,10 +125,11 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         name = brief.network.run
         recorder = _Recorder(brief, record)
         for robot in brief.robots:
-            link.subscribe(keys.truth(name, robot), f"plant/{robot}")
-            link.subscribe(keys.telemetry(name, robot), f"controller/{robot}")
+            link.subscribe(keys.truth(name, robot), f"plant/{robot}", room_bytes=ROOM_BYTES)
+            telemetry = keys.telemetry(name, robot)
+            link.subscribe(telemetry, f"controller/{robot}", room_bytes=ROOM_BYTES)
         for bus in brief.buses:
-            link.subscribe(keys.traffic(name, bus), f"can/{bus}")
+            link.subscribe(keys.traffic(name, bus), f"can/{bus}", room_bytes=ROOM_BYTES)
         progress = link.publisher(keys.progress(name, "recorder"))
         report = link.publisher(keys.report(name, "recorder"))
         await_hellos(
@@ -104,10 +157,18 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
                 next_report = now + PROGRESS_EVERY_S
                 record.flush()
                 progress.put(Progress(recorder.ticks, 0, 0).encode())
+        recorder.note_dropped(link.dropped())
+        lost = refused = recorder.refusals.lines()
         if recorder.unfinished:
             missing = ", ".join(sorted(recorder.unfinished))
-            record.note_lost(f"the run ended before the last of {missing} came")
-        values = {"undecodable": recorder.undecodable, "cpu_ns": cpu_ns() - began_ns}
+            lost = [*refused, f"the run ended before the last of {missing} came"]
+        if lost:
+            record.note_lost("; ".join(lost))
+        values: dict[str, Value] = {
+            "undecodable": recorder.undecodable,
+            "notices": "\n".join(refused),
+            "cpu_ns": cpu_ns() - began_ns,
+        }
         report.put(Report(values).encode())
         stop.await_release()
     return f"{brief.path} has {recorder.ticks} ticks"

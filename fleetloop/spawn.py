@@ -20,6 +20,8 @@ from fleetloop import placing
 from fleetloop.children import Child
 from fleetloop.nursery import Nursery
 
+AFTERWARDS_NS = 60 * 10**9
+"""Bus time in which frames may still end after the closing tick, in real time on a slow machine."""
 Links = Mapping[str, NetworkLink]
 """How each identity reaches the router."""
 
@@ -110,6 +112,8 @@ def _recorder(orders: Orders, links: Links, folder: Path) -> RecorderBrief:
         ticks.hello_every_s,
         links[access.RECORDER],
         str(folder),
+        ticks.ticks,
+        ticks.bus_time_ns(ticks.ticks) + AFTERWARDS_NS,
     )
 
 

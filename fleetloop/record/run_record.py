@@ -62,6 +62,15 @@ class RunRecord:
         with contextlib.suppress(OSError):
             folder.rmdir()
 
+    def next_tick(self, robot: str, source: Source) -> int | None:
+        """The tick of the row that a source owes next, as `RecordWriter.next_tick`."""
+        return self._rows.next_tick(robot, source)
+
+    @property
+    def written(self) -> int:
+        """Ticks of which every source has delivered, as `RecordWriter.written`."""
+        return self._rows.written
+
     def add(self, robot: str, source: Source, first_tick: int, rows: bytes) -> None:
         """Add rows of consecutive ticks, as `RecordWriter.add`."""
         self._rows.add(robot, source, first_tick, rows)

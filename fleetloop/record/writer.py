@@ -66,6 +66,17 @@ class RecordWriter:
         self._numbers = {robot: number for number, robot in enumerate(self._robots)}
         self._lost = ""
 
+    def next_tick(self, robot: str, source: Source) -> int | None:
+        """The tick of the row that a source owes next, None if it has said its last."""
+        held = self._sources[self._numbers[robot], _KINDS[source]]
+        return None if held.ended else held.first_tick + held.count
+
+    @property
+    def written(self) -> int:
+        """Ticks of which every source has delivered its row or said its last."""
+        ends = [held.first_tick + held.count for held in self._sources.values() if not held.ended]
+        return min(ends, default=max(held.first_tick for held in self._sources.values()))
+
     def add(self, robot: str, source: Source, first_tick: int, rows: bytes) -> None:
         """Add rows of consecutive ticks, float64 as `bridge.telemetry` packs them.
 

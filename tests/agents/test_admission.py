@@ -107,9 +107,11 @@ def test_in_real_time_old_and_repeated_data_is_refused() -> None:
 
 def test_where_somebody_starts_is_believed_until_control_begins() -> None:
     assert at(-1).path("r1", state(-1))
-    assert refused(at(0), state(-1)) == "dated before the run, which has begun"
     assert at(-1).pose(PoseFix(-1, 0, 0.0, 0.0, 0.0))
-    assert not at(0).pose(PoseFix(-1, 0, 0.0, 0.0, 0.0))
+    begun = at(0)
+    assert not begun.path("r1", state(-1))
+    assert not begun.pose(PoseFix(-1, 0, 0.0, 0.0, 0.0))
+    assert begun.refusals.lines() == []  # late, and no lie
 
 
 def test_poses_are_dated_like_path_states_and_of_this_world() -> None:
