@@ -51,5 +51,5 @@ def test_a_controller_that_is_killed_ends_a_real_time_run_with_its_name(tmp_path
         run.child("r3").kill()
         status, out = run.end(within_s=5.0)
         assert status == 3
-        assert "agent/r3 was killed by SIGKILL, at tick " in out
+        assert "agent/r3 was killed by SIGKILL, after " in out
         assert run.survivors() == []
