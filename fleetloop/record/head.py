@@ -9,7 +9,8 @@ has no check of channels and schemas that holds for a file whose end is missing.
 import struct
 import zlib
 from collections.abc import Sequence
-from importlib.metadata import version
+from functools import cache
+from importlib import metadata
 from io import BytesIO
 from typing import NamedTuple, TypeVar
 
@@ -84,11 +85,11 @@ def build(robots: Sequence[str], scenario_toml: str) -> Head:
         media_type=attachment.media_type,
     )
     data += attached
-    facts = {_VERSION: version("fleetloop"), _CRC: f"{zlib.crc32(data):08x}"}
-    metadata = encoded(records.Metadata(LIBRARY, facts))
-    metadata_index = records.MetadataIndex(len(data), len(metadata), LIBRARY)
+    facts = {_VERSION: _version(), _CRC: f"{zlib.crc32(data):08x}"}
+    said = encoded(records.Metadata(LIBRARY, facts))
+    metadata_index = records.MetadataIndex(len(data), len(said), LIBRARY)
     return Head(
-        data + metadata,
+        data + said,
         tuple(robots),
         scenario_toml,
         schemas,
@@ -96,6 +97,11 @@ def build(robots: Sequence[str], scenario_toml: str) -> Head:
         attachment_index,
         metadata_index,
     )
+
+
+@cache
+def _version() -> str:
+    return metadata.version("fleetloop")
 
 
 def understood(found: _Records, crc: int) -> Head:
@@ -113,10 +119,10 @@ def understood(found: _Records, crc: int) -> Head:
         if header is None or header.library != LIBRARY:
             who = f", but of {header.library!r}" if header is not None else ""
             raise HeadError(f"an MCAP file, but not the record of a run{who}")
-        metadata = next(iter(_all_of(records.Metadata, Opcode.METADATA, found)), None)
-        if metadata is None or _CRC not in metadata.metadata:
+        said = next(iter(_all_of(records.Metadata, Opcode.METADATA, found)), None)
+        if said is None or _CRC not in said.metadata:
             raise HeadError("of another version of Fleetloop, or damaged: no check sum of its head")
-        if metadata.metadata[_CRC] != f"{crc:08x}":
+        if said.metadata[_CRC] != f"{crc:08x}":
             raise HeadError("damaged: the check sum of its head differs")
         robots = [
             channel.topic.split("/")[1]
@@ -128,13 +134,13 @@ def understood(found: _Records, crc: int) -> Head:
     except (McapError, ValueError, IndexError, struct.error) as error:
         raise HeadError(f"damaged: its head says nothing ({str(error) or 'too short'})") from error
     if list(found[:-1]) != _parts(head):
-        writer = metadata.metadata.get(_VERSION, "?")
+        writer = said.metadata.get(_VERSION, "?")
         theirs = _signals(_all_of(records.Schema, Opcode.SCHEMA, found))
         ours = _signals(head.schemas)
         differ = ", ".join(sorted(theirs ^ ours)) or "none"
         raise HeadError(
             f"written by Fleetloop {writer} in another layout than that of this one,"
-            f" {version('fleetloop')}; signals that only one of both has: {differ}"
+            f" {_version()}; signals that only one of both has: {differ}"
         )
     return head
 

@@ -7,8 +7,11 @@
 
 Messages are CDR (little endian) with ROS 2 schemas, which Foxglove opens, and of fixed size, so
 that a block of them is one numpy array: MCAP's record header, the CDR header, then the fields.
-Field names in the schemas are those of `bridge.telemetry` in lower case, as ROS wants them. Times
+Field names in the schemas are those of `configs.signals` in lower case, as ROS wants them. Times
 are scenario time; nothing in a record knows the wall clock, so equal runs leave equal files.
+
+Before the messages stand channels and scenario (`fleetloop.record.head`), behind them what is
+missing in the file (`fleetloop.record.scan`); every byte is under some check sum.
 """
 
 from collections.abc import Sequence
