@@ -26,6 +26,8 @@ LEADER = "leader"
 _COLOURS = ("#08306b", "#d95f02", "#1b9e77", "#9e2a8c", "#7f7f7f", "#b8860b")
 _DASHES: tuple[object, ...] = ("-", (0, (6, 2)), (0, (2, 1.2)), (0, (7, 2, 1.5, 2)))
 _POINTS = 1500
+_DRAWABLE = 1e30
+"""Of a motion that diverged only what is smaller is drawn: axes can't be laid out beyond."""
 _STYLE: Any = {
     "font.size": 9,
     "axes.grid": True,
@@ -51,7 +53,7 @@ def all_figures(record: Record, scenario: Scenario) -> list[Captioned]:
 
     Each robot is drawn up to its own end; an edge's difference while both its ends are there.
     """
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(_STYLE), np.errstate(all="ignore"):
         chosen = [*_FIGURES, _CLOCK] if scenario.clock.mode == "realtime" else _FIGURES
         return [Captioned(name, caption, draw(record, scenario)) for name, caption, draw in chosen]
 
@@ -105,14 +107,16 @@ def positions(record: Record, _: Scenario) -> Figure:
             continue
         colour, dash = _style(n)
         pick = _stride(len(used))
-        axes.plot(used["x_d_m"][pick], used["y_d_m"][pick], color="0.75", linewidth=2.6, zorder=1)
+        x, y = _drawable(used["x_d_m"][pick]), _drawable(used["y_d_m"][pick])
+        axes.plot(x, y, color="0.75", linewidth=2.6, zorder=1)
         pick = _stride(len(truth))
-        axes.plot(truth["x_m"][pick], truth["y_m"][pick], color=colour, linestyle=dash, label=robot)
+        x, y = _drawable(truth["x_m"]), _drawable(truth["y_m"])
+        axes.plot(x[pick], y[pick], color=colour, linestyle=dash, label=robot)
         at = np.linspace(0, len(truth) - 1, 9).astype(int)
         heading = truth["theta_rad"][at]
         axes.quiver(
-            truth["x_m"][at],
-            truth["y_m"][at],
+            x[at],
+            y[at],
             np.cos(heading),
             np.sin(heading),
             color=colour,
@@ -121,7 +125,7 @@ def positions(record: Record, _: Scenario) -> Figure:
             width=0.005,
             zorder=3,
         )
-        axes.plot(truth["x_m"][0], truth["y_m"][0], "o", color=colour, markersize=4)
+        axes.plot(x[0], y[0], "o", color=colour, markersize=4)
     axes.plot([], [], color="0.75", linewidth=2.6, label="reference")
     axes.set(xlabel="x [m]", ylabel="y [m]", title="Positions and orientations; dots: start")
     axes.set_aspect("equal", adjustable="datalim")
@@ -204,7 +208,7 @@ def clock_figures(record: Record, _: Scenario) -> Figure:
     names = (("late_s", "wake-up lateness"), ("round_trip_s", "torque to feedback"))
     for axes, (signal, title) in zip(panels, names, strict=True):
         values = np.concatenate([rows[signal] for rows in record.controller.values()])
-        values = np.clip(values[np.isfinite(values)] * 1e6, 1.0, None)
+        values = np.clip(values[np.isfinite(values)] * 1e6, 1.0, 1e12)
         bins = np.geomspace(1.0, values.max(initial=10.0), 60)
         axes.hist(values, bins=bins, color=_COLOURS[0])
         for share, dash in ((50, "-"), (99, "--"), (99.9, ":")) if len(values) else ():
@@ -260,8 +264,14 @@ def _settled(series: Sequence[np.ndarray]) -> int | None:
     return last if last < longest - 2 else None
 
 
+def _drawable(values: np.ndarray) -> np.ndarray:
+    """NaN for what can't be drawn."""
+    return np.where(np.abs(values) < _DRAWABLE, values, np.nan)
+
+
 def _envelope(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Few enough points to draw, with every peak: smallest and largest value of each stretch."""
+    values = _drawable(values)
     stretch = len(values) // _POINTS
     if stretch < 3:
         return t, values

@@ -54,6 +54,8 @@ class _Recorder:
         if rows is None or wrong is not None:
             self.undecodable += rows is None
             self._refuse(arrival.tag, wrong or "")
+            if rows is not None:
+                self._give_up_if_gone(arrival.tag, rows)
             return
         self.unheard.discard(arrival.tag)
         if rows.length and kind == "can":
@@ -62,6 +64,17 @@ class _Recorder:
             self._take_rows(robot, "plant" if kind == "plant" else "controller", rows)
         if rows.final:
             self.unfinished.discard(arrival.tag)
+
+    def _give_up_if_gone(self, tag: str, rows: Rows) -> None:
+        """A source with a gap has no row any more that could follow; others don't wait for it."""
+        kind, _, robot = tag.partition("/")
+        if kind != "can":
+            source: Source = "plant" if kind == "plant" else "controller"
+            expected = self._record.next_tick(robot, source)
+            if expected is not None and (rows.final or rows.first_tick > expected):
+                self._record.end(robot, source)
+        if rows.final:
+            self.unfinished.discard(tag)
 
     def note_dropped(self, dropped: Mapping[str, int]) -> None:
         """Count what found no room, by source."""

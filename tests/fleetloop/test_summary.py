@@ -97,3 +97,13 @@ def test_what_is_no_number_is_null_in_the_file_and_said_in_the_table() -> None:
     assert read["robots"]["r1"]["final_max"] == errors
     for summary in (said, read):
         assert next(iter(robot_rows(summary)))[4:] == ["no number"] * 3 + ["0.00"]
+
+
+@pytest.mark.parametrize("value", [1e308, -1e308, np.inf, np.nan])
+def test_figures_bear_a_motion_that_diverged(finished_run: Path, value: float) -> None:
+    record = Record.open(finished_run / "record.mcap")
+    for rows in (record.plant["r1"], record.controller["r1"]):
+        for name in rows.dtype.names[2:]:
+            rows[name][1500:] = value
+    for item in all_figures(record, load("two_robots")):
+        item.figure.draw_without_rendering()
