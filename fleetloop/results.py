@@ -111,8 +111,9 @@ def spread_line(summary: Summary) -> str:
     if spread is None:
         return ""
     return (
-        f"spread of s: peak {spread['peak']:.4f} m, settled {_time(spread['settle_s'])},"
-        f" at most {spread['final']:.2e} m in the last {_final_s(summary):g} s"
+        f"spread of s: peak {_number(spread['peak'], '.4f')} m,"
+        f" settled {_time(spread['settle_s'])},"
+        f" at most {_number(spread['final'], '.2e')} m in the last {_final_s(summary):g} s"
     )
 
 
@@ -181,7 +182,7 @@ def claim(expect: dict[str, Any]) -> str:
 def _cells(values: dict[str, Any]) -> list[str]:
     settles = [_time(values["settle_s"][name]) for name in ERRORS]
     finals = [_number(values["final_max"][name], ".5f") for name in ERRORS]
-    return [*settles, *finals, f"{values['peak_torque_N_m']:.2f}"]
+    return [*settles, *finals, _number(values["peak_torque_N_m"], ".2f")]
 
 
 def _number(value: float | None, spec: str) -> str:

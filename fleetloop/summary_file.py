@@ -1,6 +1,7 @@
 """`summary.json` read back: what of it the page shows has to be there and to be what it should.
 
-Keys that aren't named here may be there, too. What `fleetloop.summary` makes fits.
+Keys that aren't named here may be there, too. What `fleetloop.summary` makes fits; a number that was
+none, as after a law that diverged, is null.
 """
 
 import json
@@ -23,7 +24,7 @@ def _of_every_error(values: dict[str, Any]) -> dict[str, Any]:
 class _Worst(BaseModel):
     settle_s: Annotated[dict[str, float | None], AfterValidator(_of_every_error)]
     final_max: Annotated[dict[str, float | None], AfterValidator(_of_every_error)]
-    peak_torque_N_m: float
+    peak_torque_N_m: float | None
 
 
 class _Robot(_Worst):
@@ -32,9 +33,9 @@ class _Robot(_Worst):
 
 
 class _Spread(BaseModel):
-    peak: float
+    peak: float | None
     settle_s: float | None
-    final: float
+    final: float | None
 
 
 class _Found(BaseModel):

@@ -6,13 +6,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from configs.errors import ScenarioError
 from configs.loading import load
 from fleetloop.record.reader import Record
 from fleetloop.report import _page, write_report
+from fleetloop.summary import RunStats, summarise, to_json
 from fleetloop.summary_file import read_summary
+
+
+GONE = object()
+"""Instead of a value: it isn't there at all."""
 
 
 @pytest.fixture
@@ -65,12 +71,12 @@ def paths(value: Any, at: tuple = ()) -> Iterator[tuple]:
 
 
 def changed(summary: dict[str, Any], at: tuple, other: Any) -> dict[str, Any]:
-    """The same but for one place; other None: it isn't there at all."""
+    """The same but for one place."""
     made = copy.deepcopy(summary)
     holder = made
     for key in at[:-1]:
         holder = holder[key]
-    if other is None:
+    if other is GONE:
         del holder[at[-1]]
     else:
         holder[at[-1]] = other
@@ -89,7 +95,7 @@ def test_whatever_is_read_can_be_shown(finished_run: Path, folder: Path) -> None
     record, scenario = Record.open(finished_run / "record.mcap"), load("two_robots")
     refused = 0
     for at in paths(summary):
-        for other in (None, [], {}, "x", 1.5, False):
+        for other in (GONE, None, [], {}, "x", 1.5, False):
             (folder / "summary.json").write_text(json.dumps(changed(summary, at, other)))
             try:
                 found = read_summary(folder)
@@ -103,3 +109,14 @@ def test_whatever_is_read_can_be_shown(finished_run: Path, folder: Path) -> None
 
 def test_what_a_run_leaves_is_read(finished_run: Path) -> None:
     assert read_summary(finished_run) == json.loads((finished_run / "summary.json").read_bytes())
+
+
+def test_a_run_that_diverged_to_no_number_is_shown(finished_run: Path, tmp_path: Path) -> None:
+    record, scenario = Record.open(finished_run / "record.mcap"), load("two_robots")
+    for rows in record.controller.values():
+        for name in rows.dtype.names[2:]:
+            rows[name][1500:] = np.nan
+    summary = summarise(record, scenario, RunStats("lockstep"))
+    (tmp_path / "summary.json").write_text(to_json(summary))
+    for shown in (summary, read_summary(tmp_path)):
+        assert "no number" in _page(shown, scenario, record, [])
