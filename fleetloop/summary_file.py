@@ -1,7 +1,7 @@
 """`summary.json` read back: what of it the page shows has to be there and to be what it should.
 
-Keys that aren't named here may be there, too. What `fleetloop.summary` makes fits; a number that was
-none, as after a law that diverged, is null.
+Keys that aren't named here may be there, too. What `fleetloop.summary` makes fits; a number that
+was none, as after a law that diverged, is null.
 """
 
 import json

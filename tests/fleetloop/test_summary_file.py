@@ -16,7 +16,6 @@ from fleetloop.report import _page, write_report
 from fleetloop.summary import RunStats, summarise, to_json
 from fleetloop.summary_file import read_summary
 
-
 GONE = object()
 """Instead of a value: it isn't there at all."""
 
