@@ -34,7 +34,7 @@ from bridge.process import (
 )
 from bridge.profile import Sampler
 from bridge.telemetry import AGENT_ROW, RowBuffer
-from bridge.zenoh_link import open_polled
+from bridge.zenoh_link import StoppedError, open_polled
 from configs.brief import AgentBrief
 from configs.errors import FleetloopError
 
@@ -48,7 +48,11 @@ def run(brief: AgentBrief, stop: Stop) -> str:
     Returns why it stopped before the end of the run, "" if it did not.
     """
     name_process(f"agent {brief.robot}")
-    with open_polled(brief.network, brief.schedule.start_deadline_s) as link:
+    try:
+        link = open_polled(brief.network, brief.schedule.start_deadline_s, stop)
+    except StoppedError:
+        return stop.reason
+    with link:
         if brief.detached:
             follow_launcher(link, brief.network.run, stop)
         with open_bus(brief.robot, brief.bus) as bus:

@@ -14,6 +14,7 @@ import ctypes
 import json
 import os
 import resource
+import select
 import socket
 import threading
 import time
@@ -31,6 +32,7 @@ from bridge.denials import Denials, directives, is_ours
 from bridge.link import ROOM_BYTES, Arrival, Inbox, Publisher
 from bridge.login import Obstacle, obstacle
 from bridge.messages import MAX_BYTES
+from bridge.process import Stop
 from configs.brief import NetworkLink, Outside, TlsFiles
 from configs.errors import InfrastructureError
 
@@ -248,22 +250,28 @@ class RouterLink(ZenohLink):
         """Whom the router refused, from its log."""
 
 
-def open_client(network: NetworkLink, timeout_s: float) -> ZenohLink:
+class StoppedError(Exception):
+    """Asked to stop before there was a session."""
+
+
+def open_client(network: NetworkLink, timeout_s: float, stop: Stop | None = None) -> ZenohLink:
     """Connect to the router as `network.user`.
 
     Raises:
         InfrastructureError: nobody answers there, or the login was refused.
+        StoppedError: `stop` was requested before.
     """
-    return ZenohLink(_client(network, timeout_s))
+    return ZenohLink(_client(network, timeout_s, stop))
 
 
-def open_polled(network: NetworkLink, timeout_s: float) -> PolledLink:
+def open_polled(network: NetworkLink, timeout_s: float, stop: Stop | None = None) -> PolledLink:
     """The same for who looks at given times."""
-    return PolledLink(_client(network, timeout_s))
+    return PolledLink(_client(network, timeout_s, stop))
 
 
-def _client(network: NetworkLink, timeout_s: float) -> zenoh.Session:
+def _client(network: NetworkLink, timeout_s: float, stop: Stop | None) -> zenoh.Session:
     """Try until it opens; a refused login is told at once, who isn't there yet is waited for."""
+    wake = [] if stop is None else [stop.wake_fd]
     deadline = time.monotonic() + timeout_s
     pause_s = _FIRST_RETRY_S
     while True:
@@ -279,7 +287,8 @@ def _client(network: NetworkLink, timeout_s: float) -> zenoh.Session:
                 f"{network.user}: no session with the router at {network.endpoint}{within}:"
                 f" {reason.text}"
             )
-        time.sleep(pause_s)
+        if select.select(wake, [], [], pause_s)[0]:
+            raise StoppedError
         pause_s = min(1.5 * pause_s, _LAST_RETRY_S)
 
 

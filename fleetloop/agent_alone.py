@@ -46,8 +46,8 @@ def run_agent(source: str, robot: str, deployment_file: Path, overrides: Overrid
     bus = placing.agent_bus(deployment, robot)
     brief = replace(agent_brief(scenario, robot, network=network, bus=bus), detached=True)
     settings = " ".join(f"{key}={value}" for key, value in deployment.bus_of(robot))
-    note(f"{role}: {settings}; waiting for run {network.run!r} at {network.endpoint}")
     with stop_on_signals() as stop:
+        note(f"{role}: {settings}; waiting for run {network.run!r} at {network.endpoint}")
         early = run(brief, stop)
     if early == LAUNCHER_GONE:
         early += ", or the network to it"

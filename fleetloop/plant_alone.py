@@ -126,8 +126,8 @@ def _join(scenario: Scenario, deployment: Deployment) -> int:
     brief = placing.robots_of_plant(plant_brief(scenario, network=network), deployment)
     attached = {bus for bus, _ in brief.attached}
     ours = [bus for bus in dict.fromkeys(r.bus for r in brief.robots) if bus not in attached]
-    note(f"plant: waiting for run {network.run!r} at {network.endpoint}")
     with stop_on_signals() as stop, places.run_folder(f"{network.run}-plant") as folder:
+        note(f"plant: waiting for run {network.run!r} at {network.endpoint}")
         listeners = places.listen(folder, ours)
         brief = replace(
             brief,

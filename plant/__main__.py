@@ -21,7 +21,7 @@ from bridge.messages import Go, PoseFix, Progress, Report, Rows
 from bridge.process import Stop, cpu_ns, go_realtime, serve, settle_memory
 from bridge.profile import Sampler
 from bridge.telemetry import PLANT_ROW, FrameBuffer, RowBuffer
-from bridge.zenoh_link import open_client
+from bridge.zenoh_link import StoppedError, open_client
 from configs.brief import PlantBrief, Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError
 from plant.loop import Counters, LockstepLoop, bus_frames
@@ -43,7 +43,11 @@ EARLY = -1
 def run(brief: PlantBrief, stop: Stop) -> str:
     """Wire the plant to its buses and the network, wait for everybody, and run."""
     listeners = {bus: socket.socket(fileno=fd) for bus, fd in brief.listeners}
-    with open_client(brief.network, brief.schedule.start_deadline_s) as link:
+    try:
+        link = open_client(brief.network, brief.schedule.start_deadline_s, stop)
+    except StoppedError:
+        return "ended before it began"
+    with link:
         if brief.detached:
             follow_launcher(link, brief.network.run, stop)
         queue = brief.wire.txqueuelen if brief.wire else 0

@@ -191,6 +191,16 @@ def test_a_controller_elsewhere_that_is_interrupted_says_so_and_leaves_its_drive
     assert torque[-1] == 0.0
 
 
+def test_who_waits_for_a_router_that_is_not_there_can_be_interrupted(tmp_path, agents) -> None:
+    agents.append(Agent("r2", with_password(tmp_path)))
+    process = agents[0].process
+    assert process.stderr is not None
+    assert "waiting for run" in process.stderr.readline()
+    process.send_signal(signal.SIGTERM)
+    status, said = agents[0].end(within_s=10.0)
+    assert (status, said) == (130, "agent/r2: interrupted by SIGTERM\n")
+
+
 def test_a_wrong_password_is_refused_within_the_start_deadline(tmp_path, agents) -> None:
     where = with_password(tmp_path)
     run = start(tmp_path, where, "--set", "clock.start_deadline_s=6.0")
