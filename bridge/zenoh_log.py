@@ -54,6 +54,7 @@ def listening(take: Callable[[str], None], is_ours: Callable[[str], bool]) -> It
     with contextlib.suppress(OSError):
         fcntl.fcntl(into, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)
     os.dup2(into, 1)
+    ours = os.fstat(into).st_ino
     os.close(into)
     over = threading.Event()
     reader = threading.Thread(target=_read, args=(out, before, over, take, is_ours), daemon=True)
@@ -62,9 +63,13 @@ def listening(take: Callable[[str], None], is_ours: Callable[[str], bool]) -> It
         yield
     finally:
         _flush()
-        os.dup2(before, 1)
+        with contextlib.suppress(OSError):  # somebody has closed it
+            if os.fstat(1).st_ino == ours:  # nobody has led it elsewhere
+                os.dup2(before, 1)
         over.set()
         reader.join(1.0)
+        if not reader.is_alive():
+            os.close(before)
 
 
 def _read(
@@ -90,7 +95,6 @@ def _read(
     if rest:
         _write(before, rest)
     os.close(out)
-    os.close(before)
 
 
 def _write(descriptor: int, line: bytes) -> None:
