@@ -210,7 +210,7 @@ class FleetloopBus(can.BusABC):
         except BlockingIOError:
             self._send_late(data, timeout)
         except OSError as error:
-            raise self._gone_with(error) from error
+            raise self._unsent(error) from error
 
     def fileno(self) -> int:
         """The descriptor that becomes readable with the next frame."""
@@ -294,6 +294,15 @@ class FleetloopBus(can.BusABC):
         why = "closed without a word" if error is None else f"is gone: {error}"
         return can.CanOperationError(f"bus {self.channel!r} {why}{self._losses()}")
 
+    def _unsent(self, error: OSError) -> can.CanOperationError:
+        """Why nothing can be sent: the bus's own last word, if it is there to read."""
+        try:
+            while self._receive(0.0):
+                pass
+        except can.CanOperationError as told:
+            return told
+        return self._gone_with(error)
+
     def _losses(self) -> str:
         return f"; {self.lost} frames for it were lost: not read in time" if self.lost else ""
 
@@ -330,6 +339,6 @@ class FleetloopBus(can.BusABC):
             except BlockingIOError:
                 continue  # another thread was faster
             except OSError as error:
-                raise self._gone_with(error) from error
+                raise self._unsent(error) from error
             return
         raise can.CanOperationError(f"bus {self.channel!r}: transmit buffer full", errno.ENOBUFS)

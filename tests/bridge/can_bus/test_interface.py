@@ -269,6 +269,23 @@ def test_the_end_of_the_bus_is_an_error_that_says_why(running, join) -> None:
         bus.recv(5.0)
 
 
+def test_who_sends_to_a_bus_that_has_ended_is_told_why_and_can_still_read_what_was_said(
+    running, join
+) -> None:
+    bus = join()
+    running.deliver(Frame(1, b""), Frame(2, b""))
+    running.close()
+
+    def send() -> None:
+        while True:
+            bus.send(message(), timeout=1.0)
+
+    for _ in range(2):
+        with pytest.raises(can.CanOperationError, match=r"the test is over|the bus has gone"):
+            send()
+    assert [bus.recv(5.0).arbitration_id for _ in range(2)] == [1, 2]
+
+
 def test_who_is_behind_when_the_bus_ends_still_gets_all_of_it_and_the_reason(running, join) -> None:
     bus = join()
     heard: list[int] = []
