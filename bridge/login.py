@@ -1,4 +1,4 @@
-"""Why there is no session with a router: from what Zenoh says of one attempt to have one.
+"""Why there is no session with a router, or no router: from what Zenoh says of one attempt.
 
 Zenoh says it of a peer only; of a client it says that it could not connect. So who was refused as a
 client asks again as a peer, for the reason (`bridge.zenoh_link`).
@@ -48,6 +48,13 @@ _OBSTACLES = (
     (r"InvalidContentType|corrupt message", "it speaks no TLS there: tls/ instead of tcp/", True),
     (r"deadline has elapsed", "no answer from there", False),
 )
+_TAKEN = (
+    (r"\[(\S+:\d+): Address already in use", "{0} is already in use"),
+    (r"\[(\S+:\d+): Cannot assign requested address", "{0} is no address of this machine"),
+    (r"\[(\S+:\d+): Permission denied", "{0} is not for this user: ports below 1024 are root's"),
+    (r"(Name or service not known|No address associated)", "no such host ({0})"),
+    (r"Missing TLS", "tls/ needs certificates: network.tls of a deployment"),
+)
 
 
 def obstacle(said: str, user: str) -> Obstacle:
@@ -55,5 +62,17 @@ def obstacle(said: str, user: str) -> Obstacle:
     for pattern, text, final in _OBSTACLES:
         if found := re.search(pattern, said):
             return Obstacle(text.format(*found.groups(), user=user), final)
-    places = re.compile(r" at /\S+:\d+\.")  # in Zenoh's own source
-    return Obstacle(places.sub("", said) or "no answer from there", final=False)
+    return Obstacle(_plain(said) or "no answer from there", final=False)
+
+
+def taken(said: str) -> str:
+    """What Zenoh's error means for who wants to listen."""
+    for pattern, text in _TAKEN:
+        if found := re.search(pattern, said):
+            return text.format(*found.groups())
+    return _plain(said) or "Zenoh doesn't answer"
+
+
+def _plain(said: str) -> str:
+    """Without places in Zenoh's own source."""
+    return re.sub(r" at /\S+:\d+\.", "", said)

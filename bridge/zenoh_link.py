@@ -30,7 +30,7 @@ from bridge import zenoh_log
 from bridge.access import AccessPlan
 from bridge.denials import Denials, directives, is_ours
 from bridge.link import ROOM_BYTES, Arrival, Inbox, Publisher
-from bridge.login import Obstacle, obstacle
+from bridge.login import Obstacle, obstacle, taken
 from bridge.messages import MAX_BYTES
 from bridge.process import Stop
 from configs.brief import NetworkLink, Outside, TlsFiles
@@ -387,13 +387,11 @@ def _listen(
         if not isinstance(session, str):
             _await_first_words([at, *([outside.endpoint] if outside else [])])
             return session, at
-        reason = session or f"nothing within {_LISTEN_S:g} s"
+        reason = taken(session)
     where = " and ".join(
         [endpoint or "any loopback port", *([outside.endpoint] if outside is not None else [])]
     )
-    raise InfrastructureError(
-        f"can't listen at {where}: already in use, or no such address ({reason})"
-    )
+    raise InfrastructureError(f"can't listen at {where}: {reason}")
 
 
 def _hasty(endpoint: str) -> str:

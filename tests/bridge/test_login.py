@@ -147,3 +147,22 @@ def test_plain_tcp_to_a_listener_with_tls_is_named(router: RouterLink, outside: 
     plain = outside.endpoint.replace("tls/", "tcp/")
     said = refusal(NetworkLink(RUN, plain, "agent-r1", "word"), 0.5)
     assert "or tcp/ instead of tls/" in said
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "said"),
+    [
+        ("tcp/192.0.2.1:7447", "192.0.2.1:7447 is no address of this machine"),
+        ("tcp/nosuch.invalid:7447", "no such host (Name or service not known)"),
+        ("tls/127.0.0.1:7447", "tls/ needs certificates: network.tls of a deployment"),
+    ],
+)
+def test_why_nobody_can_listen_there_is_told_apart(
+    plan: access.AccessPlan, tmp_path: Path, endpoint: str, said: str
+) -> None:
+    with (
+        pytest.raises(InfrastructureError, match=rf"^can't listen at {endpoint}: ") as caught,
+        open_router(endpoint, plan, tmp_path),
+    ):
+        pass
+    assert str(caught.value).endswith(said)
