@@ -139,7 +139,7 @@ class Guard:
         reason = self._refusal or self.bus_fault or drives.fault(now_ns)
         if reason is None and self.phase is not Phase.READY:
             reason = drives.missing(now_ns) or "armed in the last tick only"
-            reason += "; a longer clock.countdown_s helps"
+            reason += "; `fleetloop check` says whether bus and clock.countdown_s leave time for it"
         if reason is not None:
             raise InfrastructureError(
                 f"{self._brief.robot}: drives not armed when control had to start: {reason}"

@@ -51,6 +51,9 @@ def _names(scenario: Scenario) -> Iterator[Problem]:
         points = scenario.path.points_m
         if any(a == b for a, b in itertools.pairwise(points)):
             yield Problem("path.points_m", points, "two neighbouring points are the same")
+        if scenario.path.closed and points[0] == points[-1]:
+            right = "a closed spline goes back to its first point by itself: leave the last one out"
+            yield Problem("path.points_m", points, right)
         if scenario.path.closed and len(points) < 3:
             yield Problem("path.points_m", points, "a closed spline needs three points or more")
     steps = [step.t_s for step in scenario.leader.steps]
@@ -89,6 +92,14 @@ def _periods(scenario: Scenario) -> Iterator[Problem]:
                 f"must be a whole multiple of clock.control_period_s = {clock.control_period_s:g}"
                 f", for example {below:g}",
             )
+    silence_s = scenario.coordination.silence_limit_s
+    if clock.share_period_s > silence_s:
+        yield Problem(
+            "clock.share_period_s",
+            clock.share_period_s,
+            f"must not be above coordination.silence_limit_s = {silence_s:g}, or every neighbour"
+            " counts as silent between two shares",
+        )
     shortest = 3 * clock.control_period_s + 2 * scenario.drive.heartbeat_period_s
     if clock.countdown_s < shortest:
         yield Problem(

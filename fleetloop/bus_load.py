@@ -22,7 +22,7 @@ from bridge.drives.odrive.frames import (
 from bridge.frame import Frame
 from configs.brief import RobotBrief
 from configs.scenario import Scenario
-from configs.stability import Finding
+from fleetloop.checks.finding import Finding
 
 _SAMPLES = 64
 _TYPICAL_REV_S = 2.4  # a wheel of 4 cm radius at 0.6 m/s
@@ -40,9 +40,9 @@ def bus_findings(scenario: Scenario, robots: Sequence[RobotBrief]) -> list[Findi
         buses.setdefault(robot.bus, []).append(robot)
     period_ns = round(scenario.clock.control_period_s * 1e9)
     found = []
-    for bus, sharing in buses.items():
+    for sharing in buses.values():
         analysis = analyse(bus_messages(sharing, period_ns), scenario.bus.bitrate_bit_s)
-        found.append(_finding(scenario, bus, len(sharing), analysis))
+        found.append(_finding(scenario, tuple(robot.robot for robot in sharing), analysis))
     return found
 
 
@@ -90,11 +90,11 @@ def _axis_messages(robot: RobotBrief, node: int, period_ns: int) -> list[Message
     return messages
 
 
-def _finding(scenario: Scenario, bus: str, robots: int, analysis: Analysis) -> Finding:
+def _finding(scenario: Scenario, robots: tuple[str, ...], analysis: Analysis) -> Finding:
     rate, ceiling = scenario.bus.bitrate_bit_s, scenario.bus.load_ceiling
     count = len(analysis.messages)
-    who = "1 robot" if robots == 1 else f"{robots} robots"
-    title = f"bus {bus}: {who} at {rate / 1000:g} kbit/s"
+    shared = "" if len(robots) == 1 else f" that {len(robots)} robots share"
+    title = f"bus at {rate / 1000:g} kbit/s{shared}"
     slowest = analysis.slowest
     late = sum(not message.schedulable for message in analysis.messages)
     period_ms = slowest.period_ns * 1e-6
@@ -108,12 +108,14 @@ def _finding(scenario: Scenario, bus: str, robots: int, analysis: Analysis) -> F
         f" (ceiling {ceiling:.0%}); {timing}"
     )
     if analysis.worst_load <= ceiling and analysis.schedulable:
-        return Finding("ok", title, text)
+        return Finding("ok", title, text, robots)
     if late:
         text += f"; {late} of {count} can come too late"
     if scenario.bus.timing == "ideal":
-        return Finding("warning", title, f"{text}: no real bus can, the ideal one does")
+        return Finding("warning", title, f"{text}: no real bus can, the ideal one does", robots)
     usually = all(message.usually_schedulable for message in analysis.messages)
     if analysis.worst_load <= ceiling and usually:
-        return Finding("warning", title, f"{text}, but only when all are due at once and longest")
-    return Finding("error", title, f"{text}: lower the rates, or put fewer robots on a bus")
+        text += ", but only when all are due at once and longest"
+        return Finding("warning", title, text, robots)
+    text += ": lower the rates, or put fewer robots on a bus"
+    return Finding("error", title, text, robots, "bus.bitrate_bit_s")

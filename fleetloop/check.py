@@ -7,17 +7,22 @@ from pathlib import Path
 
 from rich.table import Table
 
-from configs.briefing import robot_briefs
 from configs.deployment import Deployment, agent_role, load_deployment
 from configs.errors import Complaint, ScenarioError
 from configs.loading import json_schema, load, shipped
 from configs.overrides import Overrides
 from configs.scenario import Scenario
-from configs.stability import Finding, findings
-from fleetloop.bus_load import bus_findings
+from fleetloop.checks.examine import examine
+from fleetloop.checks.finding import Finding, titled, worst
+from fleetloop.checks.rehearsal import rehearse
 from fleetloop.terminal import ResultConsole, say, say_json
 
 FINE, UNSOUND, WRONG = 0, 1, 2
+_VERDICTS = {
+    "ok": "sound",
+    "warning": "sound as far as can be said, but for the warnings",
+    "error": "would not work as it is",
+}
 _MARKS = {"ok": "[green]ok[/]", "warning": "[yellow]warning[/]", "error": "[red]error[/]"}
 
 
@@ -50,9 +55,9 @@ def check_scenario(
         padding=(0, 1),
     )
     for finding in found:
-        table.add_row(_MARKS[finding.level], finding.title, finding.text)
+        table.add_row(_MARKS[finding.level], titled(finding), finding.text)
     ResultConsole().print(table)
-    say("would not work as it is" if unsound else "sound")
+    say(_VERDICTS[worst(found)])
     return UNSOUND if unsound else FINE
 
 
@@ -60,7 +65,9 @@ def _find(
     source: str, overrides: Overrides, deployment: Path | None
 ) -> tuple[Scenario, list[Finding]]:
     scenario = load(source, overrides)
-    found = [*findings(scenario), *bus_findings(scenario, robot_briefs(scenario))]
+    found = examine(source, scenario)
+    if worst(found) != "error":
+        found += rehearse(scenario)
     if deployment is not None:
         found += place_findings(scenario, load_deployment(deployment, scenario))
     return scenario, found
@@ -101,7 +108,7 @@ def place_findings(scenario: Scenario, deployment: Deployment) -> list[Finding]:
         drives = "emulated" if deployment.emulates(robot) else "REAL"
         where = "here" if deployment.runs_here(agent_role(robot)) else "elsewhere"
         text = f"controller {where}, {drives} drives on {bus['interface']} {bus['channel']}"
-        found.append(Finding("ok", f"{robot}: place", text))
+        found.append(Finding("ok", "place", text, (robot,)))
     return found
 
 

@@ -136,6 +136,10 @@ def run(
             " before their time.",
         ),
     ] = False,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Run also what `fleetloop check` calls an error."),
+    ] = False,
 ) -> None:
     """Run a scenario, record everything, check its expectations, print and save the results."""
     from fleetloop.run import Options, run_scenario
@@ -150,6 +154,7 @@ def run(
         profile=profile,
         deployment=deployment,
         allow_unchecked=allow_unchecked,
+        force=force,
     )
     raise typer.Exit(run_scenario(scenario, options))
 

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Protocol
 
 from agents.agent import Agent
 from agents.bus_clock import BusClock
@@ -17,7 +18,6 @@ from bridge.messages import LeaderSpeed, PathState, PoseFix, Progress
 from bridge.process import Stop, settled_memory
 from bridge.telemetry import AGENT_ROW, PLANT_ROW, FrameBuffer, RowBuffer
 from configs.brief import AgentBrief, LeaderBrief, PlantBrief
-from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.writer import Source
 from plant.buses import IdealBus
 from plant.emulation import Emulation, emulations
@@ -25,6 +25,19 @@ from plant.unit import Unit, diverged_robots, unit_of
 from plant.wire_bus import WireBus
 
 PROGRESS_EVERY_TICKS = 256
+
+
+class Keeper(Protocol):
+    """Takes rows and traffic as they come; a `BackgroundWriter` is one."""
+
+    def add(self, robot: str, source: Source, first_tick: int, rows: bytes) -> None:
+        """Take the rows of consecutive ticks."""
+
+    def end(self, robot: str, source: Source) -> None:
+        """Nothing follows from this source."""
+
+    def traffic(self, bus: str, frames: bytes) -> None:
+        """Take what crossed a bus."""
 
 
 @dataclass(slots=True)
@@ -151,7 +164,7 @@ class InProcessRun:
         plant: PlantBrief,
         agents: list[AgentBrief],
         leader: LeaderBrief,
-        writer: BackgroundWriter,
+        writer: Keeper,
         on_progress: Callable[[Progress], None],
     ) -> None:
         self._schedule = plant.schedule
@@ -271,7 +284,7 @@ def _localise(unit: Unit, agent: Agent, tick: int, t_ns: int) -> None:
 
 
 def _write(
-    writer: BackgroundWriter,
+    writer: Keeper,
     robot: str,
     source: Source,
     first: int,
@@ -286,7 +299,7 @@ def _write(
 
 
 def _write_traffic(
-    writer: BackgroundWriter, bus: str, _first: int, count: int, frames: bytes, _final: bool
+    writer: Keeper, bus: str, _first: int, count: int, frames: bytes, _final: bool
 ) -> None:
     if count:
         writer.traffic(bus, frames)

@@ -16,6 +16,8 @@ from configs.loading import load, to_toml
 from configs.overrides import Overrides
 from configs.scenario import Scenario
 from fleetloop import placing, run_folder, wall_time
+from fleetloop.checks.examine import examine
+from fleetloop.checks.finding import likewise, titled, worst
 from fleetloop.expectations import out_of_reach
 from fleetloop.launch import Outcome, ProcessRun
 from fleetloop.lockstep import InProcessRun
@@ -44,6 +46,8 @@ class Options:
     profile: bool = False
     deployment: Path | None = None
     allow_unchecked: bool = False
+    force: bool = False
+    """Run what `fleetloop check` calls an error."""
 
 
 def run_scenario(source: str, options: Options) -> int:
@@ -75,6 +79,7 @@ def run_scenario(source: str, options: Options) -> int:
         note(long)
     for line in out_of_reach(scenario):
         note(f"{scenario.name}: {line}")
+    _look_ahead(source, scenario, force=options.force)
     started = datetime.now(UTC).astimezone()
     folder = run_folder.create(scenario.name, options.out, now=started)
     with (
@@ -96,6 +101,19 @@ def run_scenario(source: str, options: Options) -> int:
             raise
     stats.started = started.isoformat(timespec="seconds")
     return _finish(scenario, folder, stats, options)
+
+
+def _look_ahead(source: str, scenario: Scenario, *, force: bool) -> None:
+    """Say what `fleetloop check` has against a scenario, but for its rehearsal: here is the run.
+
+    Raises:
+        ScenarioError: it has an error against it.
+    """
+    found = [finding for finding in examine(source, scenario) if finding.level != "ok"]
+    for finding in likewise(found):
+        note(f"{finding.level}: {titled(finding)}: {finding.text}")
+    if worst(found) == "error" and not force:
+        raise ScenarioError(f"{source}: would not work as it is; --force runs it all the same")
 
 
 def _deployment(scenario: Scenario, options: Options) -> Deployment:

@@ -80,7 +80,7 @@ def test_a_countdown_that_is_too_short_says_in_which_state_the_drives_are() -> N
     schedule = replace(bench.schedule, countdown_ticks=10)
     bench = Bench("r2", schedule=schedule)
     bench.run(10)
-    with pytest.raises(InfrastructureError, match=r"it is IDLE, last result .*countdown_s helps"):
+    with pytest.raises(InfrastructureError, match=r"it is IDLE, last result .*fleetloop check"):
         bench.tick()
 
 

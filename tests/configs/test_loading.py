@@ -78,6 +78,12 @@ def test_the_schema_in_the_package_is_the_schema_of_the_types() -> None:
         ("clock.control_period_s=0", "clock.control_period_s", "greater than 0"),
         ("clock.control_period_s=-0.001", "clock.control_period_s", "greater than 0"),
         ("clock.share_period_s=0.0015", "clock.share_period_s", "whole multiple"),
+        ("clock.share_period_s=3.0", "clock.share_period_s", "not be above coordination.silence"),
+        (
+            "path={kind='spline', closed=true, points_m=[[0.0,0.0],[1.0,0.0],[1.0,1.0],[0.0,0.0]]}",
+            "path.points_m",
+            "leave the last one out",
+        ),
         ("clock.countdown_s=0.0", "clock.countdown_s", "too short to arm"),
         ("robot_types.etsro.body_mass_kg=-1.0", "robot_types.etsro.body_mass_kg", "greater than 0"),
         ("control.law='pid'", "control.law", "adaptive_dsc"),

@@ -1,6 +1,5 @@
 """Sections [motor], [encoder] and [supply]: defaults, what is refused, what the plant is told."""
 
-import math
 from dataclasses import replace
 
 import pytest
@@ -9,8 +8,7 @@ from scenario_text import changed
 from configs.brief import NetworkLink, PowertrainModel, RobotBrief
 from configs.briefing import plant_brief
 from configs.errors import ScenarioError
-from configs.loading import load, loads, shipped
-from configs.stability import findings
+from configs.loading import load, loads
 
 REALISTIC = "drive.preset='realistic'"
 NETWORK = NetworkLink("t", "", "", "")
@@ -72,11 +70,6 @@ def test_every_robot_of_every_seed_has_a_noise_of_its_own() -> None:
     assert len(set(seeds)) == len(seeds) == 48
 
 
-@pytest.mark.parametrize("name", shipped())
-def test_every_shipped_scenario_can_be_checked_with_realistic_drives(name: str) -> None:
-    assert findings(load(name, (REALISTIC,)))
-
-
 @pytest.mark.parametrize(
     ("override", "key", "right"),
     [
@@ -102,27 +95,3 @@ def test_one_wrong_value_gives_one_line_with_key_and_what_is_right(
     (line,) = str(caught.value).splitlines()
     assert line.startswith(f"file.toml: {key} = ")
     assert right in line
-
-
-def test_a_section_that_the_preset_does_not_look_at_is_warned_of() -> None:
-    changed = ("motor.ambient_C=40.0", "encoder.index=true")
-    titles = [f.title for f in findings(load("paper", changed)) if "not used" in f.text]
-    assert titles == ["[motor]", "[encoder]"]
-    assert not [f for f in findings(load("paper", (*changed, REALISTIC))) if "not used" in f.text]
-
-
-def test_friction_counts_in_the_torque_that_a_realistic_robot_needs() -> None:
-    def text(*overrides: str) -> str:
-        found = findings(load("two_robots", overrides))
-        return next(f.text for f in found if f.title == "r1: steady wheel torque")
-
-    def need(*overrides: str) -> float:
-        return float(text(*overrides).split()[1])
-
-    free = ("motor.coulomb_friction_N_m=0.0", "motor.viscous_friction_N_m_s=0.0")
-    limited = need("drive.preset='limited'")
-    assert need(REALISTIC, *free) == limited
-    assert math.isclose(
-        need(REALISTIC, *free[1:], "motor.coulomb_friction_N_m=0.1"), limited + 0.1, rel_tol=1e-2
-    )
-    assert "of 0.25 N·m" in text(REALISTIC, "motor.current_limit_A=5.0")

@@ -8,8 +8,8 @@ from bridge.can_bus.load import analyse
 from configs.briefing import robot_briefs, wire_model
 from configs.loading import load, loads, to_toml
 from configs.scenario import Scenario
-from configs.stability import Finding
 from fleetloop.bus_load import bus_findings, bus_messages
+from fleetloop.checks.finding import Finding
 
 MS = 1_000_000
 
@@ -25,9 +25,7 @@ def first_of(scenario: Scenario) -> Finding:
 def test_every_robot_has_its_bus_and_a_line_of_arithmetic() -> None:
     scenario = load("paper")
     findings = bus_findings(scenario, robot_briefs(scenario))
-    assert [finding.title.split(":")[0] for finding in findings] == [
-        f"bus r{n}" for n in range(1, 5)
-    ]
+    assert [finding.robots for finding in findings] == [(f"r{n}",) for n in range(1, 5)]
 
 
 def test_the_paper_at_1_khz_and_1_mbit_fits_with_the_figures_of_the_analysis() -> None:

@@ -103,6 +103,28 @@ def test_check_of_an_unsound_scenario_ends_with_1(tmp_path: Path) -> None:
     assert json.loads(done.stdout)["sound"] is False
 
 
+def test_run_refuses_what_check_calls_an_error_unless_it_is_forced(tmp_path: Path) -> None:
+    backwards = "--in-process", "--no-report", "--json", "--set", "leader.speed_m_s=-0.4"
+    refused = fleetloop("run", "two_robots", *backwards, cwd=tmp_path)
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert "error: ṡ > 0: the leader's speed: v_r = -0.4 m/s" in refused.stderr
+    assert "--force runs it" in refused.stderr
+    assert list(tmp_path.iterdir()) == []
+    forced = fleetloop(
+        "run", "two_robots", *backwards, "--force", "--duration", "0.5", cwd=tmp_path
+    )
+    assert json.loads(forced.stdout)["verdict"] == "not checked"
+    assert "error: ṡ > 0" in forced.stderr
+
+
+def test_a_path_that_stands_still_is_refused_by_check_and_run(tmp_path: Path) -> None:
+    centre = "--set", "robot.r1.offset={kind='structure', left_m=3.0}"
+    for verb in ("check", "run"):
+        done = fleetloop(verb, "two_robots", *centre, cwd=tmp_path)
+        assert done.returncode == 2
+        assert "robot.r1.offset.left_m = 3.0: r1's path stands still" in done.stderr
+
+
 def test_init_writes_a_scenario_that_checks_and_is_not_overwritten(tmp_path: Path) -> None:
     assert fleetloop("init", "mine.toml", cwd=tmp_path).returncode == 0
     assert load(tmp_path / "mine.toml").name == "my_scenario"

@@ -108,11 +108,11 @@ def test_a_check_says_where_real_drives_would_be_driven(tmp_path, capsys) -> Non
     file.write_text('[robot.r2]\nbus = { interface = "socketcan", channel = "can0" }\n')
     assert check_scenario("two_robots_100hz", (), deployment=file, as_json=True) == 0
     places = {
-        finding["title"]: finding["text"]
+        finding["robots"][0]: finding["text"]
         for finding in json.loads(capsys.readouterr().out)["findings"]
-        if finding["title"].endswith("place")
+        if finding["title"] == "place"
     }
     assert places == {
-        "r1: place": "controller here, emulated drives on fleetloop r1",
-        "r2: place": "controller here, REAL drives on socketcan can0",
+        "r1": "controller here, emulated drives on fleetloop r1",
+        "r2": "controller here, REAL drives on socketcan can0",
     }

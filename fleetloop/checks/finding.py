@@ -1,0 +1,57 @@
+"""What a check says: how bad it is, whom it concerns, the numbers, and the key to change."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+Level = Literal["ok", "warning", "error"]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was checked. An error: it would not work; a warning: it may not."""
+
+    level: Level
+    title: str
+    text: str
+    robots: tuple[str, ...] = ()
+    """Whom it concerns; nobody in particular if empty."""
+    key: str = ""
+    """Of the file, to change; "" if nothing has to."""
+
+
+def likewise(findings: Iterable[Finding]) -> list[Finding]:
+    """One of each kind: of those that differ in their numbers, the first, and who else has it."""
+    kinds: dict[tuple[str, str], list[Finding]] = {}
+    for finding in findings:
+        kinds.setdefault((finding.level, finding.title), []).append(finding)
+    merged = []
+    for first, *rest in kinds.values():
+        others = ", ".join(robot for finding in rest for robot in finding.robots)
+        merged.append(replace(first, text=f"{first.text}; likewise {others}") if others else first)
+    return merged
+
+
+def worst(findings: Iterable[Finding]) -> Level:
+    """The worst level of all."""
+    levels = {finding.level for finding in findings}
+    return "error" if "error" in levels else "warning" if "warning" in levels else "ok"
+
+
+def titled(finding: Finding) -> str:
+    """Whom it concerns, and what was checked."""
+    return f"{', '.join(finding.robots)}: {finding.title}" if finding.robots else finding.title
+
+
+def alike(findings: Iterable[Finding]) -> list[Finding]:
+    """The same findings, those that differ in nothing but the robot as one."""
+    merged: dict[tuple[str, str, str], Finding] = {}
+    for finding in findings:
+        same = finding.level, finding.title, finding.text
+        known = merged.get(same)
+        merged[same] = (
+            finding
+            if known is None
+            else replace(known, robots=tuple(dict.fromkeys([*known.robots, *finding.robots])))
+        )
+    return list(merged.values())
