@@ -281,11 +281,13 @@ def export(
     robots: Annotated[str, typer.Option(metavar="R1,R2", help="Only these robots; else all.")] = "",
     from_s: Annotated[
         float | None,
-        typer.Option("--from", metavar="SECONDS", help="From this scenario time on [s]."),
+        typer.Option("--from", metavar="SECONDS", help="From this scenario time on, in seconds."),
     ] = None,
     to_s: Annotated[
         float | None,
-        typer.Option("--to", metavar="SECONDS", help="Up to and with this scenario time [s]."),
+        typer.Option(
+            "--to", metavar="SECONDS", help="Up to and with this scenario time, in seconds."
+        ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite FILE if it exists.")] = False,
     partial: PartialOption = False,
@@ -296,8 +298,8 @@ def export(
     from fleetloop.terminal import say
 
     chosen = Selection(
-        signals=tuple(filter(None, signals.split(","))),
-        robots=tuple(filter(None, robots.split(","))),
+        signals=tuple(filter(None, map(str.strip, signals.split(",")))),
+        robots=tuple(filter(None, map(str.strip, robots.split(",")))),
         from_s=from_s,
         to_s=to_s,
     )

@@ -1,6 +1,9 @@
 """Tables of a run: columns, rows, selection, and what is never overwritten or left half."""
 
 import csv
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -131,3 +134,18 @@ def test_another_ending_or_a_folder_is_refused(finished_run: Path, tmp_path: Pat
 def test_a_place_that_cannot_be_written_is_named(finished_run: Path, tmp_path: Path) -> None:
     with pytest.raises(InfrastructureError, match=r"can't write .*nowhere/a\.csv: No such file"):
         export(finished_run, tmp_path / "nowhere" / "a.csv")
+
+
+def test_the_command_line_takes_all_of_it(finished_run: Path, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").touch()
+    wanted = ["--signals", "mu,x_m", "--robots", "r2", "--from", "1", "--to", "1.01", "--force"]
+    done = subprocess.run(
+        [sys.executable, "-m", "fleetloop", "export", finished_run, "a.csv", *wanted],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env=os.environ | {"PYTHONSAFEPATH": "1"},
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "wrote a.csv: 6 rows\n", "")
+    assert list(read(tmp_path / "a.csv")[0]) == ["t_s", "robot", "mu", "x_m"]
