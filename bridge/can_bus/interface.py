@@ -300,7 +300,10 @@ class FleetloopBus(can.BusABC):
             while self._receive(0.0):
                 pass
         except can.CanOperationError as told:
-            return told
+            if self._closed_because is None:
+                return told
+            because = f"{self._closed_because}{self._losses()}"
+            return BusClosedError(f"bus {self.channel!r} is gone: {because}")
         return self._gone_with(error)
 
     def _losses(self) -> str:

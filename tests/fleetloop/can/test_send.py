@@ -32,5 +32,5 @@ def test_nothing_is_sent_if_one_text_is_no_frame(buses) -> None:
 
 
 def test_a_bus_that_ends_meanwhile_is_named(buses) -> None:
-    with pytest.raises(InfrastructureError, match=r"gone.*after 1 frames"):
+    with pytest.raises(InfrastructureError, match=r"is gone: end of the run, after 1 frames"):
         send("r1", ["123#"], count=2, gap_s=10.0, wait=lambda _: buses.end())
