@@ -20,15 +20,17 @@ from agents.realtime import RealtimeLoop
 from bridge import keys
 from bridge.barrier import Hellos, await_hellos
 from bridge.can_bus.convert import to_message
+from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.opening import open_bus
 from bridge.launcher import follow_launcher
 from bridge.link import Arrival, Link, Publisher
-from bridge.messages import Report, Rows
+from bridge.messages import Notice, Report, Rows
 from bridge.process import (
     Stop,
     cpu_ns,
     go_realtime,
     name_process,
+    processor_wait_ns,
     serve,
     settle_memory,
 )
@@ -36,7 +38,7 @@ from bridge.profile import Sampler
 from bridge.telemetry import AGENT_ROW, RowBuffer
 from bridge.zenoh_link import StoppedError, open_polled
 from configs.brief import AgentBrief
-from configs.errors import FleetloopError
+from configs.errors import FleetloopError, InfrastructureError
 
 CONTROLLER_PRIORITY = 40
 """SCHED_FIFO, below the plant's: the drives answer whoever computes."""
@@ -69,6 +71,8 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> str:
         lambda first, count, block, final: telemetry.put(Rows(first, count, block, final).encode()),
     )
     agent = Agent(brief, rows)
+    notice = link.publisher(keys.notice(name, f"agent/{robot}"))
+    agent.guard.announce = lambda text: notice.put(Notice(text).encode())
     link.subscribe(keys.pose(name, robot), "pose")
     for neighbour in brief.hears:
         link.subscribe(keys.path(name, neighbour), f"path/{neighbour}")
@@ -121,7 +125,7 @@ class _Wired(NamedTuple):
         Returns why the body stopped early, "" if it did not.
         """
         sampler = Sampler()
-        began_ns = cpu_ns()
+        began_ns, waited_ns = cpu_ns(), processor_wait_ns()
         failure = ""
         try:
             with sampler if self.agent.brief.schedule.profile else nullcontext():
@@ -142,6 +146,7 @@ class _Wired(NamedTuple):
                 "failure": failure,
                 "early": "" if self.agent.closed else early,
                 "cpu_ns": cpu_ns() - began_ns,
+                "processor_ns": processor_wait_ns() - waited_ns,
             }
             self.report.put(Report(values).encode())
             stop.await_release()
@@ -159,7 +164,10 @@ class _Wired(NamedTuple):
 
 
 def _lockstep(wired: _Wired, stop: Stop) -> str:
-    loop = LockstepLoop(wired.agent, wired.bus, wired.link, wired.path, wired.hellos)
+    bus = wired.bus
+    if not isinstance(bus, FleetloopBus):
+        raise InfrastructureError(f"{wired.agent.brief.robot}: only a bus of ours can set the pace")
+    loop = LockstepLoop(wired.agent, bus, wired.link, wired.path, wired.hellos)
     wired.await_peers(loop.take, stop)
     first = loop.await_first_frame(stop)
     if first is None:
@@ -169,7 +177,9 @@ def _lockstep(wired: _Wired, stop: Stop) -> str:
 
 
 def _realtime(wired: _Wired, stop: Stop) -> str:
-    loop = RealtimeLoop(wired.agent, wired.bus, wired.link, wired.path, wired.hellos)
+    brief = wired.agent.brief
+    beat = wired.link.publisher(keys.progress(brief.network.run, f"agent/{brief.robot}"))
+    loop = RealtimeLoop(wired.agent, wired.bus, wired.link, wired.path, wired.hellos, beat)
     wired.await_peers(lambda arrival: (give(wired.agent, arrival), None)[1], stop)
     settle_memory()
     refused = go_realtime(CONTROLLER_PRIORITY)

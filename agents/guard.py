@@ -4,7 +4,7 @@ What the law asks for gets through whole, limited, or not at all; after arming a
 anew. Torque is sent in one place, while the phase is DRIVING and nothing is wrong in that tick.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum, auto
 from math import isfinite
 from typing import NamedTuple
@@ -47,13 +47,13 @@ _DRIVING = Phase.DRIVING
 class Event(NamedTuple):
     """A change of phase that wasn't the plan."""
 
-    tick: int
+    when: str
     phase: Phase
     reason: str
 
     def __str__(self) -> str:
         """For people."""
-        return f"tick {self.tick}: {self.phase.name}{': ' if self.reason else ''}{self.reason}"
+        return f"{self.when}: {self.phase.name}{': ' if self.reason else ''}{self.reason}"
 
 
 class Guard:
@@ -71,10 +71,16 @@ class Guard:
         self.stopped_because = ""
         """Why the robot stands still now, "" if it doesn't."""
         self.events: list[Event] = []
+        self.announce: Callable[[str], None] = lambda _: None
+        """Told of each event as it happens, in words; whoever runs the controller says to whom."""
+        self._said: list[str] = []
+        self.stalled = ""
+        """Why the last ticks came late, "" if they didn't; see `note_stall`."""
         self.bus_fault: str | None = None
         """Why nothing can be sent; whoever sends says so."""
         self._brief = brief
         self._bus_time_ns = schedule.bus_time_ns
+        self._when = schedule.when
         self._limiter = TorqueLimiter(
             host.torque_limit_N_m, host.torque_slew_limit_N_m_s, schedule.period_s
         )
@@ -98,6 +104,12 @@ class Guard:
             self._doubts[sensor] = reason
         elif self._doubts:
             self._doubts.pop(sensor, None)
+
+    def note_stall(self, tick: int, reason: str) -> None:
+        """Why ticks come late from this one on; set `stalled` to "" when that is over."""
+        self.stalled = reason
+        if len(self._said) < 2 * MAX_EVENTS:
+            self._say(f"{self._when(tick)}: {reason}")
 
     def note_unsent(self, tick: int) -> None:
         """The frames of this tick did not get onto the bus: arming has lost a step."""
@@ -184,7 +196,7 @@ class Guard:
     def notices(self) -> list[str]:
         """What a report should say beside the numbers, in words."""
         dry = ["dry run: nothing was sent to the drives"] if self._brief.host.dry_run else []
-        return [*dry, *map(str, self.events), *self.drives.notices]
+        return [*dry, *self._said, *self.drives.notices]
 
     def _own_fault(self, tick: int) -> str | None:
         """What is wrong beside the drives, None if nothing is."""
@@ -198,7 +210,9 @@ class Guard:
 
     def _stop(self, tick: int, reason: str) -> Sequence[Frame]:
         """Take the torque from both wheels."""
-        self.stopped_because = f"tick {tick}: {reason}"
+        if self.stalled:
+            reason = f"{self.stalled}: {reason}"
+        self.stopped_because = f"{self._when(tick)}: {reason}"
         self._change(tick, Phase.STOPPED, reason)
         return self.drives.disarm()
 
@@ -229,4 +243,10 @@ class Guard:
     def _change(self, tick: int, phase: Phase, reason: str) -> None:
         self.phase = phase
         if len(self.events) < MAX_EVENTS:
-            self.events.append(Event(tick, phase, reason))
+            event = Event(self._when(tick), phase, reason)
+            self.events.append(event)
+            self._say(str(event))
+
+    def _say(self, text: str) -> None:
+        self._said.append(text)
+        self.announce(text)

@@ -17,12 +17,14 @@ from agents.admission import LEADER, LOCALISATION
 from agents.agent import Agent
 from agents.bus_clock import BusClock
 from agents.guard import Phase
+from bridge.awake import LOOK_S, AwakeClock
 from bridge.barrier import Hellos
 from bridge.can_bus.convert import can_id_of, to_message
+from bridge.can_bus.interface import FleetloopBus
 from bridge.frame import Frame
 from bridge.link import Arrival, Link, Publisher
 from bridge.messages import LeaderSpeed, PathState, PoseFix
-from bridge.process import Stop
+from bridge.process import Stop, launcher_stopped
 from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
 
 LISTEN_SHARE = 0.75
@@ -31,8 +33,6 @@ plant names the controller itself."""
 BUS_SHARE = 2.0
 """Multiple of the tick deadline that a controller waits for its bus: the plant has its own word
 first."""
-STOP_EVERY_S = 0.1
-"""How often a controller that waits for messages looks whether it was told to stop."""
 
 _SAID = {"pose": ("pose", LOCALISATION), "leader": ("speed", LEADER)}
 
@@ -53,7 +53,7 @@ class LockstepLoop:
     """Runs one agent on its bus and its link."""
 
     def __init__(
-        self, agent: Agent, bus: can.BusABC, link: Link, path: Publisher, hellos: Hellos
+        self, agent: Agent, bus: FleetloopBus, link: Link, path: Publisher, hellos: Hellos
     ) -> None:
         self._agent = agent
         self._schedule = agent.brief.schedule
@@ -70,13 +70,14 @@ class LockstepLoop:
 
     def await_first_frame(self, stop: Stop) -> can.Message | None:
         """Say hello until the plant's first frame comes; None when told to stop."""
-        deadline = time.monotonic() + self._schedule.start_deadline_s
+        clock = AwakeClock(held=launcher_stopped)
+        deadline = clock.now() + self._schedule.start_deadline_s
         while not stop.requested:
             self._hellos.say()
             message = self._receive(0.02)
             if message is not None:
                 return message
-            if time.monotonic() > deadline:
+            if clock.now() > deadline:
                 raise did_not_start(self._agent)
         return None
 
@@ -120,12 +121,7 @@ class LockstepLoop:
                 counters.ticks += 1
                 if agent.phase is Phase.DONE:
                     return
-            message = self._receive(timeout_s)
-            if message is None and time.monotonic_ns() - asked_ns > timeout_s * 0.9e9:
-                raise InfrastructureError(
-                    f"{self._robot}: no encoder frames within {timeout_s:g} s after"
-                    f" {counters.ticks} ticks"
-                )
+            message = self._await_frame(timeout_s)
 
     def _send(self, frames: Sequence[Frame]) -> None:
         send = self._bus.send
@@ -141,17 +137,35 @@ class LockstepLoop:
     def _listen(self, tick: int, stop: Stop) -> None:
         """Wait for what the schedule owes this tick, or for a stop."""
         agent = self._agent
-        within_s = LISTEN_SHARE * self._schedule.tick_deadline_s
-        deadline = time.monotonic() + within_s
+        clock: AwakeClock | None = None
+        left_s = within_s = LISTEN_SHARE * self._schedule.tick_deadline_s
         while (missing := agent.missing(tick)) and not stop.requested:
             # Who is asked too late may find it waiting; who is flooded finds that there is no end.
-            left_s = deadline - time.monotonic()
-            arrival = self._link.receive(min(max(0.0, left_s), STOP_EVERY_S))
+            arrival = self._link.receive(LOOK_S if left_s > 0.0 else 0.0)
+            if clock is None:
+                clock = AwakeClock(held=launcher_stopped)
+                deadline = clock.now() + within_s
+            left_s = deadline - clock.now()
             if arrival is not None and left_s > -within_s:
                 self.take(arrival)
             elif left_s <= 0.0:
                 said = "; ".join((f"no {', no '.join(missing)}", *agent.refusals()))
                 raise PeerSilentError(f"{self._robot}: tick {tick}: within {within_s:g} s {said}")
+
+    def _await_frame(self, within_s: float) -> can.Message | None:
+        """The next frame of the bus; None when a bus without any has passed a tick."""
+        message = self._receive(LOOK_S)
+        if message is not None or self._bus.asked:
+            return message
+        clock = AwakeClock(held=launcher_stopped)
+        deadline = clock.now() + within_s - LOOK_S
+        while (message := self._receive(LOOK_S)) is None and not self._bus.asked:
+            if clock.now() > deadline:
+                raise InfrastructureError(
+                    f"{self._robot}: no encoder frames within {within_s:g} s after"
+                    f" {self.counters.ticks} ticks"
+                )
+        return message
 
     def _receive(self, timeout_s: float) -> can.Message | None:
         try:

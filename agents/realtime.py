@@ -25,19 +25,25 @@ from agents.bus_health import BusHealth
 from agents.guard import Phase
 from agents.loop import did_not_start, give
 from bridge.access import LAUNCHER
+from bridge.awake import STALL_S
 from bridge.barrier import Hellos
 from bridge.can_bus.convert import can_id_of, to_frame, to_message
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.clock import implausible_start, monotonic_of
 from bridge.frame import ERR, Frame
 from bridge.link import Link, Publisher
-from bridge.messages import Go
+from bridge.messages import Go, Progress
 from bridge.process import Stop
 
 ARRIVALS_PER_TICK = 64
 """Messages that are looked at in one tick, and two more for every in-neighbour: the rest waits."""
 BACKLOG_S = 1.0
 """Longest time for dropping what the bus gathered; no interface keeps more than this takes."""
+
+
+BEAT_EVERY_S = 0.2
+"""How often a controller says that it lives."""
+AFTERMATH_S = 0.5
 
 
 @dataclass(slots=True)
@@ -57,7 +63,13 @@ class RealtimeLoop:
     """Runs one agent on its bus and its link by the wall clock."""
 
     def __init__(
-        self, agent: Agent, bus: can.BusABC, link: Link, path: Publisher, hellos: Hellos
+        self,
+        agent: Agent,
+        bus: can.BusABC,
+        link: Link,
+        path: Publisher,
+        hellos: Hellos,
+        beat: Publisher,
     ) -> None:
         self._agent = agent
         self._schedule = agent.brief.schedule
@@ -66,6 +78,9 @@ class RealtimeLoop:
         self._link = link
         self._path = path
         self._hellos = hellos
+        self._beat = beat
+        self._beat_every = max(round(BEAT_EVERY_S / agent.brief.schedule.period_s), 1)
+        self._stalled_until = 0  # tick up to which what happens may be a stall's doing
         self._health = BusHealth(agent.brief.robot, agent.brief.host.bus_error_limit_ns)
         self._echoes = Echoes() if hands_back(agent.brief.bus) else None
         self._most_arrivals = ARRIVALS_PER_TICK + 2 * len(agent.brief.hears)
@@ -123,7 +138,9 @@ class RealtimeLoop:
             due_ns = epoch_ns + tick * period_ns + phase_ns
             self._read_until(due_ns)
             now_ns = time.monotonic_ns()
-            agent.late_s = (now_ns - due_ns) * 1e-9
+            agent.late_s = late_s = (now_ns - due_ns) * 1e-9
+            if late_s > STALL_S or agent.guard.stalled:
+                self._note_stall(tick, late_s)
             if self._sent_ns and tick > 0:
                 self.counters.misses += 1
                 agent.round_trip_s = nan
@@ -136,11 +153,26 @@ class RealtimeLoop:
             else:
                 self._send(frames, tick)
             self.counters.ticks += tick >= 0
+            if tick % self._beat_every == 0:
+                self._beat.put(Progress(tick, tick * period_ns, 0).encode())
             tick += 1
             if schedule.shares(tick):
                 self._path.put(agent.share(tick).encode())
         with suppress(can.CanError, OSError):
             self._bus.recv(0.0)  # what was gathered goes out
+
+    def _note_stall(self, tick: int, late_s: float) -> None:
+        """What a robot stops for soon after it stood still, it may stop for because it did."""
+        guard = self._agent.guard
+        if late_s > STALL_S:
+            if not guard.stalled:
+                guard.note_stall(
+                    tick, f"this controller, or its machine, stalled for {late_s:.2f} s"
+                )
+            behind = late_s / self._schedule.period_s
+            self._stalled_until = tick + round(behind + AFTERMATH_S / self._schedule.period_s)
+        elif tick > self._stalled_until:
+            guard.stalled = ""
 
     def _drop_backlog(self) -> None:
         """Read what came while nobody read: taken for news, it would be a second drive's.

@@ -3,13 +3,13 @@
 The graph *is* the network. The router refuses everything that isn't listed here (default deny), and
 each process is bound to its identity by a random password that it alone is given:
 
-    agent-<r>   puts   its own path, telemetry, progress, report; its own token
+    agent-<r>   puts   its own path, telemetry, progress, notices, report; its own token
                 hears  path of exactly its in-neighbours, its own pose, leader/speed iff h_i = 1,
                        @clock/go
-    plant       puts   pose and truth of all robots, traffic of all buses, progress, report; its
-                       token
+    plant       puts   pose and truth of all robots, traffic of all buses, progress, notices,
+                       report; its token
                 hears  @clock/go
-    recorder    puts   progress, report; its token
+    recorder    puts   progress, notices, report; its token
                 hears  truth and telemetry of all robots, traffic of all buses
     localisation       only with robots that aren't emulated:
                 puts   their poses
@@ -210,8 +210,8 @@ def plan(
     return AccessPlan(rights, passwords, frozenset(known if certified else ()), most_hz)
 
 
-def _control(run: str, process: str) -> tuple[str, str]:
-    return keys.progress(run, process), keys.report(run, process)
+def _control(run: str, process: str) -> tuple[str, ...]:
+    return keys.progress(run, process), keys.notice(run, process), keys.report(run, process)
 
 
 def _rules_of(user: str, rights: Rights) -> list[dict[str, object]]:

@@ -9,8 +9,9 @@ for the next hello is the pause between two of one's own.
 import time
 from collections.abc import Callable, Iterable
 
+from bridge.awake import LOOK_S, AwakeClock
 from bridge.link import Arrival, Link, Publisher
-from bridge.process import Stop
+from bridge.process import Stop, launcher_stopped
 from configs.errors import InfrastructureError
 
 
@@ -57,15 +58,16 @@ def await_hellos(
     Raises:
         InfrastructureError: something was still missing after `within_s`; the text names it.
     """
-    deadline = time.monotonic() + within_s
+    clock = AwakeClock(held=launcher_stopped)
+    deadline = clock.now() + within_s
     while absent := tuple(missing()):
         if stop.requested:
             return
-        if time.monotonic() > deadline:
+        if clock.now() > deadline:
             raise InfrastructureError(
                 f"{who}: not ready after {within_s:g} s: heard nothing of {', '.join(absent)}"
             )
-        arrival = link.receive(hellos.say())
+        arrival = link.receive(min(hellos.say(), LOOK_S))
         while arrival is not None:
             take(arrival)
             arrival = link.receive(0.0)

@@ -9,6 +9,7 @@
     fleetloop/<run>/@live/<process>          liveliness token: "ready"
     fleetloop/<run>/@clock/go                from the launcher to plant and controllers
     fleetloop/<run>/@progress/<process>      how far a process is, to the launcher
+    fleetloop/<run>/@notice/<process>        what has just happened, in words, to the launcher
     fleetloop/<run>/@report/<process>        a process's last word, to the launcher
     fleetloop/@guest/<user>/<line>/<bus>/..  a client of a bus on another machine: up, down, alive;
                                              <run>/<bus> if it names the run as well
@@ -73,6 +74,11 @@ def live_all(run: str) -> str:
 def progress(run: str, process: str) -> str:
     """Where a process says how far it is."""
     return f"{_run(run)}/@progress/{_process(process)}"
+
+
+def notice(run: str, process: str) -> str:
+    """Where a process says what has just happened."""
+    return f"{_run(run)}/@notice/{_process(process)}"
 
 
 def report(run: str, process: str) -> str:

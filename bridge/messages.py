@@ -12,6 +12,7 @@ still be impossible: that is for those to say who know the run.
     LeaderSpeed    [1, [[from_t_ns, speed_m_s], ...]]            leader/speed
     Rows           [1, first_tick, length, rows, final]          robot/<name>/truth, telemetry
     Progress       [1, tick, t_ns, wall_ns]                      @progress/<process>
+    Notice         [1, text]                                     @notice/<process>
     Report         [1, {name: number or text, ...}]              @report/<process>
     Go             [1, epoch_ns]                                 @clock/go
 """
@@ -29,6 +30,7 @@ MOST_BYTES = {
     "path": 128,
     "pose": 128,
     "progress": 128,
+    "notice": 1 << 12,
     "truth": 1 << 16,
     "telemetry": 1 << 16,
     "traffic": 1 << 16,
@@ -38,6 +40,8 @@ MOST_BYTES = {
 """Of what others than the launcher say, by `bridge.keys.kind`: several times what they need."""
 MAX_TEXT = 1 << 15
 """Characters of a text in a report."""
+MAX_NOTICE = 500
+"""Characters of a notice."""
 _MAX_VALUES, _MAX_NAME = 4096, 128
 _MAX_STEPS = 10_000
 _MAX_INT = 1 << 63
@@ -166,6 +170,24 @@ class Progress(NamedTuple):
         """The message in the bytes, None if there is none."""
         fields = _unpack(payload, 4)
         return cls(*fields[1:]) if fields is not None and _ints(fields[1:]) else None
+
+
+class Notice(NamedTuple):
+    """What has just happened, in one line for people."""
+
+    text: str
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, self.text[:MAX_NOTICE]))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "Notice | None":
+        """The message in the bytes, None if there is none."""
+        fields = _unpack(payload, 2)
+        if fields is None or type(fields[1]) is not str or len(fields[1]) > MAX_NOTICE:
+            return None
+        return cls(printable(fields[1].replace("\n", " ")))
 
 
 class Report(NamedTuple):

@@ -202,6 +202,23 @@ def go_realtime(priority: int) -> list[str]:
     return refused
 
 
+def launcher_stopped() -> bool:
+    """Whether the process that started this one is stopped, as by Ctrl-Z: its router is, too."""
+    try:
+        stat = Path(f"/proc/{os.getppid()}/stat").read_text("ascii", "replace")
+    except OSError:
+        return False
+    return stat.rpartition(")")[2].split()[:1] in (["T"], ["t"])
+
+
+def processor_wait_ns() -> int:
+    """How long this process's main thread was ready to run and had no processor; 0 if unknown."""
+    try:
+        return int(Path("/proc/self/schedstat").read_text("ascii").split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0
+
+
 def cpu_ns() -> int:
     """Processor time of this process so far, all threads; a run counts from its first tick."""
     return time.process_time_ns()

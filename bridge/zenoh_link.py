@@ -33,16 +33,16 @@ from bridge.link import ROOM_BYTES, Arrival, Inbox, Publisher
 from bridge.login import Obstacle, obstacle, taken
 from bridge.messages import MAX_BYTES
 from bridge.process import Stop
-from configs.brief import NetworkLink, Outside, TlsFiles
+from configs.brief import LEASE_S, NetworkLink, Outside, TlsFiles
 from configs.errors import InfrastructureError
 
-LEASE_MS = 1000
-"""A peer that is silent for this long is gone."""
 CLOSE_S = 1.0
 _PROBE_S = 1.0
 _FIRST_RETRY_S, _LAST_RETRY_S = 0.02, 0.3
 _ATTEMPT_S, _LISTEN_S = 5.0, 10.0
 _HANDSHAKE_S, _SILENT_S = 2.0, 3600
+_BLOCKED_S = 5.0
+"""Zenoh's own: a put that waits for longer closes its session."""
 _LEAST_PENDING, _MOST_PENDING, _LEAST_SESSIONS = 100, 4096, 1000
 _PORT_TRIES = 5
 POLLED_DEPTH = 64
@@ -306,7 +306,9 @@ def _reason(network: NetworkLink) -> Obstacle:
 
 def _login_config(mode: str, network: NetworkLink, timeout_s: float) -> zenoh.Config:
     """For a single attempt."""
-    config = _config(mode)
+    config = _config(mode, network.lease_s)
+    # A put that finds the router stopped waits for as long as the router may.
+    _set(config, _WAIT_BEFORE_CLOSE, int(max(network.lease_s, _BLOCKED_S) * 1e6))
     _set(config, "connect/endpoints", [network.endpoint])
     _set(config, "connect/timeout_ms", 0)
     _set(config, "transport/unicast/open_timeout", max(int(timeout_s * 1000), 1))
@@ -325,11 +327,13 @@ def open_router(
     outside: Outside | None = None,
     *,
     unread_s: float = UNREAD_S,
+    lease_s: float = LEASE_S,
 ) -> Iterator[RouterLink]:
     """Be the router at `endpoint`, or at a free loopback port if None, and enforce `access`.
 
     Those on other machines come in at `outside`. `folder` must be private: the user dictionary is
-    written there while the router opens. Who doesn't read is cut off after `unread_s`.
+    written there while the router opens. Who doesn't read is cut off after `unread_s`; who doesn't
+    hear the router for `lease_s` takes it for gone.
 
     Raises:
         InfrastructureError: an endpoint is taken or can't be listened on.
@@ -341,7 +345,7 @@ def open_router(
     dictionary.write_text(access.dictionary(), "utf-8")
     with zenoh_log.listening(denials.take, is_ours):
         try:
-            session, at = _listen(endpoint, access, dictionary, outside, unread_s)
+            session, at = _listen(endpoint, access, dictionary, outside, unread_s, lease_s)
         finally:
             dictionary.unlink()
         with RouterLink(session, at, denials) as link:
@@ -367,12 +371,13 @@ def _listen(
     dictionary: Path,
     outside: Outside | None,
     unread_s: float,
+    lease_s: float,
 ) -> tuple[zenoh.Session, str]:
     tries = 1 if endpoint else _PORT_TRIES
     reason = ""
     for _ in range(tries):
         at = endpoint or _loopback()
-        config = _config("router")
+        config = _config("router", lease_s)
         _set(config, "listen/endpoints", [at, *([_hasty(outside.endpoint)] if outside else [])])
         if outside is not None and outside.tls is not None:
             _set(config, "transport/link/tls", _mutual_tls(outside.tls, "listen"))
@@ -440,7 +445,7 @@ def _mutual_tls(files: TlsFiles, side: str) -> dict[str, object]:
     }
 
 
-def _config(mode: str) -> zenoh.Config:
+def _config(mode: str, lease_s: float) -> zenoh.Config:
     zenoh_log.begin()
     config = zenoh.Config()
     _set(config, "mode", mode)
@@ -448,8 +453,8 @@ def _config(mode: str) -> zenoh.Config:
     _set(config, "scouting/gossip/enabled", False)
     _set(config, "scouting/delay", 0)
     _set(config, "transport/shared_memory/enabled", False)
-    _set(config, "transport/link/tx/lease", LEASE_MS)
     _set(config, "transport/link/rx/max_message_size", 2 * MAX_BYTES)
+    _set(config, "transport/link/tx/lease", int(lease_s * 1e3))
     return config
 
 

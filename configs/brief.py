@@ -177,6 +177,11 @@ class Coordination:
     ahead_limit_s: float = 0.5  # in real time: who is dated further ahead isn't believed
 
 
+def when(tick: int, period_ns: int) -> str:
+    """A tick in words."""
+    return f"tick {tick} (t = {tick * period_ns * 1e-9:.3f} s)"
+
+
 @dataclass(frozen=True, slots=True)
 class Schedule:
     """The ticks of a run.
@@ -217,6 +222,10 @@ class Schedule:
     def owes(self, tick: int) -> bool:
         """Whether a pose or path states are due at this tick."""
         return self.shares(tick) or self.localises(tick - self.pose_delay_ticks)
+
+    def when(self, tick: int) -> str:
+        """A tick in words."""
+        return when(tick, self.period_ns)
 
     def bus_time_ns(self, tick: int) -> int:
         """Bus time of a tick: nanoseconds since power-up, 0 at the first tick of the countdown."""
@@ -288,6 +297,13 @@ class TlsFiles:
     private_key: str
 
 
+LEASE_S = 1.0
+"""A peer on another machine that is silent for this long is gone."""
+LOCAL_LEASE_S = 3600.0
+"""On one machine a peer that is gone closes its connection; one that is silent is stopped, and may
+go on (Ctrl-Z and `fg`)."""
+
+
 @dataclass(frozen=True, slots=True)
 class NetworkLink:
     """How one process reaches the router, and as whom."""
@@ -297,6 +313,7 @@ class NetworkLink:
     user: str
     password: str = field(repr=False)
     tls: TlsFiles | None = None
+    lease_s: float = LEASE_S  # the router waits so long for a word of it
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,12 @@ from fleetloop.nursery import Nursery
 
 KILLED, CRASHED, GAVE_UP, PEER_SILENT, PEER_LOST = range(5)
 _CONSEQUENCES = {PeerSilentError.__name__: PEER_SILENT, PeerLostError.__name__: PEER_LOST}
+_STATES = {
+    "T": ", stopped by a signal",
+    "t": ", stopped by a debugger",
+    "D": ", waits for a disk",
+    "R": ", ready to run: the machine is busy",
+}
 TERM_GRACE_S = 1.0
 """From asking a process to stop until it is killed."""
 
@@ -102,6 +108,14 @@ class Child:
             return Failure(CRASHED, self.name, text)
         rank = _CONSEQUENCES.get(self.status.kind, GAVE_UP)
         return Failure(rank, self.name, self.status.error)
+
+    def state(self) -> str:
+        """Why it may be silent, as far as the kernel knows: ", stopped by a signal"; else ""."""
+        try:
+            stat = Path(f"/proc/{self._pid}/stat").read_text("ascii", "replace")
+        except OSError:
+            return ""
+        return _STATES.get("".join(stat.rpartition(")")[2].split()[:1]), "")
 
     def release(self) -> None:
         """Tell it that its last word was heard."""

@@ -16,7 +16,9 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from bridge import access, keys
 from bridge.barrier import Hellos
@@ -24,10 +26,10 @@ from bridge.can_bus import places
 from bridge.can_bus.relay import Relay
 from bridge.clock import wall_of
 from bridge.link import Arrival, Link
-from bridge.messages import Go, LeaderSpeed, Progress, Report
+from bridge.messages import Go, LeaderSpeed, Notice, Progress, Report
 from bridge.process import Stop, cpu_ns
 from bridge.zenoh_link import RouterLink, open_router
-from configs.brief import NetworkLink
+from configs.brief import LEASE_S, LOCAL_LEASE_S, NetworkLink
 from configs.briefing import leader_brief, schedule
 from configs.deployment import Deployment, roles_of
 from configs.errors import FleetloopError, InfrastructureError
@@ -43,16 +45,19 @@ from fleetloop.children import (
     refuse_shadowed_roles,
 )
 from fleetloop.elsewhere import Elsewhere
+from fleetloop.machine import WATCH_EVERY_S, MachineWatch
 from fleetloop.nursery import Nursery
 from fleetloop.record.writer import finish_truncated
 from fleetloop.spawn import Orders, spawn
+from fleetloop.vitals import Vitals
 
-WATCH_EVERY_S = 0.05
 GO_AHEAD_NS = 200_000_000
 """In real time, from the go to power-up: for the go to reach everybody."""
 _MOST_OTHERS = 3
 WORD_S = 0.2
 """The reason of the end is so far ahead of the end of the launcher's token."""
+MAX_NOTICES = 100
+"""Of each process; what else it says is in nobody's interest."""
 DRAIN_S = 2.0
 """How long the recorder may take to write what is still on its way, once all others have ended."""
 
@@ -70,7 +75,9 @@ class Outcome:
     teardown_s: float = 0.0
     cpu_ns: int = 0  # of the launcher, since everybody was ready
     reports: dict[str, Report] = field(default_factory=dict)
+    said: dict[str, list[str]] = field(default_factory=dict)  # by process, as it happened
     notices: dict[str, list[str]] = field(default_factory=dict)  # about a process, by the launcher
+    machine: dict[str, Any] = field(default_factory=dict)
 
 
 class ProcessRun:
@@ -101,7 +108,13 @@ class ProcessRun:
         self._processes = roles_of(scenario)
         self._children: list[Child] = []
         self._alive: set[str] = set()
-        self._seen: dict[str, tuple[int, float]] = {}
+        self._vitals = Vitals()
+        self._ticking = False
+        period_s = scenario.clock.control_period_s
+        self._machine = MachineWatch(
+            lambda: self.outcome.ticks * period_s, partial(self._note, access.LAUNCHER)
+        )
+        self._now = self._machine.clock.now
         self.outcome = Outcome()
 
     def run(self, stop: Stop) -> Outcome:
@@ -114,7 +127,8 @@ class ProcessRun:
         open_files.ensure(len(self._processes))
         began = time.monotonic()
         try:
-            with self._started() as link:
+            with self._machine, self._started() as link:
+                self._machine.clock.resume()
                 try:
                     failure = self._await_ready(link, stop)
                 except InfrastructureError as error:
@@ -128,6 +142,7 @@ class ProcessRun:
                 ending = time.monotonic()
                 self._end(link, stop, failure)
                 self.outcome.teardown_s = time.monotonic() - ending
+            self.outcome.machine = self._machine.report()
             if refusals := link.denials.notes():
                 self.outcome.notices["router"] = refusals
         finally:
@@ -146,16 +161,20 @@ class ProcessRun:
             # It imports while the router opens, and knows the folder before there is one.
             with Nursery(places.folder_of(run), batch=batch) as nursery:
                 folder = open_.enter_context(places.run_folder(run))
-                router = open_router(scenario.network.endpoint, plan, folder, outside)
+                lease_s = LEASE_S if outside is not None else LOCAL_LEASE_S
+                router = open_router(
+                    scenario.network.endpoint, plan, folder, outside, lease_s=lease_s
+                )
                 link = open_.enter_context(router)
                 link.declare_live(keys.live(run, access.LAUNCHER))
                 link.watch_live(keys.live_all(run), "live")
                 # One by one: a wildcard is wider than any identity's rights and would be refused.
                 for process in self._processes:
                     link.subscribe(keys.progress(run, process), "progress")
+                    link.subscribe(keys.notice(run, process), "notice")
                     link.subscribe(keys.report(run, process), "report")
                 links = {
-                    user: NetworkLink(run, link.endpoint, user, password)
+                    user: NetworkLink(run, link.endpoint, user, password, lease_s=LOCAL_LEASE_S)
                     for user, password in plan.passwords.items()
                 }
                 spawn(self._orders, links, folder, nursery, self._children)
@@ -171,12 +190,12 @@ class ProcessRun:
         hellos = Hellos(ticks.hello_every_s)
         speed = LeaderSpeed(leader_brief(self._scenario).speed_steps)
         hellos.add(link.publisher(keys.leader_speed(run)), speed.encode())
-        deadline = time.monotonic() + ticks.start_deadline_s
+        deadline = self._now() + ticks.start_deadline_s
         countdown_ns = ticks.countdown_ticks * ticks.period_ns + GO_AHEAD_NS
         gone = False
         while not stop.requested:
             ready = self._alive.issuperset(self._processes)
-            if ready and "plant" in self._seen:
+            if ready and self._ticking:
                 return None
             if (failure := self._cause()) is not None:
                 if failure.rank >= GAVE_UP and (absent := self._elsewhere.absent()):
@@ -184,7 +203,7 @@ class ProcessRun:
                         f"not there: {_with_refusals(absent, link)}; {failure.text}"
                     )
                 return failure
-            if time.monotonic() > deadline:
+            if self._now() > deadline:
                 absent = self._elsewhere.absent() or sorted(set(self._processes) - self._alive)
                 absent = absent or ["the plant's first tick"]
                 raise InfrastructureError(
@@ -193,7 +212,7 @@ class ProcessRun:
             if ready and not gone:
                 gone = True
                 hellos.add(go, Go(wall_of(time.monotonic_ns() + countdown_ns)).encode())
-            self._take(link.receive(hellos.say()))
+            self._take(link.receive(min(hellos.say(), WATCH_EVERY_S)))
             self._tell_refusals(link)
         return None
 
@@ -205,6 +224,7 @@ class ProcessRun:
         while not stop.requested:
             self._take(link.receive(WATCH_EVERY_S))
             self._tell_refusals(link)
+            self._name_the_frozen()
             if (failure := self._cause()) is not None:
                 return self._root_of(failure, link, actors)
             if all(child.ended() for child in actors) and self._elsewhere.ended():
@@ -230,7 +250,7 @@ class ProcessRun:
 
     def _cause(self) -> Failure | None:
         """The failure that explains the others, None if nobody failed."""
-        far = self._elsewhere.failure(time.monotonic())
+        far = self._elsewhere.failure(self._now())
         near = cause(self._children)
         if near is None or far is None:
             return near or far
@@ -241,8 +261,8 @@ class ProcessRun:
         within_s = 0.3
         if failure.rank >= PEER_SILENT:
             within_s += self._limit_s()
-        deadline = time.monotonic() + within_s
-        while time.monotonic() < deadline:
+        deadline = self._now() + within_s
+        while self._now() < deadline:
             left = self._settle(link, actors, WATCH_EVERY_S)
             better = self._cause()
             if better is not None and better.rank < failure.rank:
@@ -260,9 +280,9 @@ class ProcessRun:
         self, link: Link, children: Sequence[Child], within_s: float = DRAIN_S
     ) -> list[Child]:
         """Hear last words until these have ended, at most `within_s`; return who has not."""
-        deadline = time.monotonic() + within_s
+        deadline = self._now() + within_s
         while left := [child for child in children if not child.ended()]:
-            left_s = deadline - time.monotonic()
+            left_s = deadline - self._now()
             if left_s <= 0.0:
                 break
             self._take(link.receive(min(left_s, WATCH_EVERY_S)))
@@ -270,15 +290,37 @@ class ProcessRun:
 
     def _silent(self) -> Failure | None:
         """The process whose progress stopped, None while all are well."""
-        limit_s = self._limit_s()
-        now = time.monotonic()
+        limit_s, now_s = self._limit_s(), self._now()
         for name in ("plant", "recorder"):
-            child = self._child(name)
-            tick, when = self._seen.get(name, (0, now))
-            if child is not None and now - when > limit_s and not child.ended():
-                text = f"{name}: no progress for {now - when:.1f} s after {max(tick, 0)} ticks"
-                return Failure(GAVE_UP, name, text)
+            child, silence = self._child(name), self._vitals.silence(name, now_s)
+            if child is None or silence is None or silence.lasted_s <= limit_s or child.ended():
+                continue
+            text = (
+                f"{name}: no progress for {silence.lasted_s:.1f} s after {max(silence.tick, 0)}"
+                f" ticks{child.state()}"
+            )
+            return Failure(GAVE_UP, name, text)
         return None
+
+    def _name_the_frozen(self) -> None:
+        """In real time everybody beats, and nobody waits for who doesn't: say it at once."""
+        if self._scenario.clock.mode != "realtime":
+            return
+        when = schedule(self._scenario).when
+        for process, tick, lasted_s in self._vitals.newly_frozen(self._now()):
+            child = self._child(process)
+            state = child.state() if child is not None else ""
+            text = f"no sign of life for {lasted_s:.1f} s, since {when(tick)}{state}"
+            self._note(process, text)
+
+    def _note(self, process: str, text: str) -> None:
+        """The launcher has noticed something about a process."""
+        self._tell(self.outcome.notices.setdefault(process, []), process, text)
+
+    def _tell(self, account: list[str], process: str, text: str) -> None:
+        if len(account) < MAX_NOTICES:
+            account.append(text)
+            self._on_notice(process, text)
 
     def _take(self, arrival: Arrival | None) -> None:
         if arrival is None:
@@ -287,16 +329,23 @@ class ProcessRun:
         if arrival.tag == "live":
             there = arrival.payload == b"1"
             (self._alive.add if there else self._alive.discard)(process)
-            self._elsewhere.note_token(process, time.monotonic(), there=there)
+            self._elsewhere.note_token(process, self._now(), there=there)
         elif arrival.tag == "progress":
             progress = Progress.decode(arrival.payload)
             if progress is not None:
-                self._seen[process] = (progress.tick, time.monotonic())
+                silence = self._vitals.beat(process, progress.tick, self._now())
+                if silence is not None:
+                    self._note(process, f"goes on after {silence.lasted_s:.1f} s")
                 if process == "plant":
+                    self._ticking = True
                     self.outcome.ticks = progress.tick
                     self.outcome.wall_s = progress.wall_ns * 1e-9
                     self._on_progress(progress)
+        elif arrival.tag == "notice":
+            if (notice := Notice.decode(arrival.payload)) is not None:
+                self._tell(self.outcome.said.setdefault(process, []), process, notice.text)
         elif (report := Report.decode(arrival.payload)) is not None:
+            self._vitals.end(process)
             self.outcome.reports[process] = report
             self._elsewhere.note_report(process, report)
             for child in self._children:
@@ -307,11 +356,7 @@ class ProcessRun:
 
     def _end(self, link: RouterLink, stop: Stop, failure: Failure | None) -> None:
         outcome = self.outcome
-        if stop.requested:
-            outcome.ended, outcome.reason = "interrupted", stop.reason
-        elif failure is not None:
-            outcome.ended, outcome.reason = "aborted", failure.text
-            outcome.timed = not failure.unexpected
+        self._judge(stop, failure)
         recorder = self._children[-1]
         actors = self._children[:-1]
         if failure is not None and failure.name == recorder.name:
@@ -326,11 +371,12 @@ class ProcessRun:
                 actors[0].ask_to_stop()
             self._settle(link, actors, 1.0)
         end(actors)
+        self._machine.clock.resume()
         self._hear_from_elsewhere(link)
         if outcome.ended != "completed":
             recorder.ask_to_stop()
-        deadline = time.monotonic() + DRAIN_S
-        while not recorder.ended() and time.monotonic() < deadline:
+        deadline = self._now() + DRAIN_S
+        while not recorder.ended() and self._now() < deadline:
             self._take(link.receive(WATCH_EVERY_S))
         while (arrival := link.receive(0.0)) is not None:
             self._take(arrival)
@@ -342,6 +388,17 @@ class ProcessRun:
             outcome.reason = lost.text if lost else f"recorder: not done within {DRAIN_S:g} s"
         if unfinished:
             self._complete_record()
+
+    def _judge(self, stop: Stop, failure: Failure | None) -> None:
+        """How the run ended; who gave up while the machine stood still is not the cause."""
+        outcome = self.outcome
+        if stop.requested:
+            outcome.ended, outcome.reason = "interrupted", stop.reason
+        elif failure is not None:
+            outcome.ended, outcome.reason = "aborted", failure.text
+            outcome.timed = not failure.unexpected
+            if failure.rank >= GAVE_UP and (stall := self._machine.lately(self._limit_s() + 1.0)):
+                outcome.reason = f"{stall}; {failure.text}"
 
     def _complete_record(self) -> None:
         """Give the record the end that its writer didn't."""
@@ -357,14 +414,14 @@ class ProcessRun:
             return
         word = Report({"reason": reason}).encode()
         link.publisher(keys.report(self._run, access.LAUNCHER)).put(word)
-        deadline = time.monotonic() + WORD_S
-        while not self._elsewhere.ended() and (left_s := deadline - time.monotonic()) > 0.0:
+        deadline = self._now() + WORD_S
+        while not self._elsewhere.ended() and (left_s := deadline - self._now()) > 0.0:
             self._take(link.receive(min(left_s, WATCH_EVERY_S)))
 
     def _hear_from_elsewhere(self, link: Link) -> None:
         """Let those on other machines say their last word; what they don't say in time is lost."""
-        deadline = time.monotonic() + DRAIN_S
-        while not self._elsewhere.ended() and (left_s := deadline - time.monotonic()) > 0.0:
+        deadline = self._now() + DRAIN_S
+        while not self._elsewhere.ended() and (left_s := deadline - self._now()) > 0.0:
             self._take(link.receive(min(left_s, WATCH_EVERY_S)))
 
 

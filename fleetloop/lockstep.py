@@ -21,6 +21,7 @@ from configs.brief import AgentBrief, LeaderBrief, PlantBrief
 from fleetloop.record.writer import Source
 from plant.buses import IdealBus
 from plant.emulation import Emulation, emulations
+from plant.herald import Herald
 from plant.unit import Unit, diverged_robots, unit_of
 from plant.wire_bus import WireBus
 
@@ -166,6 +167,7 @@ class InProcessRun:
         leader: LeaderBrief,
         writer: Keeper,
         on_progress: Callable[[Progress], None],
+        on_notice: Callable[[str, str], None] = lambda *_: None,
     ) -> None:
         self._schedule = plant.schedule
         self._units = [unit_of(robot) for robot in plant.robots]
@@ -184,6 +186,12 @@ class InProcessRun:
             brief.robot: [agent for agent in self._agents if brief.robot in agent.brief.hears]
             for brief in agents
         }
+        for agent in self._agents:
+            agent.guard.announce = partial(on_notice, agent.brief.robot)
+        period_ns = plant.schedule.period_ns
+        self._herald = Herald(
+            lambda: diverged_robots(self._units, period_ns), partial(on_notice, "plant")
+        )
         self._on_progress = on_progress
         ends = dict(zip(self._units, zip(self._agents, self._truths, strict=True), strict=True))
 
@@ -247,6 +255,7 @@ class InProcessRun:
             self.ticks = max(tick, 0)
             if tick % PROGRESS_EVERY_TICKS == 0:
                 wall_ns = time.monotonic_ns() - start_ns
+                self._herald.look()
                 self._on_progress(Progress(tick, tick * schedule.period_ns, wall_ns))
         self.wall_s = (time.monotonic_ns() - start_ns) * 1e-9
 

@@ -24,6 +24,7 @@ from fleetloop.results import (
     robot_header,
     robot_rows,
     spread_line,
+    trouble_lines,
 )
 from fleetloop.summary import RunStats, Summary, summarise
 from fleetloop.summary_file import read_summary
@@ -92,7 +93,9 @@ def _page(
         subtitle=escape(scenario.description),
         lost=escape(f"The record isn't all there: {record.shortage()}." if record.lost else ""),
         verdict=escape(summary["verdict"]),
+        verdict_class=summary["verdict"].replace(" ", "-"),
         reason=escape(summary["reason"]),
+        troubles=_list(trouble_lines(summary)),
         robots=_table(robot_header(summary), robot_rows(summary)),
         spread=escape(spread_line(summary)),
         expectations=_table(
@@ -128,6 +131,11 @@ def _figure(item: Captioned, data: bytes) -> str:
     text = escape(item.caption)
     source = f"data:image/png;base64,{base64.b64encode(data).decode()}"
     return f'<figure><img alt="{text}" src="{source}"><figcaption>{text}</figcaption></figure>'
+
+
+def _list(lines: Iterable[str]) -> str:
+    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
+    return f'<h2>What went wrong</h2><ul class="troubles">{items}</ul>' if items else ""
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -132,6 +132,23 @@ def trouble_lines(summary: Summary) -> Iterator[str]:
         yield f"BUS {bus}: {trouble}"
     if summary["record_lost"]:
         yield f"RECORD not all there: {summary['record_lost']}"
+    for robot, how in summary["cut_short"].items():
+        yield f"{robot}: {how}"
+    if (line := machine_line(summary)) is not None:
+        yield line
+
+
+def machine_line(summary: Summary) -> str | None:
+    """How often the machine stood still; None if it didn't, or if nobody watched it."""
+    machine = summary.get("machine")
+    if not machine or not machine["stalls"]:
+        return None
+    stops = machine["stopped_and_continued"]
+    return (
+        f"MACHINE stalled {machine['stalls']} times, {machine['stalled_s']:.2f} s in all, longest"
+        f" {machine['longest_stall_s']:.2f} s at t = {machine['longest_stall_at_s']:.2f} s"
+        + (f"; {stops} of them stopped by Ctrl-Z or a signal" if stops else "")
+    )
 
 
 def realtime_lines(summary: Summary) -> Iterator[str]:

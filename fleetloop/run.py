@@ -90,12 +90,25 @@ def run_scenario(source: str, options: Options) -> int:
         def on_progress(state: Progress) -> None:
             progress.show(state.t_ns * 1e-9, state.wall_ns * 1e-9)
 
+        def on_notice(process: str, text: str) -> None:
+            progress.notice(f"{process.removeprefix('agent/')}: {text}")
+
         try:
             run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
             if options.in_process:
-                stats = _in_process(scenario, folder, on_progress, stop)
+                stats = _in_process(scenario, folder, on_progress, on_notice, stop)
             else:
-                stats = _over_processes(scenario, deployment, folder, options, on_progress, stop)
+                run = ProcessRun(
+                    scenario,
+                    run=f"{folder.name}-{time.monotonic_ns() % 1_000_000:06d}",
+                    record=folder / run_folder.RECORD,
+                    speed=options.speed,
+                    profile=options.profile,
+                    on_progress=on_progress,
+                    on_notice=on_notice,
+                    deployment=deployment,
+                )
+                stats = _stats(run.run(stop), realtime=scenario.clock.mode == "realtime")
         except InfrastructureError:
             run_folder.remove_if_unused(folder)
             raise
@@ -122,31 +135,11 @@ def _deployment(scenario: Scenario, options: Options) -> Deployment:
     return load_deployment(options.deployment, scenario)
 
 
-def _over_processes(
-    scenario: Scenario,
-    deployment: Deployment,
-    folder: Path,
-    options: Options,
-    on_progress: Callable[[Progress], None],
-    stop: Stop,
-) -> RunStats:
-    run = ProcessRun(
-        scenario,
-        run=f"{folder.name}-{time.monotonic_ns() % 1_000_000:06d}",
-        record=folder / run_folder.RECORD,
-        speed=options.speed,
-        profile=options.profile,
-        on_progress=on_progress,
-        on_notice=lambda process, text: note(f"{process}: {text}"),
-        deployment=deployment,
-    )
-    return _stats(run.run(stop), realtime=scenario.clock.mode == "realtime")
-
-
 def _in_process(
     scenario: Scenario,
     folder: Path,
     on_progress: Callable[[Progress], None],
+    on_notice: Callable[[str, str], None],
     stop: Stop,
 ) -> RunStats:
     network = NetworkLink("in-process", "", "", "")
@@ -173,6 +166,7 @@ def _in_process(
                 leader_brief(scenario),
                 writer,
                 on_progress,
+                on_notice,
             )
             startup_s = time.monotonic() - began
             run.run(stop)
@@ -203,6 +197,7 @@ def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
         wall_s=outcome.wall_s,
         startup_s=outcome.startup_s,
         teardown_s=outcome.teardown_s,
+        machine=outcome.machine,
     )
     stats.cpu_s["launcher"] = round(outcome.cpu_ns * 1e-9, 3)
     for process, report in outcome.reports.items():
@@ -237,7 +232,9 @@ def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
             stats.stopped_robots[process.removeprefix("agent/")] = str(stopped)
         if notices := report.values.get("notices"):
             stats.notices[process.removeprefix("agent/")] = str(notices).split("\n")
-    for process, said in outcome.notices.items():
+    # What a process said on the way is in its report as well, if it lived to make one.
+    lost = {name: said for name, said in outcome.said.items() if name not in outcome.reports}
+    for process, said in (*lost.items(), *outcome.notices.items()):
         stats.notices.setdefault(process.removeprefix("agent/"), []).extend(said)
     if (plant := outcome.reports.get("plant")) is not None:
         stats.stopped_robots |= _under("stopped.", plant)  # the cause of what its controller says

@@ -40,6 +40,7 @@ class RunStats:
     waits_s: dict[str, dict[str, float]] = field(default_factory=dict)
     stopped_robots: dict[str, str] = field(default_factory=dict)
     notices: dict[str, list[str]] = field(default_factory=dict)
+    machine: dict[str, Any] = field(default_factory=dict)  # of `fleetloop.machine`
     bus_troubles: dict[str, str] = field(default_factory=dict)
     left_early: dict[str, str] = field(default_factory=dict)  # robots told to stop, by whom
     cpu_s: dict[str, float] = field(default_factory=dict)
@@ -93,6 +94,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         },
         "notices": stats.notices,
         "overruns": stats.overruns,
+        "machine": stats.machine or None,
         "frames_per_bus": stats.frames_per_bus,
         "bus_troubles": stats.bus_troubles,
         "waits_s": stats.waits_s,

@@ -90,6 +90,13 @@ class RunProgress:
         if self._bar is not None:
             self._bar.stop()
 
+    def notice(self, text: str) -> None:
+        """Say what has just happened, above the bar."""
+        if self._bar is not None:
+            self._console.print(text, style="yellow", markup=False, highlight=False, soft_wrap=True)
+        else:
+            note(text)
+
     def show(self, t_s: float, wall_s: float) -> None:
         """Say that scenario time `t_s` was reached after `wall_s` of running."""
         factor = f"{t_s / wall_s:5.1f} × real time" if t_s > 0 and wall_s > 0 else ""

@@ -17,13 +17,21 @@ from bridge.can_bus.hub import Hub
 from bridge.clock import implausible_start, monotonic_of
 from bridge.launcher import follow_launcher
 from bridge.link import Arrival, Link, Publisher
-from bridge.messages import Go, PoseFix, Progress, Report, Rows
-from bridge.process import Stop, cpu_ns, go_realtime, serve, settle_memory
+from bridge.messages import Go, Notice, PoseFix, Progress, Report, Rows
+from bridge.process import (
+    Stop,
+    cpu_ns,
+    go_realtime,
+    processor_wait_ns,
+    serve,
+    settle_memory,
+)
 from bridge.profile import Sampler
 from bridge.telemetry import PLANT_ROW, FrameBuffer, RowBuffer
 from bridge.zenoh_link import StoppedError, open_client
 from configs.brief import PlantBrief, Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError
+from plant.herald import Herald
 from plant.loop import Counters, LockstepLoop, bus_frames
 from plant.realtime import RealtimeLoop
 from plant.unit import diverged_robots, unit_of
@@ -115,8 +123,16 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
     for truth in truths:
         hellos.add(truth, Rows(0, 0, b"", False).encode())
 
+    def news() -> dict[str, str]:
+        troubles = {f"bus {bus}": text for bus, text in end.troubles().items()}
+        return troubles | diverged_robots(units, brief.schedule.period_ns)
+
+    notice = link.publisher(keys.notice(name, "plant"))
+    herald = Herald(news, lambda text: notice.put(Notice(text).encode()))
+
     def say(state: Progress) -> None:
         progress.put(state.encode())
+        herald.look()
 
     refused: list[str] = []
     body: Callable[[Stop], None]
@@ -137,7 +153,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
         loop = LockstepLoop(brief, units, hub, poses, rows, say, taps)
         counters, progress_of, body = loop.counters, loop.progress, loop.run
     sampler = Sampler()
-    began_ns = cpu_ns()
+    began_ns, waited_ns = cpu_ns(), processor_wait_ns()
     try:
         with sampler if brief.schedule.profile else nullcontext():
             _body(body, stop)
@@ -157,6 +173,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
             "waited_ns": counters.waited_ns,
             "overruns": counters.overruns,
             "cpu_ns": cpu_ns() - began_ns,
+            "processor_ns": processor_wait_ns() - waited_ns,
             "refused": ", ".join(refused),
             **bus_frames(counters),
             **{

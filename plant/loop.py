@@ -19,10 +19,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
+from bridge.awake import LOOK_S, STALL_S
 from bridge.can_bus.hub import Hub
 from bridge.link import Publisher
 from bridge.messages import PoseFix, Progress
-from bridge.process import Stop
+from bridge.process import Stop, launcher_stopped
 from bridge.telemetry import RowBuffer, Tap
 from configs.brief import LEAD_TICKS, PlantBrief
 from configs.errors import InfrastructureError, PeerLostError
@@ -32,8 +33,9 @@ from plant.unit import Unit
 from plant.wire_bus import WireBus
 
 REPORT_EVERY_NS = 100_000_000
-WAIT_S = 0.1
+WAIT_S = LOOK_S
 """Longest wait for an answer before somebody who doesn't answer is looked for."""
+_STALL_NS = int((LOOK_S + STALL_S) * 1e9)
 ANSWER_SHARE = 0.9
 """Part of the tick deadline that the plant waits for answers: before that, controllers name who is
 silent; after it, the launcher names the plant."""
@@ -194,9 +196,13 @@ class LockstepLoop:
             answered = hub.collect(WAIT_S)
             after_ns = time.monotonic_ns()
             self.counters.waited_ns += after_ns - now_ns
+            if after_ns - now_ns > _STALL_NS or (not answered and launcher_stopped()):
+                self._forgive(after_ns - now_ns)
             for bus in answered:
                 self._go_on(self._lanes[bus], after_ns)
             now_ns = time.monotonic_ns()
+            if now_ns - after_ns > _STALL_NS:
+                self._forgive(now_ns - after_ns)
             if not answered:
                 self._look_for_the_absent(now_ns)
             elif now_ns >= next_report_ns:
@@ -293,11 +299,17 @@ class LockstepLoop:
             self._hub.serve(left_ns * 1e-9)
             left_ns = due_ns - time.monotonic_ns()
 
+    def _forgive(self, stood_still_ns: int) -> None:
+        """Time in which this process, or who carries messages, stood still is nobody's delay."""
+        for lane in self._lanes.values():
+            if lane.asked_ns:
+                lane.asked_ns += stood_still_ns
+
     def _look_for_the_absent(self, now_ns: int) -> None:
         left = set(self._hub.left())
         limit_ns = int(self._limit_s * 1e9)
         for lane in self._lanes.values():
-            when = f"tick {lane.tick} (t = {lane.tick * self._schedule.period_ns * 1e-9:.3f} s)"
+            when = self._schedule.when(lane.tick)
             robot = lane.asked or " or ".join(lane.robots)
             # Each controller leaves when it has answered the closing tick.
             if lane.tick < self._ticks and (gone := left.intersection(lane.robots)):

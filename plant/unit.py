@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 from bridge.drives import DRIVES, DriveNode
 from bridge.drives.feeling import Feeling
 from bridge.frame import Frame
-from configs.brief import PowertrainModel, RobotBrief
+from configs.brief import PowertrainModel, RobotBrief, when
 from plant.divergence import Divergence
 from plant.encoder import PER_RADIAN
 from plant.integrate import rk4
@@ -225,7 +225,7 @@ def unit_of(brief: RobotBrief) -> Unit:
 def diverged_robots(units: Iterable[Unit], period_ns: int) -> dict[str, str]:
     """Robots whose motion diverged: the tick that did it, and how."""
     return {
-        unit.brief.robot: f"tick {round(found.t_s * 1e9) // period_ns}: {found}"
+        unit.brief.robot: f"{when(round(found.t_s * 1e9) // period_ns, period_ns)}: {found}"
         for unit in units
         if (found := unit.divergence) is not None
     }

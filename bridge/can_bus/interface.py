@@ -212,6 +212,11 @@ class FleetloopBus(can.BusABC):
         except OSError as error:
             raise self._unsent(error) from error
 
+    @property
+    def asked(self) -> bool:
+        """Of a paced client: whether the bus waits for its answer, to a tick or to frames."""
+        return self._owes
+
     def fileno(self) -> int:
         """The descriptor that becomes readable with the next frame."""
         return self._line.fileno()

@@ -147,18 +147,20 @@ class Rig:
     ) -> None:
         self.clock = Clock()
         monkeypatch.setattr(agents.realtime, "time", self.clock)
-        self.bench = Bench("r1", *overrides, f"duration_s={duration_s}")
+        self.bench = Bench("r1", *overrides, f"until_s={duration_s}")
         if not ours:
             host = self.bench.agent.brief.host
             host = replace(host, bus_error_limit_ns=2 * S)
             changes = {"host": host, **changes}
-            self.bench = Bench("r1", *overrides, f"duration_s={duration_s}", **changes)
+            self.bench = Bench("r1", *overrides, f"until_s={duration_s}", **changes)
         schedule = self.bench.schedule
         epoch_ns = self.clock.now_ns + schedule.countdown_ticks * schedule.period_ns
         self.wire = Wire(self.bench, self.clock, epoch_ns - schedule.bus_time_ns(0))
         self.link = PoseLink(self.bench, self.clock, epoch_ns)
-        path = SimpleNamespace(put=lambda _: None)
-        self.loop = RealtimeLoop(self.bench.agent, self.wire, self.link, path, Hellos(0.02))
+        nowhere = SimpleNamespace(put=lambda _: None)
+        self.loop = RealtimeLoop(
+            self.bench.agent, self.wire, self.link, nowhere, Hellos(0.02), nowhere
+        )
         self.epoch_ns = epoch_ns
 
     def run(self) -> None:

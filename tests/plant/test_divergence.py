@@ -93,8 +93,8 @@ def test_the_tick_whose_torques_did_it_is_named_with_the_last_sound_motion() -> 
     tell(robot, 1, Command.SET_INPUT_TORQUE, f.ONE_FLOAT.pack(1e30))
     go_on(robot, 3, first=7)
     assert diverged_robots([robot], PERIOD_NS) == {
-        "r1": "tick 7: its motion diverged: v = 0 m/s, ω = 0 rad/s under wheel torques of 0 and"
-        " 1e+30 N·m"
+        "r1": "tick 7 (t = 0.007 s): its motion diverged: v = 0 m/s, ω = 0 rad/s under wheel"
+        " torques of 0 and 1e+30 N·m"
     }
 
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -33,6 +34,7 @@ class Run:
         self.launcher = psutil.Process(self._process.pid)
         self._family: dict[int, psutil.Process] = {}
         self._texts = {"stdout": "", "stderr": ""}
+        self._more = threading.Condition()
         self._readers = [
             threading.Thread(target=self._read, args=(name,), daemon=True) for name in self._texts
         ]
@@ -40,7 +42,18 @@ class Run:
             reader.start()
 
     def _read(self, name: str) -> None:
-        self._texts[name] = getattr(self._process, name).read()
+        for line in getattr(self._process, name):
+            with self._more:
+                self._texts[name] += line
+                self._more.notify_all()
+
+    def await_line(self, pattern: str, within_s: float) -> re.Match[str]:
+        """Return when it has said a line like this on standard error."""
+        line = re.compile(f"^{pattern}$", re.MULTILINE)
+        with self._more:
+            said = self._more.wait_for(lambda: line.search(self._texts["stderr"]), within_s)
+        assert said is not None, self._texts
+        return said
 
     def await_bus_time(self, seconds: float) -> None:
         """Return when the bus of r1 has reached this time: the countdown is over, rows flow."""
@@ -51,7 +64,7 @@ class Run:
             try:
                 bus = can.Bus(interface="fleetloop", channel="r1")
             except can.CanInitializationError:
-                self._wait(0.02)
+                self.wait(0.02)
             else:
                 break
         with bus:
@@ -60,7 +73,8 @@ class Run:
         for child in self.launcher.children(recursive=True):
             self._family[child.pid] = child
 
-    def _wait(self, seconds: float) -> None:
+    def wait(self, seconds: float) -> None:
+        """Let it run, or stand still, for so long, or until it ends."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(seconds)
 

@@ -54,7 +54,9 @@ def test_a_robot_that_diverges_is_named_and_the_other_goes_on_in_either_mode(
     assert run.summary()["verdict"] == "failed"
     stopped = run.summary()["stopped_robots"]
     assert list(stopped) == ["r1"]
-    assert stopped["r1"].startswith("tick 0: its motion diverged: v = 1e+06 m/s, ω = ")
+    assert stopped["r1"].startswith(
+        "tick 0 (t = 0.000 s): its motion diverged: v = 1e+06 m/s, ω = "
+    )
 
 
 def test_four_robots_are_at_least_six_processes_under_two_gibibytes(tmp_path: Path) -> None:

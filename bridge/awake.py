@@ -1,0 +1,72 @@
+"""Time in which a process could see what came: deadlines that a stalled machine doesn't eat.
+
+Who waits looks at the clock at least every `LOOK_S`. When two looks are much further apart than
+that, the process did not run meanwhile: it was stopped (Ctrl-Z, SIGSTOP), starved of processor
+time, or its machine stood still. What it waited for may have come in that time or stood still as
+well, so the time doesn't count. Nor does time in which the launcher is stopped: its router carries
+all messages.
+"""
+
+import time
+from collections.abc import Callable
+
+LOOK_S = 0.1
+STALL_S = 0.25
+"""Beyond what a wait was to last: this much later is no lateness any more."""
+
+
+def _never() -> bool:
+    return False
+
+
+class AwakeClock:
+    """Counts the seconds in which this process was awake; keep it looked at.
+
+    Args:
+        look_s: longest time between two looks, if all is well [s].
+        stall_s: what is later than that by so much is a stall [s].
+        held: whether those that are waited for are held up at this moment.
+        on_stall: told of every stall: how long it was [s].
+        monotonic: the clock of the machine [s].
+    """
+
+    __slots__ = (
+        *("_held", "_look_s", "_looked_s", "_lost_s", "_monotonic", "_on_stall", "_stall_s"),
+        "longest_late_s",
+    )
+
+    def __init__(
+        self,
+        *,
+        look_s: float = LOOK_S,
+        stall_s: float = STALL_S,
+        held: Callable[[], bool] = _never,
+        on_stall: Callable[[float], None] = lambda _: None,
+        monotonic: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._look_s = look_s
+        self._stall_s = stall_s
+        self._held = held
+        self._on_stall = on_stall
+        self._monotonic = monotonic
+        self._looked_s = monotonic()
+        self._lost_s = 0.0
+        self.longest_late_s = 0.0
+        """The longest that a look came later than it should have."""
+
+    def now(self) -> float:
+        """Seconds on a clock that stood still while this process did."""
+        now_s = self._monotonic()
+        gap_s = now_s - self._looked_s
+        self._looked_s = now_s
+        self.longest_late_s = max(self.longest_late_s, gap_s - self._look_s)
+        if gap_s > self._look_s + self._stall_s:
+            self._lost_s += gap_s - self._look_s
+            self._on_stall(gap_s - self._look_s)
+        elif gap_s > 0.0 and self._held():
+            self._lost_s += gap_s
+        return now_s - self._lost_s
+
+    def resume(self) -> None:
+        """What was done since the last look took its time, and was no wait."""
+        self._looked_s = self._monotonic()

@@ -1,0 +1,62 @@
+"""A clock that stands still while its process does."""
+
+from bridge.awake import LOOK_S, STALL_S, AwakeClock
+
+
+class Machine:
+    """A clock that is set by hand."""
+
+    def __init__(self) -> None:
+        self.now_s = 1000.0
+        self.stalls: list[float] = []
+        self.held = False
+        self.clock = AwakeClock(
+            held=lambda: self.held,
+            on_stall=self.stalls.append,
+            monotonic=lambda: self.now_s,
+        )
+        self.began_s = self.clock.now()
+
+    def passes(self, seconds: float) -> None:
+        self.now_s += seconds
+
+    def awake_s(self) -> float:
+        return round(self.clock.now() - self.began_s, 6)
+
+
+def test_looks_that_are_close_count_the_time_between_them() -> None:
+    machine = Machine()
+    for _ in range(10):
+        machine.passes(LOOK_S)
+        machine.awake_s()
+    assert machine.awake_s() == 1.0
+    machine.passes(LOOK_S + 0.9 * STALL_S)  # late, and no stall yet
+    assert machine.awake_s() == round(1.0 + LOOK_S + 0.9 * STALL_S, 6)
+    assert machine.stalls == []
+
+
+def test_a_stall_counts_as_the_wait_that_it_was_to_be_and_is_told() -> None:
+    machine = Machine()
+    machine.passes(60.0)
+    assert machine.awake_s() == LOOK_S
+    assert [round(stall, 6) for stall in machine.stalls] == [60.0 - LOOK_S]
+
+
+def test_time_in_which_the_others_are_held_up_does_not_count() -> None:
+    machine = Machine()
+    machine.held = True
+    for _ in range(50):
+        machine.passes(LOOK_S)
+        assert machine.awake_s() == 0.0
+    machine.held = False
+    machine.passes(LOOK_S)
+    assert machine.awake_s() == LOOK_S
+
+
+def test_work_is_no_stall() -> None:
+    machine = Machine()
+    machine.passes(5.0)
+    machine.clock.resume()
+    machine.passes(LOOK_S)
+    assert machine.awake_s() == round(5.0 + LOOK_S, 6)
+    assert machine.stalls == []
