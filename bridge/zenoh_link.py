@@ -1,27 +1,19 @@
 """A link over Zenoh: client sessions to one router, which enforces the graph.
 
-Client mode, multicast and gossip off, so that nobody can talk past the router; shared memory off;
-reliable, blocking, real-time priority: nothing is dropped. Express, nothing waits for a batch.
+Reliable, blocking, real-time priority: nothing is dropped. Express, nothing waits for a batch.
 Subscribers run on Zenoh's network thread and only queue. Every session is closed in a `with`: one
-that isn't can keep its process from ending. Every session is kept until the process ends (`_keep`).
-
-Each session keeps few threads: a message that wakes one instead of five costs half as much. In a
-router what hears and what says stay apart, so that somebody who doesn't read can't stop the rest.
+that isn't can keep its process from ending. All are kept until it ends (`bridge.session.keep`).
 """
 
 import contextlib
-import ctypes
-import json
 import os
-import resource
 import select
-import socket
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import Self
 
 import zenoh
 from zenoh.handlers import Callback, RingChannel
@@ -30,38 +22,37 @@ from bridge import zenoh_log
 from bridge.access import AccessPlan
 from bridge.denials import Denials, directives, is_ours
 from bridge.link import ROOM_BYTES, Arrival, Inbox, Publisher
+from bridge.listening import accept_many, await_first_words, hasty, loopback
 from bridge.login import Obstacle, obstacle, taken
-from bridge.messages import MAX_BYTES
 from bridge.process import Stop
-from configs.brief import LEASE_S, NetworkLink, Outside, TlsFiles
+from bridge.session import (
+    ONE_THREAD,
+    ROUTER_THREADS,
+    few_threads,
+    keep,
+    mutual_tls,
+    open_bounded,
+    set_key,
+    settings,
+)
+from configs.brief import LEASE_S, NetworkLink, Outside
 from configs.errors import InfrastructureError
 
 CLOSE_S = 1.0
 _PROBE_S = 1.0
 _FIRST_RETRY_S, _LAST_RETRY_S = 0.02, 0.3
 _ATTEMPT_S, _LISTEN_S = 5.0, 10.0
-_HANDSHAKE_S, _SILENT_S = 2.0, 3600
 _BLOCKED_S = 5.0
 """Zenoh's own: a put that waits for longer closes its session."""
-_LEAST_PENDING, _MOST_PENDING, _LEAST_SESSIONS = 100, 4096, 1000
 _PORT_TRIES = 5
 POLLED_DEPTH = 64
 """Messages on a key that wait for who polls, the newest: more than any schedule lets be on their
 way (`configs.brief.LEAD_TICKS`)."""
 _YIELDS = 20
 _PAUSE_S, _LONGEST_PAUSE_S = 50e-6, 2e-3
-_ONE_THREAD = (
-    "(app: (worker_threads: 1), net: (handover: app), acc: (handover: app), rx: (handover: app),"
-    " tx: (handover: app))"
-)
-_ROUTER_THREADS = (
-    "(app: (worker_threads: 1), net: (handover: app), acc: (handover: app),"
-    " rx: (worker_threads: 2), tx: (worker_threads: 1))"
-)
 _WAIT_BEFORE_CLOSE = "transport/link/tx/queue/congestion_control/block/wait_before_close"
 UNREAD_S = 0.5
 """Who doesn't read for this long what he asked for, while others wait to say more, is cut off."""
-_Kept = TypeVar("_Kept")
 
 
 class ZenohLink:
@@ -168,8 +159,8 @@ class ZenohLink:
             closer.join(CLOSE_S)
             if closer.is_alive():
                 ZenohLink.stuck = True
-                _keep(self._declared)
-                _keep(self._tokens)
+                keep(self._declared)
+                keep(self._tokens)
                 return
         self._declared.clear()
         self._tokens.clear()
@@ -276,8 +267,8 @@ def _client(network: NetworkLink, timeout_s: float, stop: Stop | None) -> zenoh.
     pause_s = _FIRST_RETRY_S
     while True:
         left_s = min(max(deadline - time.monotonic(), _FIRST_RETRY_S), _ATTEMPT_S)
-        with _few_threads(_ONE_THREAD):
-            session = _open_bounded(_login_config("client", network, left_s), left_s + 1.0)
+        with few_threads(ONE_THREAD):
+            session = open_bounded(_login_config("client", network, left_s), left_s + 1.0)
         if not isinstance(session, str):
             return session
         reason = _reason(network)
@@ -295,9 +286,9 @@ def _client(network: NetworkLink, timeout_s: float, stop: Stop | None) -> zenoh.
 def _reason(network: NetworkLink) -> Obstacle:
     """Why there is no session: Zenoh tells it peers only."""
     config = _login_config("peer", network, _PROBE_S)
-    _set(config, "listen/endpoints", [])
-    _set(config, "connect/exit_on_failure", True)
-    said = _open_bounded(config, _PROBE_S + 1.0)
+    set_key(config, "listen/endpoints", [])
+    set_key(config, "connect/exit_on_failure", True)
+    said = open_bounded(config, _PROBE_S + 1.0)
     if isinstance(said, str):
         return obstacle(said, network.user)
     said.close()
@@ -306,16 +297,16 @@ def _reason(network: NetworkLink) -> Obstacle:
 
 def _login_config(mode: str, network: NetworkLink, timeout_s: float) -> zenoh.Config:
     """For a single attempt."""
-    config = _config(mode, network.lease_s)
+    config = settings(mode, network.lease_s)
     # A put that finds the router stopped waits for as long as the router may.
-    _set(config, _WAIT_BEFORE_CLOSE, int(max(network.lease_s, _BLOCKED_S) * 1e6))
-    _set(config, "connect/endpoints", [network.endpoint])
-    _set(config, "connect/timeout_ms", 0)
-    _set(config, "transport/unicast/open_timeout", max(int(timeout_s * 1000), 1))
-    _set(config, "transport/auth/usrpwd/user", network.user)
-    _set(config, "transport/auth/usrpwd/password", network.password)
+    set_key(config, _WAIT_BEFORE_CLOSE, int(max(network.lease_s, _BLOCKED_S) * 1e6))
+    set_key(config, "connect/endpoints", [network.endpoint])
+    set_key(config, "connect/timeout_ms", 0)
+    set_key(config, "transport/unicast/open_timeout", max(int(timeout_s * 1000), 1))
+    set_key(config, "transport/auth/usrpwd/user", network.user)
+    set_key(config, "transport/auth/usrpwd/password", network.password)
     if network.tls is not None:
-        _set(config, "transport/link/tls", _mutual_tls(network.tls, "connect"))
+        set_key(config, "transport/link/tls", mutual_tls(network.tls, "connect"))
     return config
 
 
@@ -352,19 +343,6 @@ def open_router(
             yield link
 
 
-@contextlib.contextmanager
-def _few_threads(threads: str) -> Iterator[None]:
-    """Around the first session of a process: Zenoh reads it then, and children don't inherit it."""
-    if "ZENOH_RUNTIME" in os.environ:
-        yield
-        return
-    os.environ["ZENOH_RUNTIME"] = threads
-    try:
-        yield
-    finally:
-        del os.environ["ZENOH_RUNTIME"]
-
-
 def _listen(
     endpoint: str | None,
     access: AccessPlan,
@@ -376,154 +354,24 @@ def _listen(
     tries = 1 if endpoint else _PORT_TRIES
     reason = ""
     for _ in range(tries):
-        at = endpoint or _loopback()
-        config = _config("router", lease_s)
-        _set(config, "listen/endpoints", [at, *([_hasty(outside.endpoint)] if outside else [])])
+        at = endpoint or loopback()
+        config = settings("router", lease_s)
+        set_key(config, "listen/endpoints", [at, *([hasty(outside.endpoint)] if outside else [])])
         if outside is not None and outside.tls is not None:
-            _set(config, "transport/link/tls", _mutual_tls(outside.tls, "listen"))
-        _accept_many(config, len(access.rights))
-        _set(config, "transport/auth/usrpwd/dictionary_file", str(dictionary))
+            set_key(config, "transport/link/tls", mutual_tls(outside.tls, "listen"))
+        accept_many(config, len(access.rights))
+        set_key(config, "transport/auth/usrpwd/dictionary_file", str(dictionary))
         config.insert_json5("access_control", access.access_control())
         config.insert_json5("low_pass_filter", access.low_pass_filter())
         config.insert_json5("downsampling", access.downsampling())
-        _set(config, _WAIT_BEFORE_CLOSE, int(unread_s * 1e6))
-        with _few_threads(_ROUTER_THREADS):
-            session = _open_bounded(config, _LISTEN_S)
+        set_key(config, _WAIT_BEFORE_CLOSE, int(unread_s * 1e6))
+        with few_threads(ROUTER_THREADS):
+            session = open_bounded(config, _LISTEN_S)
         if not isinstance(session, str):
-            _await_first_words([at, *([outside.endpoint] if outside else [])])
+            await_first_words([at, *([outside.endpoint] if outside else [])])
             return session, at
         reason = taken(session)
     where = " and ".join(
         [endpoint or "any loopback port", *([outside.endpoint] if outside is not None else [])]
     )
     raise InfrastructureError(f"can't listen at {where}: {reason}")
-
-
-def _hasty(endpoint: str) -> str:
-    """The same with a bound on how long a handshake of TLS may take."""
-    milliseconds = int(_HANDSHAKE_S * 1e3)
-    return f"{endpoint}#tls_handshake_timeout_ms={milliseconds}" if "tls/" in endpoint else endpoint
-
-
-def _accept_many(config: zenoh.Config, identities: int) -> None:
-    """Let those who open connections and say nothing keep nobody out.
-
-    Each costs a descriptor until `_HANDSHAKE_S`; those beyond the limit are hung up on, and whoever
-    means it tries again at once (`_client`). A quarter of the descriptors stays out of their reach.
-    """
-    descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    pending = min(max(descriptors // 4, 2 * identities, _LEAST_PENDING), _MOST_PENDING)
-    _set(config, "transport/unicast/accept_timeout", int(_HANDSHAKE_S * 1e3))
-    _set(config, "transport/unicast/accept_pending", pending)
-    _set(config, "transport/unicast/max_sessions", _LEAST_SESSIONS + 2 * identities)
-
-
-def _await_first_words(endpoints: Sequence[str]) -> None:
-    """Let the kernel keep connections until their first bytes: who listens here, speaks second.
-
-    The sockets are Zenoh's, which has no setting for it; where they can't be had or the kernel
-    doesn't do it they stay as they are.
-    """
-    ports = {int(port) for at in endpoints if (port := at.rpartition(":")[2]).isdecimal()}
-    for descriptor in Path("/proc/self/fd").iterdir():
-        with contextlib.suppress(OSError):
-            if not str(descriptor.readlink()).startswith("socket:"):
-                continue
-            with socket.socket(fileno=os.dup(int(descriptor.name))) as listener:
-                listens = listener.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
-                if listens and listener.getsockname()[1] in ports:
-                    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_DEFER_ACCEPT, _SILENT_S)
-
-
-def _mutual_tls(files: TlsFiles, side: str) -> dict[str, object]:
-    """Zenoh's TLS section; `side` is "listen" or "connect"."""
-    return {
-        "root_ca_certificate": files.ca,
-        "enable_mtls": True,
-        f"{side}_certificate": files.certificate,
-        f"{side}_private_key": files.private_key,
-    }
-
-
-def _config(mode: str, lease_s: float) -> zenoh.Config:
-    zenoh_log.begin()
-    config = zenoh.Config()
-    _set(config, "mode", mode)
-    _set(config, "scouting/multicast/enabled", False)
-    _set(config, "scouting/gossip/enabled", False)
-    _set(config, "scouting/delay", 0)
-    _set(config, "transport/shared_memory/enabled", False)
-    _set(config, "transport/link/rx/max_message_size", 2 * MAX_BYTES)
-    _set(config, "transport/link/tx/lease", int(lease_s * 1e3))
-    return config
-
-
-def _set(config: zenoh.Config, path: str, value: object) -> None:
-    config.insert_json5(path, json.dumps(value))
-
-
-def _open_bounded(config: zenoh.Config, timeout_s: float) -> zenoh.Session | str:
-    """A session, or why there is none; "" if that took too long.
-
-    Opened in a thread of its own: a peer that accepts and never answers would hang it. A session
-    that opens after all when nobody waits for it any more is closed.
-    """
-    result: list[zenoh.Session | str] = []
-    lock = threading.Lock()
-    waiting = True
-
-    def open_session() -> None:
-        try:
-            opened: zenoh.Session | str = _keep(zenoh.open(config))
-        except zenoh.ZError as error:
-            opened = str(error)
-        with lock:
-            if waiting:
-                result.append(opened)
-                return
-        if not isinstance(opened, str):
-            opened.close()
-
-    opener = threading.Thread(target=open_session, daemon=True)
-    opener.start()
-    opener.join(timeout_s)
-    with lock:
-        waiting = False
-    return result[0] if result else ""
-
-
-def _keep(thing: _Kept) -> _Kept:
-    """Never deallocate it: no list or module may own it, for those end before the process does.
-
-    To deallocate a session, open or closed, is to wait with the GIL held for a task of Zenoh's,
-    and Zenoh's only thread may wait for the GIL at that moment to call another session back: every
-    thread of the process would stop for ever. Whatever drops the last reference does it, a garbage
-    collection of an old exception's traceback in any thread too. A session that was closed costs
-    20 kB.
-    """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(thing))
-    return thing
-
-
-def _loopback() -> str:
-    """A free endpoint that only this machine reaches.
-
-    Raises:
-        InfrastructureError: the machine has no loopback address.
-    """
-    reasons = []
-    for family, host in ((socket.AF_INET, "127.0.0.1"), (socket.AF_INET6, "::1")):
-        try:
-            with socket.socket(family, socket.SOCK_STREAM) as probe:
-                probe.bind((host, 0))
-                probe.listen()
-                port: int = probe.getsockname()[1]
-                socket.create_connection((host, port), _PROBE_S).close()  # its device may be down
-        except OSError as error:
-            reasons.append(f"{host}: {error.strerror}")
-        else:
-            return f"tcp/[{host}]:{port}" if ":" in host else f"tcp/{host}:{port}"
-    raise InfrastructureError(
-        f"no loopback address for the processes of a run to meet at ({', '.join(reasons)}):"
-        " ip link set lo up"
-    )
