@@ -13,7 +13,7 @@ from configs.loading import json_schema, load, shipped
 from configs.overrides import Overrides
 from configs.scenario import Scenario
 from fleetloop.checks.examine import examine
-from fleetloop.checks.finding import Finding, titled, worst
+from fleetloop.checks.finding import Finding, named, worst
 from fleetloop.checks.rehearsal import rehearse
 from fleetloop.terminal import ResultConsole, say, say_json
 
@@ -47,6 +47,13 @@ def check_scenario(
     if as_json:
         _say_json(findings=found)
         return UNSOUND if unsound else FINE
+    ResultConsole().print(_table(scenario, found))
+    say(_VERDICTS[worst(found)])
+    return UNSOUND if unsound else FINE
+
+
+def _table(scenario: Scenario, findings: Sequence[Finding]) -> Table:
+    """A row for each; what is well differs in numbers only, so there one robot stands for all."""
     graph = scenario.topology
     table = Table(
         title=f"{scenario.name}: {len(graph.robots)} robots, {len(graph.edges)} edges",
@@ -54,11 +61,25 @@ def check_scenario(
         box=None,
         padding=(0, 1),
     )
-    for finding in found:
-        table.add_row(_MARKS[finding.level], titled(finding), finding.text)
-    ResultConsole().print(table)
-    say(_VERDICTS[worst(found)])
-    return UNSOUND if unsound else FINE
+    by_title: dict[str, list[Finding]] = {}
+    for finding in findings:
+        by_title.setdefault(finding.title, []).append(finding)
+    for title, group in by_title.items():
+        shown = [finding for finding in group if finding.level != "ok"]
+        well = [finding for finding in group if finding.level == "ok"]
+        if well:
+            first = named(well[0].robots, graph.robots)
+            others = [robot for finding in well[1:] for robot in finding.robots]
+            text = (
+                f"{well[0].text}; likewise {named(others, graph.robots)}"
+                if others
+                else well[0].text
+            )
+            table.add_row(_MARKS["ok"], title, first, text)
+        for finding in shown:
+            robots = named(finding.robots, graph.robots)
+            table.add_row(_MARKS[finding.level], title, robots, finding.text)
+    return table
 
 
 def _find(

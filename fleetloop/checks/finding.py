@@ -1,6 +1,6 @@
 """What a check says: how bad it is, whom it concerns, the numbers, and the key to change."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -41,6 +41,21 @@ def worst(findings: Iterable[Finding]) -> Level:
 def titled(finding: Finding) -> str:
     """Whom it concerns, and what was checked."""
     return f"{', '.join(finding.robots)}: {finding.title}" if finding.robots else finding.title
+
+
+def named(robots: Sequence[str], everybody: Sequence[str]) -> str:
+    """Robots in few words: "all", "r3", "r1 to r4, r7"."""
+    if len(robots) == len(everybody) > 1:
+        return "all"
+    runs: list[list[str]] = []
+    for robot in robots:
+        at = everybody.index(robot)
+        if runs and at > 0 and everybody[at - 1] == runs[-1][-1]:
+            runs[-1].append(robot)
+        else:
+            runs.append([robot])
+    spans = [f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(run) for run in runs]
+    return ", ".join(spans)
 
 
 def alike(findings: Iterable[Finding]) -> list[Finding]:

@@ -89,6 +89,12 @@ def test_check_without_a_name_lists_the_shipped_scenarios(tmp_path: Path) -> Non
         assert name in out
 
 
+def test_check_gives_alike_robots_one_line(tmp_path: Path) -> None:
+    lines = fleetloop("check", "twelve", cwd=tmp_path).stdout.splitlines()
+    for title in ("sampled speed loop", "first torques", "bus at 1000 kbit/s"):
+        assert sum(title in line for line in lines) == 1
+
+
 def test_check_shows_both_sides_of_46(tmp_path: Path) -> None:
     done = fleetloop("check", "paper_ring", cwd=tmp_path)
     assert done.returncode == 0
