@@ -20,6 +20,7 @@ from configs.brief import OURS, Settings, TlsFiles
 from configs.complaints import MISSING, complaints, refusal
 from configs.cross_checks import Problem
 from configs.errors import Complaint, ScenarioError
+from configs.files import expanded
 from configs.scenario import Scenario
 from configs.sections import Name, Section
 from configs.users import read_users
@@ -294,9 +295,12 @@ def _beside(deployment: Deployment, folder: Path) -> Deployment:
         return deployment
     changes: dict[str, Any] = {}
     if network.users is not None:
-        changes["users"] = folder / network.users.expanduser()
+        changes["users"] = folder / expanded(network.users, "network.users")
     if network.tls is not None:
         tls = network.tls
-        files = {key: folder / getattr(tls, key).expanduser() for key in TlsSection.model_fields}
+        files = {
+            key: folder / expanded(getattr(tls, key), f"network.tls.{key}")
+            for key in TlsSection.model_fields
+        }
         changes["tls"] = tls.model_copy(update=files)
     return deployment.model_copy(update={"network": network.model_copy(update=changes)})

@@ -8,19 +8,19 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from configs.sections import NotNegative, Positive, Section
+from configs.sections import Positive, Seconds, SecondsOrZero, Section
 
 
 class Host(Section):
     """Supervision of drives, bus and pose; own limits; what follows a fault, and the end."""
 
-    heartbeat_age_limit_s: Positive = Field(
+    heartbeat_age_limit_s: Seconds = Field(
         0.5, description="a drive silent for longer has dropped out"
     )
-    encoder_age_limit_s: Positive | None = Field(
+    encoder_age_limit_s: Seconds | None = Field(
         None, description="ten control periods, at least 0.05 s, if not given"
     )
-    pose_age_limit_s: Positive | None = Field(
+    pose_age_limit_s: Seconds | None = Field(
         None,
         description="the delay and five localisation periods, at least 0.5 s, if not given; counts"
         " where fixes do: not with localisation.source odometry",
@@ -45,10 +45,10 @@ class Host(Section):
     rearm: bool = Field(
         False, description="a robot that stopped itself arms again once the fault is gone"
     )
-    rearm_after_s: NotNegative = Field(0.5, description="all must have been well for this long")
+    rearm_after_s: SecondsOrZero = Field(0.5, description="all must have been well for this long")
     rearm_attempts: Annotated[int, Field(ge=1, le=1000)] = Field(3, description="in a run")
-    rearm_limit_s: Positive = Field(1.0, description="longest wait for closed loop then")
-    bus_error_limit_s: NotNegative = Field(
+    rearm_limit_s: Seconds = Field(1.0, description="longest wait for closed loop then")
+    bus_error_limit_s: SecondsOrZero = Field(
         5.0,
         description="errors of a bus that isn't ours are borne for this long, then the controller"
         " gives up",

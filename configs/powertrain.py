@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from configs.sections import NotNegative, Positive, Section
+from configs.sections import NotNegative, Positive, Seconds, SecondsOrZero, Section
 
 AboveZeroKelvin = Annotated[float, Field(gt=-273.15, allow_inf_nan=False)]
 
@@ -22,8 +22,8 @@ class Motor(Section):
     current_limit_A: Positive | None = Field(
         None, description="of the power stage; the drive's, drive.current_limit_A, if not given"
     )
-    current_loop_s: Positive = Field(0.001, description="time constant of the current loop")
-    compute_delay_s: NotNegative = Field(0.000_125, description="from demand to current loop")
+    current_loop_s: Seconds = Field(0.001, description="time constant of the current loop")
+    compute_delay_s: SecondsOrZero = Field(0.000_125, description="from demand to current loop")
     winding_resistance_ohm: Positive = Field(
         0.2, description="the heat is R i²: 1.5 times the phase resistance for amplitudes"
     )
@@ -32,9 +32,9 @@ class Motor(Section):
     coulomb_friction_N_m: NotNegative = 5e-3
     ambient_C: AboveZeroKelvin = 25.0
     motor_thermal_resistance_K_W: NotNegative = Field(15.0, description="windings to ambient")
-    motor_thermal_time_s: Positive = 60.0
+    motor_thermal_time_s: Seconds = 60.0
     fet_thermal_resistance_K_W: NotNegative = Field(30.0, description="FETs to ambient")
-    fet_thermal_time_s: Positive = 60.0
+    fet_thermal_time_s: Seconds = 60.0
     torque_noise_N_m: NotNegative = Field(1e-3, description="rms, of the drive's estimate")
     current_quantum_A: NotNegative = Field(0.01, description="of the drive's measurement; 0: none")
 

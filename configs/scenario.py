@@ -28,9 +28,10 @@ from configs.sections import (
     Name,
     Network,
     PathShape,
-    Positive,
     Robot,
+    Seconds,
     Section,
+    Seed,
 )
 from configs.topology import Graph, generated, parse_edge, random_rooted
 
@@ -44,13 +45,13 @@ class Scenario(Section):
     schema_: Literal[1] = Field(alias="schema", description="version of this format")
     name: Name
     description: str = ""
-    duration_s: Positive = 30.0
-    until_s: Positive | None = Field(
+    duration_s: Seconds = 30.0
+    until_s: Seconds | None = Field(
         None,
         description="end this run here, not at duration_s, as --duration does: what is expected"
         " later stays unchecked",
     )
-    seed: Annotated[int, Field(ge=0)] = 1
+    seed: Seed = 1
     clock: Clock = Clock()
     path: PathShape = Cosine(kind="cosine", start_m=(-3.5, 0.0))
     leader: Leader = Leader()

@@ -10,9 +10,19 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from configs import patterns
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+MOST = 1e12
+"""Beyond every quantity of a robot, and far enough from where products of floats are infinite."""
+MOST_S = 1e9
+"""Thirty years: all sums of times fit into 64 bits of nanoseconds."""
+MOST_INTEGER = (1 << 53) - 1
+"""What every reader of TOML and JSON takes exactly."""
+
+Finite = Annotated[float, Field(ge=-MOST, le=MOST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=MOST, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, le=MOST, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(gt=0, le=MOST_S, allow_inf_nan=False)]
+SecondsOrZero = Annotated[float, Field(ge=0, le=MOST_S, allow_inf_nan=False)]
+Seed = Annotated[int, Field(ge=0, le=MOST_INTEGER)]
 Name = Annotated[str, Field(pattern=patterns.NAME, max_length=32)]
 Node = Annotated[int, Field(ge=0, le=62)]
 Point = Annotated[tuple[Finite, Finite], Field(strict=False)]
@@ -33,13 +43,15 @@ class Clock(Section):
     mode: Literal["lockstep", "realtime"] = Field(
         "lockstep", description="the plant owns time, or everybody keeps the wall clock's"
     )
-    control_period_s: Positive = Field(0.001, description="one tick: sense, decide, act")
-    share_period_s: Positive = Field(0.02, description="path variables go to the out-neighbours")
-    localisation_period_s: Positive = Field(0.01, description="poses go to the robots")
-    plant_step_s: Positive = Field(0.001, description="longest integration step of the plant")
-    countdown_s: NotNegative = Field(0.25, description="for arming the drives, before t = 0")
-    tick_deadline_s: Positive = Field(2.0, description="longest wait within a tick, wall clock")
-    start_deadline_s: Positive | None = Field(
+    control_period_s: Seconds = Field(0.001, description="one tick: sense, decide, act")
+    share_period_s: Seconds = Field(0.02, description="path variables go to the out-neighbours")
+    localisation_period_s: Seconds = Field(0.01, description="poses go to the robots")
+    plant_step_s: Annotated[float, Field(ge=1e-6, le=MOST_S, allow_inf_nan=False)] = Field(
+        0.001, description="longest integration step of the plant"
+    )
+    countdown_s: SecondsOrZero = Field(0.25, description="for arming the drives, before t = 0")
+    tick_deadline_s: Seconds = Field(2.0, description="longest wait within a tick, wall clock")
+    start_deadline_s: Seconds | None = Field(
         None,
         description="longest wait for everybody to be ready; if not given 20 s, or 0.5 s for each"
         " robot if that is more",
@@ -154,7 +166,9 @@ class Mounting(Section):
 
     right_sign: Literal[1, -1] = 1
     left_sign: Literal[1, -1] = Field(1, description="-1: a drive mounted as a mirror image")
-    gear_ratio: Positive = Field(1.0, description="motor revolutions per wheel revolution")
+    gear_ratio: Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False)] = Field(
+        1.0, description="motor revolutions per wheel revolution"
+    )
 
 
 class Disturbance(Section):
@@ -183,8 +197,8 @@ class Control(Section):
     k3: Positive = 1.5
     k4: Positive = 3.0
     gamma_1_s: Positive = 0.01
-    gamma_2_s: Positive = 0.01
-    gamma_3_s: Positive = 0.01
+    gamma_2_s: Seconds = 0.01
+    gamma_3_s: Seconds = 0.01
     k5: Eight = (0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1)
     sigma_max: Positive = Field(1.0, description="bound of every element of Θ")
     sigma_margin: Positive = Field(0.1, description="the projection's k")
@@ -204,9 +218,9 @@ class CoordinationSection(Section):
     q: Positive = 1.0
     v_hat_0: Finite = 0.0
     mu_0: Finite = 0.0
-    age_limit_s: Positive = Field(2.0, description="a neighbour's value is carried on this far")
-    silence_limit_s: Positive = Field(2.0, description="then a silent neighbour stops counting")
-    ahead_limit_s: Positive = Field(
+    age_limit_s: Seconds = Field(2.0, description="a neighbour's value is carried on this far")
+    silence_limit_s: Seconds = Field(2.0, description="then a silent neighbour stops counting")
+    ahead_limit_s: Seconds = Field(
         0.5, description="in real time, a neighbour dated further ahead isn't believed"
     )
 
@@ -266,8 +280,8 @@ class GraphSection(Section):
     generator: Literal["chain", "ring", "tree", "star", "complete", "random"] | None = Field(
         None, description="a named shape over the robots in their order, instead of edges"
     )
-    max_in_degree: Annotated[int, Field(ge=1)] = Field(2, description="of the random graph")
-    seed: Annotated[int, Field(ge=0)] = Field(1, description="of the random graph")
+    max_in_degree: Annotated[int, Field(ge=1, le=256)] = Field(2, description="of the random graph")
+    seed: Seed = Field(1, description="of the random graph")
     leader: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(
         None, description="robots that hear the virtual leader; the first one if not given"
     )
@@ -276,7 +290,7 @@ class GraphSection(Section):
 class SpeedStep(Section):
     """From this time on, this speed."""
 
-    t_s: NotNegative
+    t_s: SecondsOrZero
     speed_m_s: Finite
 
 
@@ -301,10 +315,10 @@ class Bus(Section):
     tx_mailboxes: Annotated[int, Field(ge=1, le=32)] = Field(
         3, description="frames that wait in a drive's controller"
     )
-    restart_s: NotNegative | None = Field(
+    restart_s: SecondsOrZero | None = Field(
         None, description="a host recovers from bus-off this much later; never if not given"
     )
-    drive_restart_s: NotNegative | None = Field(
+    drive_restart_s: SecondsOrZero | None = Field(
         None, description="the same of a drive; as in the field, never if not given"
     )
     record: Annotated[tuple[Literal["blf", "log"], ...], Field(strict=False)] = Field(
@@ -326,26 +340,26 @@ class Drive(Section):
     )
     right_node: Node = 0
     left_node: Node = 1
-    heartbeat_period_s: Positive = 0.1
-    encoder_period_s: Positive | None = Field(
+    heartbeat_period_s: Seconds = 0.1
+    encoder_period_s: Seconds | None = Field(
         None,
         description="of encoder frames, whole milliseconds, at most one control period, which it is"
         " if not given; in lockstep on ideal buses they come with the ticks",
     )
-    torques_period_s: NotNegative = Field(
+    torques_period_s: SecondsOrZero = Field(
         0.0, description="this message and the next five: whole milliseconds; 0: only on request"
     )
-    error_period_s: NotNegative = 0.0
-    iq_period_s: NotNegative = 0.0
-    temperature_period_s: NotNegative = 0.0
-    bus_voltage_period_s: NotNegative = 0.0
-    powers_period_s: NotNegative = 0.0
+    error_period_s: SecondsOrZero = 0.0
+    iq_period_s: SecondsOrZero = 0.0
+    temperature_period_s: SecondsOrZero = 0.0
+    bus_voltage_period_s: SecondsOrZero = 0.0
+    powers_period_s: SecondsOrZero = 0.0
     firmware: Annotated[str, Field(pattern=patterns.FIRMWARE)] = Field(
         "0.6.10", description="from 0.6.11 on, writing an endpoint is answered"
     )
-    boot_s: NotNegative = Field(0.5, description="silent for so long after a reboot")
+    boot_s: SecondsOrZero = Field(0.5, description="silent for so long after a reboot")
     calibrated: bool = Field(True, description="at power-up; else arming needs a calibration")
-    calibration_s: Positive = Field(2.0, description="of the motor, and then of the encoder")
+    calibration_s: Seconds = Field(2.0, description="of the motor, and then of the encoder")
     estop_blocks_arming: bool = Field(True, description="until errors are cleared")
     under_voltage_V: NotNegative = Field(10.0, description="of the bus; below, a drive disarms")
     over_voltage_V: Positive = Field(30.0, description="of the bus; above, a drive disarms")
@@ -354,8 +368,8 @@ class Drive(Section):
     spinout_power_W: NotNegative = Field(
         10.0, description="disarms if the motor brakes and takes more than this; 0: it never does"
     )
-    watchdog_s: NotNegative = Field(0.1, description="0: off, as drives are delivered")
-    command_latency_s: Annotated[tuple[NotNegative, NotNegative], Field(strict=False)] = Field(
+    watchdog_s: SecondsOrZero = Field(0.1, description="0: off, as drives are delivered")
+    command_latency_s: Annotated[tuple[SecondsOrZero, SecondsOrZero], Field(strict=False)] = Field(
         (0.0001, 0.0011),
         description="least and most from the end of a frame until firmware acts on it; preset"
         " realistic on buses with bit timing",
@@ -376,7 +390,7 @@ class Localisation(Section):
     source: Literal["fused", "external", "odometry"] = Field(
         "fused", description="fixes carried on by wheel odometry, fixes alone, or odometry alone"
     )
-    delay_s: NotNegative | None = Field(
+    delay_s: Annotated[float, Field(ge=0, le=60, allow_inf_nan=False)] | None = Field(
         None, description="from a pose to its arrival; one control period if not given"
     )
 
@@ -396,8 +410,8 @@ class Expect(Section):
     robots: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(
         None, description="all if not given"
     )
-    from_s: NotNegative = 0.0
-    to_s: Positive | None = Field(None, description="the end if not given")
+    from_s: SecondsOrZero = 0.0
+    to_s: Seconds | None = Field(None, description="the end if not given")
     max_abs: NotNegative | None = None
     min: Finite | None = None
     max: Finite | None = None

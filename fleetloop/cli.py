@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from configs.errors import FleetloopError, ScenarioError
+from fleetloop import numbers
 from fleetloop.can.app import app as can_app
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def run(
     speed: Annotated[
         float,
         typer.Option(
-            min=0.0,
+            callback=numbers.speed,
             metavar="FACTOR",
             help="Hold the run to this multiple of real time; 0: as fast as the machine allows.",
         ),
@@ -187,7 +188,12 @@ def plant(
         typer.Option(metavar="R1,R2", help="Only these robots; all that are emulated if not given"),
     ] = "",
     duration: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="End after this time; else with Ctrl-C.")
+        float | None,
+        typer.Option(
+            callback=numbers.between(0.0, numbers.LONGEST_S),
+            metavar="SECONDS",
+            help="End after this time; else with Ctrl-C.",
+        ),
     ] = None,
     clock: ClockOption = None,
     seed: SeedOption = None,
@@ -281,12 +287,20 @@ def export(
     robots: Annotated[str, typer.Option(metavar="R1,R2", help="Only these robots; else all.")] = "",
     from_s: Annotated[
         float | None,
-        typer.Option("--from", metavar="SECONDS", help="From this scenario time on, in seconds."),
+        typer.Option(
+            "--from",
+            callback=numbers.finite,
+            metavar="SECONDS",
+            help="From this scenario time on, in seconds.",
+        ),
     ] = None,
     to_s: Annotated[
         float | None,
         typer.Option(
-            "--to", metavar="SECONDS", help="Up to and with this scenario time, in seconds."
+            "--to",
+            callback=numbers.finite,
+            metavar="SECONDS",
+            help="Up to and with this scenario time, in seconds.",
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite FILE if it exists.")] = False,

@@ -29,3 +29,9 @@ def test_every_import_is_a_declared_dependency_and_every_dependency_is_imported(
     distributions = packages_distributions()
     used = {distributions[name][0].lower().replace("_", "-") for name in imported()}
     assert used == declared
+
+
+def test_ci_runs_the_test_command_of_the_readme() -> None:
+    readme = (ROOT / "README.md").read_text("utf-8").splitlines()
+    (command,) = [line for line in readme if line.endswith("uv run ./test.sh")]
+    assert (ROOT / ".ci" / "run").read_text("utf-8").splitlines()[-1] == command

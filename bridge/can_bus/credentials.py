@@ -21,6 +21,7 @@ from can.util import cast_from_string
 from bridge.tls import check_tls
 from configs.brief import NetworkLink, TlsFiles
 from configs.errors import ScenarioError
+from configs.files import expanded
 from configs.users import read_users
 
 _TLS = ("ca", "certificate", "private_key")
@@ -78,7 +79,7 @@ def _password(options: Mapping[str, str], user: str) -> str:
         raise ScenarioError("over tcp give either password or users")
     if "password" in options:
         return as_option(options["password"])
-    path = Path(options["users"]).expanduser()
+    path = expanded(Path(options["users"]), "users")
     known = read_users(path, "users")
     if not known.get(user):
         raise ScenarioError(f"users = {path}: no line {user}:<password>")

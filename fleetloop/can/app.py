@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from fleetloop.numbers import LONGEST_S, between
+
 app = typer.Typer(
     help="Look at, feed, join and offer the CAN buses of runs that are up. BUS is a bus (r1), or"
     " run and bus (20261123-101500-paper/r1) if several runs have it.",
@@ -19,7 +21,8 @@ BusArg = Annotated[str, typer.Argument(metavar="BUS", help="A bus that is up, e.
 @app.command("list")
 def list_(
     seconds: Annotated[
-        float, typer.Option(min=0.01, max=60.0, metavar="S", help="How long to listen.")
+        float,
+        typer.Option(callback=between(0.01, 60.0), metavar="S", help="How long to listen."),
     ] = 1.0,
     bit_rate: Annotated[
         int, typer.Option("--bitrate", min=1, metavar="BIT/S", help="What load is a share of.")
@@ -54,7 +57,8 @@ def dump(
         int | None, typer.Option("-n", min=1, help="End after so many frames.")
     ] = None,
     silence_ms: Annotated[
-        float | None, typer.Option("-T", min=0.0, metavar="MS", help="End after a silence.")
+        float | None,
+        typer.Option("-T", callback=between(0.0, 1e12), metavar="MS", help="End after a silence."),
     ] = None,
     decode: Annotated[
         bool, typer.Option("--decode", help="Say what CANSimple frames mean.")
@@ -89,7 +93,10 @@ def send(
     ],
     count: Annotated[int, typer.Option("-n", min=1, help="Send them so many times.")] = 1,
     gap_ms: Annotated[
-        float, typer.Option("-g", min=0.0, metavar="MS", help="Time between two frames.")
+        float,
+        typer.Option(
+            "-g", callback=between(0.0, 1e12), metavar="MS", help="Time between two frames."
+        ),
     ] = 0.0,
 ) -> None:
     """Put frames on a bus, in cansend's syntax."""
@@ -127,7 +134,9 @@ def gateway(
     retry: Annotated[
         float,
         typer.Option(
-            min=0.0, metavar="S", help="When the other bus is lost, try so long to open it again."
+            callback=between(0.0, LONGEST_S),
+            metavar="S",
+            help="When the other bus is lost, try so long to open it again.",
         ),
     ] = 0.0,
     rate: Annotated[

@@ -57,7 +57,7 @@ def test_plant_and_controller_are_told_the_same_mounting_robot_by_robot() -> Non
         ("host.rearm_attempts=0", "host.rearm_attempts", "1"),
         ("host.dry=true", "host.dry", "unknown key"),
         ("mounting.left_sign=0", "mounting.left_sign", "-1"),
-        ("mounting.gear_ratio=0.0", "mounting.gear_ratio", "greater than 0"),
+        ("mounting.gear_ratio=0.0", "mounting.gear_ratio", "1e-06 or more"),
         ("robot.r1.mounting.right_sign=2", "robot.r1.mounting.right_sign", "-1"),
     ],
 )

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from configs.errors import ScenarioError
 from configs.loading import load, shipped
 
 VERBS = ("run", "agent", "plant", "check", "report", "export", "diff", "init", "can")
@@ -255,3 +256,29 @@ def test_a_role_is_not_started_by_hand(tmp_path: Path) -> None:
     )
     assert done.returncode == 2
     assert b"no AgentBrief" in done.stderr
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-1", "1e308"])
+@pytest.mark.parametrize(
+    ("args", "option"),
+    [
+        (("plant", "two_robots"), "--duration"),
+        (("run", "two_robots"), "--duration"),
+        (("run", "two_robots"), "--speed"),
+        (("can", "list"), "--seconds"),
+        (("can", "dump", "any"), "-T"),
+        (("can", "send", "r1", "017#"), "-g"),
+    ],
+)
+def test_a_number_that_is_none_is_blamed_on_its_option(
+    value: str, args: tuple[str, ...], option: str
+) -> None:
+    from typer.testing import CliRunner
+
+    from fleetloop.cli import app
+
+    done = CliRunner().invoke(app, [*args, option, value])
+    said = f"{done.stderr} {done.exception}"
+    assert option in said
+    assert "must be" in said
+    assert done.exit_code == 2 or isinstance(done.exception, ScenarioError)

@@ -1,0 +1,36 @@
+"""Numbers on the command line: within bounds, told in the words of this program."""
+
+import math
+from collections.abc import Callable
+
+import typer
+
+LONGEST_S = 1e9
+FASTEST, SLOWEST = 1e6, 1e-6
+"""Multiples of real time."""
+
+
+def between(least: float, most: float) -> Callable[[float | None], float | None]:
+    """A check of an option's value: at least and at most this."""
+
+    def check(value: float | None) -> float | None:
+        if value is not None and not least <= value <= most:  # not a number is neither
+            raise typer.BadParameter(f"{value:g}: must be a number from {least:g} to {most:g}.")
+        return value
+
+    return check
+
+
+def finite(value: float | None) -> float | None:
+    """A check of an option's value: a number."""
+    if value is not None and not math.isfinite(value):
+        raise typer.BadParameter(f"{value:g}: must be a finite number.")
+    return value
+
+
+def speed(value: float) -> float:
+    """A check of a multiple of real time; 0: as fast as can be."""
+    if value and not SLOWEST <= value <= FASTEST:
+        right = f"must be 0 (as fast as the machine allows), or from {SLOWEST:g} to {FASTEST:g}."
+        raise typer.BadParameter(f"{value:g}: {right}")
+    return value
