@@ -9,7 +9,8 @@
 
 A login is a sequence of lines about one connection (TLS, InitSyn, OpenSyn), the last of them with
 the user's name. Rights are looked up in advance when a key is declared, which says nothing, and
-then again for every message, which does. What is kept is bounded.
+then again for every message, which does; but for what comes too often (`access.downsampling`) and
+was dropped before. What is kept is bounded.
 """
 
 import re

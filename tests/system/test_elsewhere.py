@@ -231,7 +231,7 @@ from bridge.zenoh_link import open_client
 from configs.brief import NetworkLink
 with open_client(NetworkLink("", sys.argv[1], "bench", "word"), 10.0) as link:
     for _ in range(5):
-        link.publisher(keys.path(sys.argv[2], "r1")).put(b"forged")
+        link.publisher(keys.report(sys.argv[2], "agent/r1")).put(b"forged")
 """
 
 
@@ -251,7 +251,7 @@ def test_a_denied_put_leaves_whom_and_how_often_in_log_and_summary(tmp_path: Pat
         assert status == 0, out
     finally:
         run.kill()
-    what = f"denied to 'bench' from 127.0.0.1: put on fleetloop/{SCENARIO[0]}/robot/r1/path"
+    what = f"denied to 'bench' from 127.0.0.1: put on fleetloop/{SCENARIO[0]}/@report/agent/r1"
     assert f"router: {what}\n" in out
     assert run.summary()["notices"]["router"] == [f"{what} (5 times)"]
 
