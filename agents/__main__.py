@@ -36,10 +36,12 @@ from bridge.process import (
 )
 from bridge.profile import Sampler
 from bridge.telemetry import AGENT_ROW, RowBuffer
-from bridge.zenoh_link import StoppedError, open_polled
+from bridge.zenoh_link import POLLED_DEPTH, StoppedError, open_polled
 from configs.brief import AgentBrief
 from configs.errors import FleetloopError, InfrastructureError
 
+NEWEST = 64
+"""In real time, messages of each neighbour that wait: the newest wins."""
 CONTROLLER_PRIORITY = 40
 """SCHED_FIFO, below the plant's: the drives answer whoever computes."""
 
@@ -51,7 +53,8 @@ def run(brief: AgentBrief, stop: Stop) -> str:
     """
     name_process(f"agent {brief.robot}")
     try:
-        link = open_polled(brief.network, brief.schedule.start_deadline_s, stop)
+        depth = NEWEST if brief.schedule.realtime else POLLED_DEPTH
+        link = open_polled(brief.network, brief.schedule.start_deadline_s, stop, depth=depth)
     except StoppedError:
         return stop.reason
     with link:
@@ -142,6 +145,7 @@ class _Wired(NamedTuple):
                 **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
                 "stopped": self.agent.guard.stopped_because,
                 "notices": "\n".join(self.agent.notices()),
+                "flood": ", ".join(self.agent.admission.refusals.floods()),
                 "refused": ", ".join(refused),
                 "failure": failure,
                 "early": "" if self.agent.closed else early,

@@ -28,6 +28,14 @@ class Arrival(NamedTuple):
     payload: bytes
 
 
+class Dropped(NamedTuple):
+    """How many messages of a subscription found no room."""
+
+    tag: str
+    key: str
+    messages: int
+
+
 class Publisher(Protocol):
     """The right to put messages on one key."""
 
@@ -71,10 +79,9 @@ class Link(Protocol):
 class Mailbox:
     """The room of one subscription. Filled from whatever thread, emptied by one."""
 
-    __slots__ = ("_given", "_lock", "_room", "_taken", "dropped", "tag")
+    __slots__ = ("_given", "_lock", "_room", "_taken", "dropped")
 
-    def __init__(self, tag: str, room_bytes: int) -> None:
-        self.tag = tag
+    def __init__(self, room_bytes: int) -> None:
         self.dropped = 0
         self._room = room_bytes
         self._given = self._taken = 0
@@ -103,14 +110,16 @@ class Inbox:
 
     def __init__(self) -> None:
         self._queue: SimpleQueue[tuple[Arrival, Mailbox | None]] = SimpleQueue()
-        self._boxes: list[Mailbox] = []
+        self._boxes: list[tuple[str, str, Mailbox]] = []  # tag and key of each
         self._latest: dict[tuple[str, str], bytes] = {}  # by tag and key, of what is queued
         self._lock = threading.Lock()
 
-    def mailbox(self, tag: str, room_bytes: int) -> Callable[[str, Callable[[], bytes], int], None]:
-        """How a subscriber puts its messages: key, how to get the payload, and its length."""
-        box = Mailbox(tag, room_bytes)
-        self._boxes.append(box)
+    def mailbox(
+        self, key: str, tag: str, room_bytes: int
+    ) -> Callable[[str, Callable[[], bytes], int], None]:
+        """How a subscriber puts messages: key, how to get the payload, its length."""
+        box = Mailbox(room_bytes)
+        self._boxes.append((tag, key, box))
         put = self._queue.put
 
         def take(key: str, payload: Callable[[], bytes], size: int) -> None:
@@ -128,13 +137,9 @@ class Inbox:
         if not waits:
             self._queue.put((arrival, None))
 
-    def dropped(self) -> dict[str, int]:
-        """By tag, how many messages found no room."""
-        dropped: dict[str, int] = {}
-        for box in self._boxes:
-            if box.dropped:
-                dropped[box.tag] = dropped.get(box.tag, 0) + box.dropped
-        return dropped
+    def dropped(self) -> list[Dropped]:
+        """The subscriptions that had no room for all, and how many messages they lost."""
+        return [Dropped(tag, key, box.dropped) for tag, key, box in self._boxes if box.dropped]
 
     def receive(self, timeout_s: float) -> Arrival | None:
         """The next arrival, waiting at most `timeout_s`; 0 polls."""

@@ -5,8 +5,11 @@ because there was no room for it. Nobody who reads messages fails for what they 
 here, and the counts go with the reader's last word into the summary.
 """
 
+from collections import Counter
 from typing import NamedTuple
 
+FLOOD = 1000
+"""More refused messages of one sender than anybody says by mistake."""
 MOST_KINDS = 32
 """Of senders and kinds that are told apart; what comes later counts as others."""
 
@@ -43,6 +46,13 @@ class Refusals:
             key = _Kind("message", "others", "too many kinds to tell apart")
         self._details.setdefault(key, detail or key.kind)
         self._counts[key] = self._counts.get(key, 0) + count
+
+    def floods(self) -> list[str]:
+        """Senders of whom so much was refused that whoever heard them had no time for others."""
+        counts: Counter[str] = Counter()
+        for key, count in self._counts.items():
+            counts[key.sender] += count
+        return [f"{sender} ({n} messages)" for sender, n in counts.items() if n >= FLOOD]
 
     def lines(self) -> list[str]:
         """Each kind in words: "refused 3 path states of r1: dated 3600 s ahead"."""

@@ -21,7 +21,7 @@ from zenoh.handlers import Callback, RingChannel
 from bridge import zenoh_log
 from bridge.access import AccessPlan
 from bridge.denials import Denials, directives, is_ours
-from bridge.link import ROOM_BYTES, Arrival, Inbox, Publisher
+from bridge.link import ROOM_BYTES, Arrival, Dropped, Inbox, Publisher
 from bridge.listening import accept_many, await_first_words, hasty, loopback
 from bridge.login import Obstacle, obstacle, taken
 from bridge.process import Stop
@@ -45,9 +45,9 @@ _ATTEMPT_S, _LISTEN_S = 5.0, 10.0
 _BLOCKED_S = 5.0
 """Zenoh's own: a put that waits for longer closes its session."""
 _PORT_TRIES = 5
-POLLED_DEPTH = 64
-"""Messages on a key that wait for who polls, the newest: more than any schedule lets be on their
-way (`configs.brief.LEAD_TICKS`)."""
+POLLED_DEPTH = 4096
+"""Messages on a key that wait for who polls, the newest: many times more than any schedule lets be
+on their way (`configs.brief.LEAD_TICKS`), so that a flood doesn't wash away what is due."""
 _YIELDS = 20
 _PAUSE_S, _LONGEST_PAUSE_S = 50e-6, 2e-3
 _WAIT_BEFORE_CLOSE = "transport/link/tx/queue/congestion_control/block/wait_before_close"
@@ -78,7 +78,7 @@ class ZenohLink:
 
     def subscribe(self, key: str, tag: str, *, room_bytes: int = ROOM_BYTES) -> None:
         """Queue what others put on `key`, marked with `tag`; what finds no room is counted."""
-        put = self._inbox.mailbox(tag, room_bytes)
+        put = self._inbox.mailbox(key, tag, room_bytes)
 
         def take(sample: zenoh.Sample) -> None:
             payload = sample.payload
@@ -140,8 +140,8 @@ class ZenohLink:
         put = self._inbox.put_latest
         self.each_live(key_expr, lambda key, alive: put(Arrival(tag, key, b"1" if alive else b"0")))
 
-    def dropped(self) -> dict[str, int]:
-        """By tag, how many messages found no room because nobody took those before them."""
+    def dropped(self) -> list[Dropped]:
+        """The subscriptions that had no room for all, because nobody took what came before."""
         return self._inbox.dropped()
 
     stuck = False
@@ -184,18 +184,19 @@ class PolledLink(ZenohLink):
     others, then with pauses that grow.
     """
 
-    def __init__(self, session: zenoh.Session) -> None:
+    def __init__(self, session: zenoh.Session, depth: int) -> None:
         super().__init__(session)
+        self._depth = depth
         self._polled: list[tuple[str, str, Callable[[], zenoh.Sample | None]]] = []
         self.receive = self._receive
 
     def subscribe(self, key: str, tag: str, **_: int) -> None:
-        """Keep the last `POLLED_DEPTH` that others put on `key`, marked with `tag`.
+        """Keep the last that others put on `key`, marked with `tag`.
 
         Never more, whatever their size: of what arrives here the router bounds that.
         """
         subscriber = self._session.declare_subscriber(
-            key, RingChannel(POLLED_DEPTH), allowed_origin=zenoh.Locality.REMOTE
+            key, RingChannel(self._depth), allowed_origin=zenoh.Locality.REMOTE
         )
         self._declared.append(subscriber)
         self._polled.append((tag, key, subscriber.try_recv))
@@ -255,9 +256,15 @@ def open_client(network: NetworkLink, timeout_s: float, stop: Stop | None = None
     return ZenohLink(_client(network, timeout_s, stop))
 
 
-def open_polled(network: NetworkLink, timeout_s: float, stop: Stop | None = None) -> PolledLink:
-    """The same for who looks at given times."""
-    return PolledLink(_client(network, timeout_s, stop))
+def open_polled(
+    network: NetworkLink,
+    timeout_s: float,
+    stop: Stop | None = None,
+    *,
+    depth: int = POLLED_DEPTH,
+) -> PolledLink:
+    """The same for who looks at given times and keeps the last `depth` messages on each key."""
+    return PolledLink(_client(network, timeout_s, stop), depth)
 
 
 def _client(network: NetworkLink, timeout_s: float, stop: Stop | None) -> zenoh.Session:

@@ -26,7 +26,7 @@ from bridge.can_bus import places
 from bridge.can_bus.relay import Relay
 from bridge.clock import wall_of
 from bridge.link import Arrival, Link
-from bridge.messages import Go, LeaderSpeed, Notice, Progress, Report
+from bridge.messages import Go, LeaderSpeed, Progress, Report
 from bridge.process import Stop, cpu_ns
 from bridge.zenoh_link import RouterLink, open_router
 from configs.brief import LEASE_S, LOCAL_LEASE_S, NetworkLink
@@ -50,6 +50,7 @@ from fleetloop.nursery import Nursery
 from fleetloop.record.writer import finish_truncated
 from fleetloop.spawn import Orders, spawn
 from fleetloop.vitals import Vitals
+from fleetloop.words import Words
 
 GO_AHEAD_NS = 200_000_000
 """In real time, from the go to power-up: for the go to reach everybody."""
@@ -58,6 +59,8 @@ WORD_S = 0.2
 """The reason of the end is so far ahead of the end of the launcher's token."""
 MAX_NOTICES = 100
 """Of each process; what else it says is in nobody's interest."""
+UNREAD_SHARE = 0.25
+"""Part of the tick deadline after which a client that doesn't read is cut off: all wait for it."""
 DRAIN_S = 2.0
 """How long the recorder may take to write what is still on its way, once all others have ended."""
 
@@ -108,6 +111,7 @@ class ProcessRun:
         self._processes = roles_of(scenario)
         self._children: list[Child] = []
         self._alive: set[str] = set()
+        self._words = Words(schedule(scenario, speed))
         self._vitals = Vitals()
         self._ticking = False
         period_s = scenario.clock.control_period_s
@@ -145,6 +149,10 @@ class ProcessRun:
             self.outcome.machine = self._machine.report()
             if refusals := link.denials.notes():
                 self.outcome.notices["router"] = refusals
+            self._words.note_dropped(link.dropped())
+            if refusals := self._words.refusals.lines():
+                self.outcome.notices.setdefault(access.LAUNCHER, []).extend(refusals)
+            self._blame_floods()
         finally:
             end(self._children, grace_s=0.0)
         return self.outcome
@@ -162,9 +170,9 @@ class ProcessRun:
             with Nursery(places.folder_of(run), batch=batch) as nursery:
                 folder = open_.enter_context(places.run_folder(run))
                 lease_s = LEASE_S if outside is not None else LOCAL_LEASE_S
-                router = open_router(
-                    scenario.network.endpoint, plan, folder, outside, lease_s=lease_s
-                )
+                unread_s = UNREAD_SHARE * schedule(scenario, self._speed).tick_deadline_s
+                at = scenario.network.endpoint
+                router = open_router(at, plan, folder, outside, lease_s=lease_s, unread_s=unread_s)
                 link = open_.enter_context(router)
                 link.declare_live(keys.live(run, access.LAUNCHER))
                 link.watch_live(keys.live_all(run), "live")
@@ -235,14 +243,33 @@ class ProcessRun:
                 return Failure(
                     GAVE_UP, name, f"{name}: has not ended {DRAIN_S:g} s after the plant"
                 )
-            if (silent := self._silent()) is not None:
+            if (silent := self._cut_off(link) or self._silent()) is not None:
                 self._settle(link, actors, 0.3)
                 return self._cause() or silent
         return None
 
+    def _blame_floods(self) -> None:
+        """Who says so much that nobody has time for others is the cause of whoever is too late."""
+        reports = self.outcome.reports.values()
+        said = [str(report.values.get("flood", "")) for report in reports]
+        floods = sorted({*filter(None, said), *self._words.refusals.floods()})
+        if floods and self.outcome.ended == "aborted":
+            self.outcome.reason += f"; flooded by {', '.join(floods)}"
+
     def _tell_refusals(self, link: RouterLink) -> None:
         for text in link.denials.news():
             self._on_notice("router", text)
+
+    def _cut_off(self, link: RouterLink) -> Failure | None:
+        """Whose part of the run is broken because the router cut it off; None if nobody's is."""
+        lockstep = self._scenario.clock.mode == "lockstep"
+        for child in self._children if link.denials.cut_off else ():
+            deaf = access.user_of(child.name) in link.denials.cut_off
+            needed = lockstep or child.name == "recorder"  # else what is newer is as good
+            if deaf and needed and child.name not in self._alive and not child.ended():
+                text = f"{child.name}: did not read what was sent to it, and was cut off"
+                return Failure(GAVE_UP, child.name, text)
+        return None
 
     def _child(self, name: str) -> Child | None:
         """The process of that name, None if it is not one of this machine."""
@@ -331,7 +358,7 @@ class ProcessRun:
             (self._alive.add if there else self._alive.discard)(process)
             self._elsewhere.note_token(process, self._now(), there=there)
         elif arrival.tag == "progress":
-            progress = Progress.decode(arrival.payload)
+            progress = self._words.progress(process, arrival.payload)
             if progress is not None:
                 silence = self._vitals.beat(process, progress.tick, self._now())
                 if silence is not None:
@@ -342,12 +369,13 @@ class ProcessRun:
                     self.outcome.wall_s = progress.wall_ns * 1e-9
                     self._on_progress(progress)
         elif arrival.tag == "notice":
-            if (notice := Notice.decode(arrival.payload)) is not None:
+            if (notice := self._words.notice(process, arrival.payload)) is not None:
                 self._tell(self.outcome.said.setdefault(process, []), process, notice.text)
-        elif (report := Report.decode(arrival.payload)) is not None:
-            self._vitals.end(process)
-            self.outcome.reports[process] = report
-            self._elsewhere.note_report(process, report)
+        else:
+            if (report := self._words.report(process, arrival.payload)) is not None:
+                self._vitals.end(process)
+                self.outcome.reports[process] = report
+                self._elsewhere.note_report(process, report)
             for child in self._children:
                 if child.name == process:
                     child.release()

@@ -5,14 +5,15 @@ outlives the launcher for as long as it takes to complete the file. Started by `
 """
 
 import time
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
 from bridge import keys
 from bridge.barrier import Hellos, await_hellos
 from bridge.can_bus import places
 from bridge.frame import MAX_DATA
-from bridge.link import Arrival
+from bridge.link import Arrival, Dropped
 from bridge.messages import Progress, Report, Rows, Value
 from bridge.process import Stop, cpu_ns, serve
 from bridge.refusals import Refusals
@@ -28,6 +29,8 @@ QUIET_S = 0.3
 PROGRESS_EVERY_S = 0.25
 AHEAD_TICKS = 1 << 17
 """How far a source's rows may be ahead of the slowest's; they wait in memory."""
+GAPS = 8
+"""Blocks in a row that leave a gap: what is missing doesn't come any more."""
 ROOM_BYTES = 1 << 26
 """Of what waits of one source: a slow disk may take its time."""
 _WHOSE = {"plant": "the plant for {}", "controller": "{}'s controller", "can": "bus {}"}
@@ -40,6 +43,7 @@ class _Recorder:
         self._ticks = brief.ticks
         self._last_frame_ns = brief.last_frame_ns
         self.refusals = Refusals()
+        self._gaps: Counter[str] = Counter()  # blocks in a row that leave one, by source
         sources = {f"{kind}/{r}" for r in brief.robots for kind in ("plant", "controller")}
         sources |= {f"can/{bus}" for bus in brief.buses}
         self.unheard = set(sources)
@@ -58,6 +62,7 @@ class _Recorder:
                 self._give_up_if_gone(arrival.tag, rows)
             return
         self.unheard.discard(arrival.tag)
+        self._gaps[arrival.tag] = 0
         if rows.length and kind == "can":
             self._record.traffic(robot, rows.rows)
         elif kind != "can":
@@ -66,19 +71,23 @@ class _Recorder:
             self.unfinished.discard(arrival.tag)
 
     def _give_up_if_gone(self, tag: str, rows: Rows) -> None:
-        """A source with a gap has no row any more that could follow; others don't wait for it."""
+        """A source with a gap has no row any more that could follow; others don't wait for it.
+
+        One block that is ahead may be somebody else's: the source itself goes on where it was.
+        """
         kind, _, robot = tag.partition("/")
         if kind != "can":
             source: Source = "plant" if kind == "plant" else "controller"
             expected = self._record.next_tick(robot, source)
-            if expected is not None and (rows.final or rows.first_tick > expected):
+            self._gaps[tag] += expected is not None and rows.first_tick > expected
+            if expected is not None and (rows.final or self._gaps[tag] >= GAPS):
                 self._record.end(robot, source)
         if rows.final:
             self.unfinished.discard(tag)
 
-    def note_dropped(self, dropped: Mapping[str, int]) -> None:
-        """Count what found no room, by source."""
-        for tag, count in dropped.items():
+    def note_dropped(self, dropped: Iterable[Dropped]) -> None:
+        """Count what found no room."""
+        for tag, _, count in dropped:
             self._refuse(tag, f"{ROOM_BYTES >> 20} MiB of it waited already", count)
 
     def _refuse(self, tag: str, why: str, count: int = 1) -> None:
@@ -180,6 +189,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         values: dict[str, Value] = {
             "undecodable": recorder.undecodable,
             "notices": "\n".join(refused),
+            "flood": ", ".join(recorder.refusals.floods()),
             "cpu_ns": cpu_ns() - began_ns,
         }
         report.put(Report(values).encode())

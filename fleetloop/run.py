@@ -30,6 +30,8 @@ from fleetloop.signals import stop_on_signals
 from fleetloop.summary import RunStats, Summary, summarise, to_json
 from fleetloop.terminal import RunProgress, note, say, say_json
 
+MOST_NOTICES = 200
+"""Of one process; what else it says is in nobody's interest."""
 EXIT_CODES = {"held": 0, "failed": 1, "not checked": 1, "aborted": 3, "interrupted": 130}
 
 
@@ -223,7 +225,7 @@ def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
         if process == "plant":
             stats.overruns = int(report.number("overruns"))
             stats.frames_per_bus = {
-                bus: int(count) for bus, count in _under("frames.", report).items()
+                bus: int(report.number(f"frames.{bus}")) for bus in _under("frames.", report)
             }
             stats.bus_troubles = _under("trouble.", report)
         if early := report.values.get("early"):
@@ -231,7 +233,8 @@ def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
         if stopped := report.values.get("stopped"):
             stats.stopped_robots[process.removeprefix("agent/")] = str(stopped)
         if notices := report.values.get("notices"):
-            stats.notices[process.removeprefix("agent/")] = str(notices).split("\n")
+            lines = str(notices).split("\n")
+            stats.notices[process.removeprefix("agent/")] = lines[:MOST_NOTICES]
     # What a process said on the way is in its report as well, if it lived to make one.
     lost = {name: said for name, said in outcome.said.items() if name not in outcome.reports}
     for process, said in (*lost.items(), *outcome.notices.items()):

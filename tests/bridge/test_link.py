@@ -2,11 +2,11 @@
 
 import threading
 
-from bridge.link import Arrival, Inbox, Mailbox
+from bridge.link import Arrival, Dropped, Inbox, Mailbox
 
 
 def put(inbox: Inbox, tag: str, payloads: list[bytes], room_bytes: int) -> None:
-    mailbox = inbox.mailbox(tag, room_bytes)
+    mailbox = inbox.mailbox("key", tag, room_bytes)
     for payload in payloads:
         mailbox("key", lambda payload=payload: payload, len(payload))
 
@@ -26,22 +26,22 @@ def test_who_floods_his_key_crowds_out_nobody_else() -> None:
     assert [arrival.payload for arrival in found if arrival.tag == "quiet"] == [b"a", b"b"]
     kept = [arrival for arrival in found if arrival.tag == "flood"]
     assert sum(len(arrival.payload) for arrival in kept) <= 100_000
-    assert inbox.dropped() == {"flood": 10_000 - len(kept)}
+    assert inbox.dropped() == [Dropped("flood", "key", 10_000 - len(kept))]
 
 
 def test_room_comes_back_with_what_is_taken() -> None:
     inbox = Inbox()
-    mailbox = inbox.mailbox("tag", 2000)
+    mailbox = inbox.mailbox("key", "tag", 2000)
     for n in range(100):
         mailbox("key", lambda n=n: bytes([n]) * 500, 500)
         arrival = inbox.receive(0.0)
         assert arrival is not None
         assert arrival.payload == bytes([n]) * 500
-    assert inbox.dropped() == {}
+    assert inbox.dropped() == []
 
 
 def test_a_single_message_always_finds_room() -> None:
-    box = Mailbox("tag", 10)
+    box = Mailbox(10)
     assert box.admit(1_000_000)
     assert not box.admit(1)
     box.take(1_000_000)

@@ -22,10 +22,12 @@ WAIT_S = 60.0
 class Run:
     """A `fleetloop run` that is going on."""
 
+    program: tuple[str, ...] = ("-m", "fleetloop")
+
     def __init__(self, folder: Path, *args: str) -> None:
         self.folder = folder
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "fleetloop", "run", *args, "--no-report", "--out", str(folder)],
+            [sys.executable, *self.program, "run", *args, "--no-report", "--out", str(folder)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
