@@ -1,12 +1,21 @@
-"""Shared by all tests: a private folder for sockets, and scenarios as small as they can be."""
+"""Shared by all tests: a private folder for sockets, signals as children expect them."""
 
 import os
+import signal
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+pytest_plugins = ("wall_clock",)
+
+# In the background of a script, or under nohup, these are ignored, and all children inherit that.
+# A handler, even one that does nothing, is theirs no longer: they begin with the default.
+for _number in (signal.SIGINT, signal.SIGHUP):
+    if signal.getsignal(_number) is signal.SIG_IGN:
+        signal.signal(_number, lambda *_: None)
 
 settings.register_profile("fleetloop", deadline=None, max_examples=60, derandomize=True)
 settings.load_profile("fleetloop")

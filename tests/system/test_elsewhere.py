@@ -16,7 +16,7 @@ from system.processes import Run
 
 from fleetloop.record.reader import Record
 
-pytestmark = pytest.mark.system
+pytestmark = [pytest.mark.system, pytest.mark.wall_clock]
 SCENARIO = ("two_robots_100hz", "--set", "expect=[]")
 
 

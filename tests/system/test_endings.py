@@ -26,6 +26,7 @@ def check_remains(run: Run, runtime_folder: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.wall_clock
 def test_a_signal_ends_a_run_in_order(number: signal.Signals, tmp_path, runtime_folder) -> None:
     with running(tmp_path / "a", "paper") as run:
         run.send(number)
@@ -40,6 +41,7 @@ def test_a_signal_ends_a_run_in_order(number: signal.Signals, tmp_path, runtime_
     ("child", "name"),
     [("plant", "plant"), ("recorder", "recorder"), ("r1", "agent/r1"), ("r4", "agent/r4")],
 )
+@pytest.mark.wall_clock
 def test_a_killed_process_is_named_with_the_tick(
     child: str, name: str, tmp_path, runtime_folder
 ) -> None:
@@ -54,6 +56,7 @@ def test_a_killed_process_is_named_with_the_tick(
     assert f"verdict  aborted: {summary['reason']}" in out
 
 
+@pytest.mark.wall_clock
 def test_a_killed_launcher_leaves_nothing_and_the_plant_says_the_tick(
     tmp_path, runtime_folder
 ) -> None:
@@ -73,6 +76,7 @@ def test_a_killed_launcher_leaves_nothing_and_the_plant_says_the_tick(
         ("r2", "no (answer from the controller|path state) of r2"),
     ],
 )
+@pytest.mark.wall_clock
 def test_a_wedged_process_is_named_within_the_tick_deadline(
     child: str, words: str, tmp_path, runtime_folder
 ) -> None:

@@ -20,6 +20,7 @@ from fleetloop.testing import EmulatedPlant
 
 pytestmark = [
     pytest.mark.system,
+    pytest.mark.wall_clock,
     pytest.mark.skipif(multicast_goes_nowhere(), reason="no route for multicast here"),
 ]
 BUS = 'bus = { interface = "udp_multicast", channel = "239.74.163.9", port = 43116, hop_limit = 0 }'

@@ -8,7 +8,7 @@ from system.processes import completed, running
 
 from fleetloop.record.reader import Record
 
-pytestmark = pytest.mark.system
+pytestmark = [pytest.mark.system, pytest.mark.wall_clock]
 
 
 def test_a_real_time_run_takes_its_time_and_records_every_tick(tmp_path: Path) -> None:

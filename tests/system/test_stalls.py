@@ -42,6 +42,7 @@ def test_a_lockstep_run_that_was_stopped_goes_on_to_the_same_record(
     assert re.search(r"launcher: stopped for 2\.\d+ s at t = .* \(Ctrl-Z\), and continued", out)
 
 
+@pytest.mark.wall_clock
 def test_a_controller_that_freezes_in_real_time_is_named_at_once_and_when_it_goes_on(
     tmp_path: Path,
 ) -> None:

@@ -8,7 +8,7 @@ from system.processes import running
 
 from bridge.drives.odrive.frames import AxisState, Command, decode_heartbeat, identifier
 
-pytestmark = pytest.mark.system
+pytestmark = [pytest.mark.system, pytest.mark.wall_clock]
 
 
 def say(bus: can.BusABC, node: int, command: Command) -> None:

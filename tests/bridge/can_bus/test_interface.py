@@ -149,6 +149,7 @@ def test_a_gathered_client_sends_with_its_next_look_and_takes_an_instant_in_one_
     assert gathered.recv(0.0).arbitration_id == 4  # it is here already
 
 
+@pytest.mark.wall_clock
 def test_short_waits_are_kept_to_the_millisecond(running, join) -> None:
     import time
 
@@ -304,6 +305,7 @@ def test_who_is_behind_when_the_bus_ends_still_gets_all_of_it_and_the_reason(run
     assert heard == list(range(5000))
 
 
+@pytest.mark.wall_clock
 def test_who_does_not_read_delays_the_end_of_the_bus_by_a_bound(running, join) -> None:
     import time
 

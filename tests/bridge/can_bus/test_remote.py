@@ -340,6 +340,7 @@ def test_a_guest_that_is_killed_has_left(running: Running) -> None:
         assert running.until(lambda: running.hub.clients() == 0)
 
 
+@pytest.mark.wall_clock
 def test_a_guest_that_was_frozen_is_told_and_has_held_up_nobody(running: Running) -> None:
     with (
         program(
@@ -368,6 +369,7 @@ def test_a_guest_that_was_frozen_is_told_and_has_held_up_nobody(running: Running
         assert "router has gone, or the network to it" in said
 
 
+@pytest.mark.wall_clock
 def test_a_killed_router_is_an_error_within_seconds_and_not_a_wait_for_ever(tmp_path: Path) -> None:
     (tmp_path / "w").mkdir()
     path = os.pathsep.join(sys.path)
@@ -408,6 +410,7 @@ def slow_way(running: Running) -> Iterator[CutProxy]:
     proxy.close()
 
 
+@pytest.mark.wall_clock
 def test_over_a_slow_way_nothing_is_lost_and_the_window_is_wide_enough_for_a_full_bus(
     running: Running, slow_way: CutProxy
 ) -> None:
@@ -425,6 +428,7 @@ def test_over_a_slow_way_nothing_is_lost_and_the_window_is_wide_enough_for_a_ful
         )
 
 
+@pytest.mark.wall_clock
 def test_a_silent_cut_is_an_error_at_the_guest_and_a_goodbye_at_the_hub_within_seconds(
     running: Running, slow_way: CutProxy
 ) -> None:
