@@ -16,6 +16,9 @@ for _number in (_signal.SIGINT, _signal.SIGTERM):
 
 def main() -> None:
     """Run the command line."""
+    from fleetloop import packages
+
+    packages.prefer_own()
     from fleetloop import streams
 
     streams.settle()

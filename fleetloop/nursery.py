@@ -27,6 +27,7 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from configs.errors import InfrastructureError
+from fleetloop import packages
 
 BIRTH_S = 20.0
 _PR_SET_CHILD_SUBREAPER = 36
@@ -71,6 +72,7 @@ class Nursery:
                     stdin=theirs.fileno(),
                     stdout=subprocess.DEVNULL,
                     start_new_session=True,
+                    env=packages.environment(),
                 )
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
