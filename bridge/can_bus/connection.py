@@ -51,6 +51,7 @@ class Bus:
         "queue",
         "said",
         "stamp_ns",
+        "strangers",
         "taken",
     )
 
@@ -65,6 +66,7 @@ class Bus:
         self.departed: list[Key] = []
         self.stamp_ns = -1  # not powered up yet
         self.clients: list[Connection] = []
+        self.strangers: list[Connection] = []  # connected, and have not said hello
         self.held: list[Connection] = []  # not read until what was said is taken
         self.taken: Spoken[Frame] = Spoken()
         self.owing = 0

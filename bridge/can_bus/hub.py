@@ -35,6 +35,8 @@ from bridge.can_bus.traffic import Key, Passed, Said, Stamped
 from bridge.frame import ERR, Frame
 
 MAX_CLIENTS = 64
+MAX_STRANGERS = 64
+"""Connections to a bus that have not said hello; with one more the oldest goes."""
 UNTAKEN = 100_000
 GOODBYE_S = 1.5
 """How long the end of a bus may wait for clients that are behind ..."""
@@ -385,7 +387,11 @@ class Hub:
         except OSError:
             return
         sock.setblocking(False)
-        self._register(sock.fileno(), Connection(sock, bus, _READ))
+        stranger = Connection(sock, bus, _READ)
+        self._register(sock.fileno(), stranger)
+        bus.strangers.append(stranger)
+        if len(bus.strangers) > MAX_STRANGERS:
+            self._drop(bus.strangers[0])
 
     def _welcome(self, client: Connection, hello: wire.Packet) -> None:
         bus = client.bus
@@ -401,6 +407,7 @@ class Hub:
         client.own = bool(hello.flags & wire.OWN)
         client.key = client.name if paced else self._joined
         client.joined = True
+        bus.strangers.remove(client)
         bus.clients.append(client)
         bus.counters.joins += 1
         welcome = wire.encode_text(
@@ -459,7 +466,9 @@ class Hub:
             return
         self._epoll.unregister(fd)
         client.sock.close()
-        if client in client.bus.clients:
+        if not client.joined:
+            client.bus.strangers.remove(client)
+        else:
             client.bus.clients.remove(client)
             if client.bus.queue:
                 client.bus.departed.append(client.key)

@@ -52,13 +52,17 @@ class UnixLine:
         self._bound_s: float | None = None
         self._recv, self._send = self._socket.recv, self._socket.send
         try:
-            self._socket.settimeout(timeout_s)
+            # The kernel's own bound: a socket that doesn't block is refused where others wait too.
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _timeval(timeout_s))
             self._socket.connect(str(path))
             self._send(hello)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _timeval(None))
+        except BlockingIOError as error:
+            self._socket.close()
+            raise TimeoutError("no answer in time") from error
         except OSError:
             self._socket.close()
             raise
-        self._socket.settimeout(None)
 
     def send(self, packet: bytes) -> None:
         """Send at once."""
@@ -103,7 +107,11 @@ class UnixLine:
 
     def _limit(self, wait_s: float | None) -> None:
         """Let the kernel bound a receive: one system call instead of two."""
-        seconds = 0 if wait_s is None else max(wait_s, 1e-6)
-        timeval = _TIMEVAL.pack(int(seconds), int(seconds % 1 * 1e6))
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, _timeval(wait_s))
         self._bound_s = wait_s
+
+
+def _timeval(wait_s: float | None) -> bytes:
+    """A bound for the kernel; None: for ever."""
+    seconds = 0 if wait_s is None else max(wait_s, 1e-6)
+    return _TIMEVAL.pack(int(seconds), int(seconds % 1 * 1e6))

@@ -23,7 +23,7 @@ from configs.errors import InfrastructureError
 SUFFIX = ".can"
 LOCK = ".fleetloop-lock"
 _MAX_PATH_BYTES = 107
-_BACKLOG = 64
+_BACKLOG = 4096
 
 
 class NoSuchBusError(InfrastructureError):
@@ -201,9 +201,11 @@ def name_of(path: Path) -> str:
 
 def _answers(path: Path) -> bool:
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as probe:
-        probe.settimeout(0.2)
+        probe.setblocking(False)
         try:
             probe.connect(str(path))
+        except BlockingIOError:
+            return True  # so many wait to be let in that there is no room for another
         except OSError:
             return False
     return True

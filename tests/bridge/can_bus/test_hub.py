@@ -1,5 +1,7 @@
 """The hub against clients that don't keep to anything: raw sockets that write what they like."""
 
+import errno
+import select
 import socket
 import struct
 import threading
@@ -158,6 +160,48 @@ def test_the_bus_interface_says_why_it_was_refused(serving) -> None:
     assert "refused: paced is for the controllers" in refusal(paced="r1")
     assert "must name the robot" in refusal(paced=True)
     assert "must name the robot" in refusal(paced=3)
+
+
+# --- who connects and says nothing ----------------------------------------------------------------
+
+
+def test_any_number_of_connections_that_say_nothing_keep_nobody_out(serving) -> None:
+    silent = []
+    for _ in range(3 * hub_module.MAX_STRANGERS):
+        silent.append(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET))
+        silent[-1].connect(str(places.socket_path(places.base_folder() / "hub", "r1")))
+        serving.serve()
+    assert serving.join().hear().kind == wire.WELCOME
+    assert serving.join(f"r1\0{SECRET}", wire.PACED).hear().kind == wire.WELCOME
+    ended = [select.select([one], [], [], 0.0)[0] and not one.recv(1) for one in silent]
+    assert sum(map(bool, ended)) >= 2 * hub_module.MAX_STRANGERS
+    for one in silent:
+        one.close()
+
+
+def test_who_finds_the_way_in_crowded_waits_for_its_turn(
+    runtime_folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(places, "_BACKLOG", 0)
+    serving = Serving()
+    crowd = [socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(4)]
+    for one in crowd:
+        one.setblocking(False)
+    path = str(places.socket_path(places.base_folder() / "hub", "r1"))
+    assert errno.EAGAIN in [one.connect_ex(path) for one in crowd]
+    with pytest.raises(can.CanInitializationError, match="no answer in time"):
+        can.Bus(interface="fleetloop", channel="r1", connect_timeout=0.05)
+    opened: list[can.BusABC] = []
+    opener = threading.Thread(
+        target=lambda: opened.append(can.Bus(interface="fleetloop", channel="r1"))
+    )
+    opener.start()
+    while opener.is_alive():
+        serving.hub.serve(0.01)
+    opened[0].shutdown()
+    for one in crowd:
+        one.close()
+    serving.close()
 
 
 # --- much between two questions -------------------------------------------------------------------
