@@ -15,6 +15,8 @@ and so makes the sender silent: in lockstep the wait for it names it, in real ti
 sums.
 """
 
+from collections import Counter
+
 from bridge.messages import LeaderSpeed, PathState, PoseFix
 from bridge.refusals import Refusals
 from configs.brief import LEAD_TICKS, AgentBrief
@@ -22,6 +24,8 @@ from configs.reach import within_world
 
 LOCALISATION = "the localisation system"
 LEADER = "the leader"
+MOST_LATE = 5000
+"""Messages from before the run that may still have been on their way when it began."""
 _AHEAD_TICKS = LEAD_TICKS + 2
 """A state is said a tick before it is due, and this robot may be between two ticks."""
 
@@ -43,11 +47,12 @@ class Admission:
         self._ahead_ns = round(brief.coordination.ahead_limit_s * 1e9) + 2 * schedule.period_ns
         self._old_ns = round(brief.coordination.silence_limit_s * 1e9)
         self._newest_ns: dict[str, int] = {}
+        self._late_by: Counter[str] = Counter()
 
     def path(self, robot: str, state: PathState) -> bool:
         """Whether a path state may be used."""
         if state.tick < 0 <= self.tick:
-            return False
+            return self._late(robot)
         wrong = self._path_date(robot, state)
         if wrong is None and (far := self._reach.beyond(state.t_ns * 1e-9, state.s, state.v_hat)):
             wrong = "reach", far
@@ -61,7 +66,7 @@ class Admission:
     def pose(self, fix: PoseFix) -> bool:
         """Whether a pose may be used."""
         if fix.tick < 0 <= self.tick:
-            return False
+            return self._late(LOCALISATION)
         wrong = self._pose_date(fix)
         if wrong is None and not within_world(fix.x_m, fix.y_m, fix.theta_rad):
             wrong = "reach", f"({fix.x_m:.6g} m, {fix.y_m:.6g} m, {fix.theta_rad:.6g} rad)"
@@ -79,6 +84,13 @@ class Admission:
                 self.refusals.note("speed", LEADER, "reach", far)
                 return False
         return True
+
+    def _late(self, sender: str) -> bool:
+        """Refuse what was said before the run; more than can have been on its way is a flood."""
+        self._late_by[sender] += 1
+        if self._late_by[sender] > MOST_LATE:
+            self.refusals.note("message", sender, "start", "dated before the run, which goes on")
+        return False
 
     def malformed(self, what: str, sender: str) -> None:
         """Count a message that was none."""

@@ -31,7 +31,7 @@ from bridge.can_bus.convert import can_id_of, to_frame, to_message
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.clock import implausible_start, monotonic_of
 from bridge.frame import ERR, Frame
-from bridge.link import Link, Publisher
+from bridge.link import Link, Publisher, waiting
 from bridge.messages import Go, Progress
 from bridge.process import Stop
 
@@ -186,10 +186,7 @@ class RealtimeLoop:
 
     def _hear_peers(self) -> None:
         """Take what the network brought; of a flood no more than a tick has room for."""
-        for _ in range(self._most_arrivals):
-            arrival = self._link.receive(0.0)
-            if arrival is None:
-                return
+        for arrival in waiting(self._link, self._most_arrivals):
             self.counters.undecodable += not give(self._agent, arrival)
 
     def _send(self, frames: Sequence[Frame], tick: int) -> None:

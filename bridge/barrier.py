@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable
 
 from bridge.awake import LOOK_S, AwakeClock
-from bridge.link import Arrival, Link, Publisher
+from bridge.link import Arrival, Link, Publisher, waiting
 from bridge.process import Stop, launcher_stopped
 from configs.errors import InfrastructureError
 
@@ -46,7 +46,7 @@ class Hellos:
 def await_hellos(
     link: Link,
     hellos: Hellos,
-    take: Callable[[Arrival], None],
+    take: Callable[[Arrival], object],
     missing: Callable[[], Iterable[str]],
     *,
     who: str,
@@ -67,7 +67,7 @@ def await_hellos(
             raise InfrastructureError(
                 f"{who}: not ready after {within_s:g} s: heard nothing of {', '.join(absent)}"
             )
-        arrival = link.receive(min(hellos.say(), LOOK_S))
-        while arrival is not None:
+        if (arrival := link.receive(min(hellos.say(), LOOK_S))) is not None:
             take(arrival)
-            arrival = link.receive(0.0)
+        for more in waiting(link):
+            take(more)

@@ -9,11 +9,13 @@ his own key crowds out nobody else. What finds no room is dropped and counted.
 """
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import NamedTuple, Protocol, Self
 
+MOST_AT_ONCE = 10_000
+"""Messages that one look takes: whoever drains comes to an end, however fast others say more."""
 ROOM_BYTES = 1 << 18
 """Of one subscription, if the subscriber asks for no other."""
 _OVERHEAD_BYTES = 256
@@ -74,6 +76,15 @@ class Link(Protocol):
         traceback: TracebackType | None,
     ) -> None:
         """Close."""
+
+
+def waiting(link: Link, most: int = MOST_AT_ONCE) -> Iterator[Arrival]:
+    """What has arrived, without waiting; of a flood no more than `most`: the rest stays."""
+    for _ in range(most):
+        arrival = link.receive(0.0)
+        if arrival is None:
+            return
+        yield arrival
 
 
 class Mailbox:

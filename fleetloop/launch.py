@@ -25,7 +25,7 @@ from bridge.barrier import Hellos
 from bridge.can_bus import places
 from bridge.can_bus.relay import Relay
 from bridge.clock import wall_of
-from bridge.link import Arrival, Link
+from bridge.link import Arrival, Link, waiting
 from bridge.messages import Go, LeaderSpeed, Progress, Report
 from bridge.process import Stop, cpu_ns
 from bridge.zenoh_link import RouterLink, open_router
@@ -406,7 +406,7 @@ class ProcessRun:
         deadline = self._now() + DRAIN_S
         while not recorder.ended() and self._now() < deadline:
             self._take(link.receive(WATCH_EVERY_S))
-        while (arrival := link.receive(0.0)) is not None:
+        for arrival in waiting(link):
             self._take(arrival)
         unfinished = not recorder.ended() or recorder.failure() is not None
         end([recorder])

@@ -25,7 +25,7 @@ from fleetloop.record.run_record import RunRecord
 from fleetloop.record.writer import Source
 
 QUIET_S = 0.3
-"""Once asked to stop, the recorder takes what still comes until nothing came for this long."""
+"""Once asked to stop, the recorder takes what still comes until nothing new came for this long."""
 PROGRESS_EVERY_S = 0.25
 AHEAD_TICKS = 1 << 17
 """How far a source's rows may be ahead of the slowest's; they wait in memory."""
@@ -51,7 +51,8 @@ class _Recorder:
         self.undecodable = 0
         self.ticks = 0
 
-    def take(self, arrival: Arrival) -> None:
+    def take(self, arrival: Arrival) -> bool:
+        """Take what may be taken; return whether the record has more now."""
         kind, _, robot = arrival.tag.partition("/")
         rows = Rows.decode(arrival.payload, _ROW_SIZES[kind])
         wrong = "not well formed" if rows is None else self._wrong(kind, robot, rows)
@@ -60,7 +61,7 @@ class _Recorder:
             self._refuse(arrival.tag, wrong or "")
             if rows is not None:
                 self._give_up_if_gone(arrival.tag, rows)
-            return
+            return False
         self.unheard.discard(arrival.tag)
         self._gaps[arrival.tag] = 0
         if rows.length and kind == "can":
@@ -69,6 +70,7 @@ class _Recorder:
             self._take_rows(robot, "plant" if kind == "plant" else "controller", rows)
         if rows.final:
             self.unfinished.discard(arrival.tag)
+        return rows.length > 0 or rows.final
 
     def _give_up_if_gone(self, tag: str, rows: Rows) -> None:
         """A source with a gap has no row any more that could follow; others don't wait for it.
@@ -170,8 +172,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         while recorder.unfinished:
             arrival = link.receive(PROGRESS_EVERY_S)
             now = time.monotonic()
-            if arrival is not None:
-                recorder.take(arrival)
+            if arrival is not None and recorder.take(arrival):
                 quiet_since = now
             elif stop.requested and now - quiet_since > QUIET_S:
                 break

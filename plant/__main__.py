@@ -16,7 +16,7 @@ from bridge.can_bus.ends import DriveEnd
 from bridge.can_bus.hub import Hub
 from bridge.clock import implausible_start, monotonic_of
 from bridge.launcher import follow_launcher
-from bridge.link import Arrival, Link, Publisher
+from bridge.link import Arrival, Link, Publisher, waiting
 from bridge.messages import Go, Notice, PoseFix, Progress, Report, Rows
 from bridge.process import (
     Stop,
@@ -224,7 +224,7 @@ def _serve_until_go(
     while time.monotonic() < deadline and not stop.requested:
         hellos.say()
         end.serve(0.02)
-        while (arrival := link.receive(0.0)) is not None:
+        for arrival in waiting(link):
             go = Go.decode(arrival.payload) if arrival.tag == "go" else None
             if go is None:
                 continue
@@ -246,10 +246,7 @@ def _record(
     if not others:
         return
     robots = {other.robot: other for other in others}
-    for _ in range(ARRIVALS_PER_ROBOT * len(others)):
-        arrival = link.receive(0.0)
-        if arrival is None:
-            break
+    for arrival in waiting(link, ARRIVALS_PER_ROBOT * len(others)):
         if (other := robots.get(arrival.tag)) is not None:
             other.take(PoseFix.decode(arrival.payload))
     for other, buffer in zip(others, rows, strict=True):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from robot_bench import NOWHERE, SCENARIO, Bench
 
-from agents.admission import Admission
+from agents.admission import MOST_LATE, Admission
 from agents.agent import Agent
 from agents.loop import give
 from bridge.link import Arrival
@@ -112,6 +112,9 @@ def test_where_somebody_starts_is_believed_until_control_begins() -> None:
     assert not begun.path("r1", state(-1))
     assert not begun.pose(PoseFix(-1, 0, 0.0, 0.0, 0.0))
     assert begun.refusals.lines() == []  # late, and no lie
+    for _ in range(2 * MOST_LATE):
+        begun.path("r1", state(-1))
+    assert begun.refusals.floods() == [f"r1 ({MOST_LATE + 1} messages)"]
 
 
 def test_poses_are_dated_like_path_states_and_of_this_world() -> None:

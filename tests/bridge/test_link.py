@@ -2,7 +2,7 @@
 
 import threading
 
-from bridge.link import Arrival, Dropped, Inbox, Mailbox
+from bridge.link import Arrival, Dropped, Inbox, Mailbox, waiting
 
 
 def put(inbox: Inbox, tag: str, payloads: list[bytes], room_bytes: int) -> None:
@@ -46,6 +46,14 @@ def test_a_single_message_always_finds_room() -> None:
     assert not box.admit(1)
     box.take(1_000_000)
     assert box.admit(1)
+
+
+def test_who_drains_comes_to_an_end_however_fast_others_say_more() -> None:
+    class Flood:
+        def receive(self, _: float) -> Arrival:
+            return Arrival("tag", "key", b"")
+
+    assert sum(1 for _ in waiting(Flood(), 100)) == 100
 
 
 def test_of_what_replaces_itself_only_the_last_waits() -> None:
