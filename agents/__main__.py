@@ -144,6 +144,7 @@ class _Wired(NamedTuple):
                 **asdict(counters),
                 **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
                 "stopped": self.agent.guard.stopped_because,
+                "stopped_tick": self.agent.guard.stopped_tick,
                 "notices": "\n".join(self.agent.notices()),
                 "flood": ", ".join(self.agent.admission.refusals.floods()),
                 "refused": ", ".join(refused),

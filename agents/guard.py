@@ -68,6 +68,7 @@ class Guard:
         """Whether tick 0 has come."""
         self.passed = Passed.NOTHING
         """What became of the torques of this tick."""
+        self.stopped_tick = 0
         self.stopped_because = ""
         """Why the robot stands still now, "" if it doesn't."""
         self.events: list[Event] = []
@@ -212,6 +213,7 @@ class Guard:
         """Take the torque from both wheels."""
         if self.stalled:
             reason = f"{self.stalled}: {reason}"
+        self.stopped_tick = tick
         self.stopped_because = f"{self._when(tick)}: {reason}"
         self._change(tick, Phase.STOPPED, reason)
         return self.drives.disarm()

@@ -25,7 +25,7 @@ from agents.bus_health import BusHealth
 from agents.guard import Phase
 from agents.loop import did_not_start, give
 from bridge.access import LAUNCHER
-from bridge.awake import STALL_S
+from bridge.awake import STALL_S, Lateness
 from bridge.barrier import Hellos
 from bridge.can_bus.convert import can_id_of, to_frame, to_message
 from bridge.can_bus.echo import Echoes, hands_back
@@ -43,7 +43,6 @@ BACKLOG_S = 1.0
 
 BEAT_EVERY_S = 0.2
 """How often a controller says that it lives."""
-AFTERMATH_S = 0.5
 
 
 @dataclass(slots=True)
@@ -80,7 +79,7 @@ class RealtimeLoop:
         self._hellos = hellos
         self._beat = beat
         self._beat_every = max(round(BEAT_EVERY_S / agent.brief.schedule.period_s), 1)
-        self._stalled_until = 0  # tick up to which what happens may be a stall's doing
+        self._lateness = Lateness(agent.brief.schedule.period_s)
         self._health = BusHealth(agent.brief.robot, agent.brief.host.bus_error_limit_ns)
         self._echoes = Echoes() if hands_back(agent.brief.bus) else None
         self._most_arrivals = ARRIVALS_PER_TICK + 2 * len(agent.brief.hears)
@@ -133,14 +132,17 @@ class RealtimeLoop:
         period_ns, phase_ns = schedule.period_ns, agent.brief.phase_ns
         self._power_up_ns = epoch_ns - schedule.countdown_ticks * period_ns
         tick = -schedule.countdown_ticks
+        lateness = self._lateness
         self._drop_backlog()
         while agent.phase is not Phase.DONE:
             due_ns = epoch_ns + tick * period_ns + phase_ns
             self._read_until(due_ns)
             now_ns = time.monotonic_ns()
             agent.late_s = late_s = (now_ns - due_ns) * 1e-9
-            if late_s > STALL_S or agent.guard.stalled:
-                self._note_stall(tick, late_s)
+            if lateness.note(tick, late_s):
+                self._name_stall(tick, late_s)
+            elif agent.guard.stalled and not lateness.late:
+                agent.guard.stalled = ""
             if self._sent_ns and tick > 0:
                 self.counters.misses += 1
                 agent.round_trip_s = nan
@@ -161,18 +163,13 @@ class RealtimeLoop:
         with suppress(can.CanError, OSError):
             self._bus.recv(0.0)  # what was gathered goes out
 
-    def _note_stall(self, tick: int, late_s: float) -> None:
+    def _name_stall(self, tick: int, late_s: float) -> None:
         """What a robot stops for soon after it stood still, it may stop for because it did."""
-        guard = self._agent.guard
+        text = f"this controller, or its machine, stalled for {late_s:.2f} s"
         if late_s > STALL_S:
-            if not guard.stalled:
-                guard.note_stall(
-                    tick, f"this controller, or its machine, stalled for {late_s:.2f} s"
-                )
-            behind = late_s / self._schedule.period_s
-            self._stalled_until = tick + round(behind + AFTERMATH_S / self._schedule.period_s)
-        elif tick > self._stalled_until:
-            guard.stalled = ""
+            self._agent.guard.note_stall(tick, text)
+        else:
+            self._agent.guard.stalled = text
 
     def _drop_backlog(self) -> None:
         """Read what came while nobody read: taken for news, it would be a second drive's.

@@ -9,10 +9,18 @@ all messages.
 
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 LOOK_S = 0.1
 STALL_S = 0.25
 """Beyond what a wait was to last: this much later is no lateness any more."""
+
+
+LATE_S = 0.04
+"""For who keeps absolute deadlines: who is so late may be taken for silent by others."""
+AFTERMATH_S = 0.5
+"""What happens so soon after a stall may be its doing."""
+MAX_STALLS = 32
 
 
 def _never() -> bool:
@@ -70,3 +78,37 @@ class AwakeClock:
     def resume(self) -> None:
         """What was done since the last look took its time, and was no wait."""
         self._looked_s = self._monotonic()
+
+
+class Stall(NamedTuple):
+    """Of who keeps absolute deadlines."""
+
+    tick: int  # the first that came late
+    lasted_s: float
+
+
+class Lateness:
+    """Finds the stalls of who keeps absolute deadlines, tick by tick."""
+
+    __slots__ = ("_limit_s", "_period_s", "_until", "late", "stalls")
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        self._limit_s = max(LATE_S, 2.0 * period_s)
+        self._until = 0
+        self.late = False
+        """Whether there is a stall that is not caught up with, or was until `AFTERMATH_S` ago."""
+        self.stalls: list[Stall] = []
+
+    def note(self, tick: int, late_s: float) -> bool:
+        """A tick comes so late; whether a stall begins with it."""
+        if late_s > self._limit_s:
+            begins = not self.late
+            self._until = tick + round((late_s + AFTERMATH_S) / self._period_s)
+            if begins and len(self.stalls) < MAX_STALLS:
+                self.stalls.append(Stall(tick, late_s))
+            self.late = True
+            return begins
+        if self.late and tick > self._until:
+            self.late = False
+        return False

@@ -134,21 +134,26 @@ def trouble_lines(summary: Summary) -> Iterator[str]:
         yield f"RECORD not all there: {summary['record_lost']}"
     for robot, how in summary["cut_short"].items():
         yield f"{robot}: {how}"
-    if (line := machine_line(summary)) is not None:
-        yield line
+    yield from machine_lines(summary)
 
 
-def machine_line(summary: Summary) -> str | None:
-    """How often the machine stood still; None if it didn't, or if nobody watched it."""
-    machine = summary.get("machine")
-    if not machine or not machine["stalls"]:
-        return None
-    stops = machine["stopped_and_continued"]
-    return (
-        f"MACHINE stalled {machine['stalls']} times, {machine['stalled_s']:.2f} s in all, longest"
-        f" {machine['longest_stall_s']:.2f} s at t = {machine['longest_stall_at_s']:.2f} s"
-        + (f"; {stops} of them stopped by Ctrl-Z or a signal" if stops else "")
-    )
+def machine_lines(summary: Summary) -> Iterator[str]:
+    """How often launcher and plant stood still; nothing if they didn't, or nobody watched."""
+    machine = summary.get("machine") or {}
+    if machine.get("stalls"):
+        stops = machine["stopped_and_continued"]
+        yield (
+            f"MACHINE stalled {machine['stalls']} times, {machine['stalled_s']:.2f} s in all,"
+            f" longest {machine['longest_stall_s']:.2f} s at"
+            f" t = {machine['longest_stall_at_s']:.2f} s"
+            + (f"; {stops} of them stopped by Ctrl-Z or a signal" if stops else "")
+        )
+    if stalls := machine.get("plant_stalls"):
+        worst = max(stalls, key=lambda stall: stall["lasted_s"])
+        yield (
+            f"PLANT, or its machine, stalled {len(stalls)} times, longest {worst['lasted_s']:.2f} s"
+            f" at t = {worst['t_s']:.2f} s"
+        )
 
 
 def realtime_lines(summary: Summary) -> Iterator[str]:

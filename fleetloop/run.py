@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from bridge.messages import Progress, Report
+from bridge.messages import Progress
 from bridge.process import Stop, keep_to_itself
 from configs.brief import NetworkLink
 from configs.briefing import agent_brief, leader_brief, plant_brief, schedule
@@ -16,10 +16,11 @@ from configs.loading import load, to_toml
 from configs.overrides import Overrides
 from configs.scenario import Scenario
 from fleetloop import placing, run_folder, wall_time
+from fleetloop.accounts import stats_of
 from fleetloop.checks.examine import examine
 from fleetloop.checks.finding import likewise, titled, worst
 from fleetloop.expectations import out_of_reach
-from fleetloop.launch import Outcome, ProcessRun
+from fleetloop.launch import ProcessRun
 from fleetloop.lockstep import InProcessRun
 from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.reader import Record
@@ -30,8 +31,6 @@ from fleetloop.signals import stop_on_signals
 from fleetloop.summary import RunStats, Summary, summarise, to_json
 from fleetloop.terminal import RunProgress, note, say, say_json
 
-MOST_NOTICES = 200
-"""Of one process; what else it says is in nobody's interest."""
 EXIT_CODES = {"held": 0, "failed": 1, "not checked": 1, "aborted": 3, "interrupted": 130}
 
 
@@ -110,7 +109,11 @@ def run_scenario(source: str, options: Options) -> int:
                     on_notice=on_notice,
                     deployment=deployment,
                 )
-                stats = _stats(run.run(stop), realtime=scenario.clock.mode == "realtime")
+                stats = stats_of(
+                    run.run(stop),
+                    realtime=scenario.clock.mode == "realtime",
+                    period_s=scenario.clock.control_period_s,
+                )
         except InfrastructureError:
             run_folder.remove_if_unused(folder)
             raise
@@ -188,69 +191,6 @@ def _in_process(
         stopped_robots=run.stopped_robots,
         notices=run.notices,
     )
-
-
-def _stats(outcome: Outcome, *, realtime: bool) -> RunStats:
-    stats = RunStats(
-        mode="realtime" if realtime else "lockstep",
-        ended=outcome.ended,
-        reason=outcome.reason,
-        timed=outcome.timed,
-        wall_s=outcome.wall_s,
-        startup_s=outcome.startup_s,
-        teardown_s=outcome.teardown_s,
-        machine=outcome.machine,
-    )
-    stats.cpu_s["launcher"] = round(outcome.cpu_ns * 1e-9, 3)
-    for process, report in outcome.reports.items():
-        waits = {
-            name.removesuffix("_ns"): round(report.number(name) * 1e-9, 4)
-            for name in report.values
-            if name.endswith("_ns") and name != "cpu_ns"
-        }
-        if profile := {
-            name.removeprefix("profile."): report.number(name) * 1e-9
-            for name in report.values
-            if name.startswith("profile.") and report.number(name)
-        }:
-            stats.profile_s[process] = profile
-        if waits:
-            stats.waits_s[process] = waits
-        if "cpu_ns" in report.values:
-            stats.cpu_s[process] = round(report.number("cpu_ns") * 1e-9, 3)
-        if "misses" in report.values:
-            counts = {name: int(report.number(name)) for name in ("misses", "skipped")}
-            stats.realtime[process.removeprefix("agent/")] = counts
-        stats.refused |= set(filter(None, str(report.values.get("refused", "")).split(", ")))
-        if process == "plant":
-            stats.overruns = int(report.number("overruns"))
-            stats.frames_per_bus = {
-                bus: int(report.number(f"frames.{bus}")) for bus in _under("frames.", report)
-            }
-            stats.bus_troubles = _under("trouble.", report)
-        if early := report.values.get("early"):
-            stats.left_early[process.removeprefix("agent/")] = str(early)
-        if stopped := report.values.get("stopped"):
-            stats.stopped_robots[process.removeprefix("agent/")] = str(stopped)
-        if notices := report.values.get("notices"):
-            lines = str(notices).split("\n")
-            stats.notices[process.removeprefix("agent/")] = lines[:MOST_NOTICES]
-    # What a process said on the way is in its report as well, if it lived to make one.
-    lost = {name: said for name, said in outcome.said.items() if name not in outcome.reports}
-    for process, said in (*lost.items(), *outcome.notices.items()):
-        stats.notices.setdefault(process.removeprefix("agent/"), []).extend(said)
-    if (plant := outcome.reports.get("plant")) is not None:
-        stats.stopped_robots |= _under("stopped.", plant)  # the cause of what its controller says
-    return stats
-
-
-def _under(prefix: str, report: Report) -> dict[str, str]:
-    """What a report says under names that begin alike, by the rest of the name."""
-    return {
-        name.removeprefix(prefix): str(value)
-        for name, value in report.values.items()
-        if name.startswith(prefix)
-    }
 
 
 def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options) -> int:

@@ -11,6 +11,7 @@ from contextlib import nullcontext
 from functools import partial
 
 from bridge import keys
+from bridge.awake import Stall
 from bridge.barrier import Hellos, await_hellos
 from bridge.can_bus.ends import DriveEnd
 from bridge.can_bus.hub import Hub
@@ -123,9 +124,16 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
     for truth in truths:
         hellos.add(truth, Rows(0, 0, b"", False).encode())
 
+    stalls: list[Stall] = []
+
     def news() -> dict[str, str]:
         troubles = {f"bus {bus}": text for bus, text in end.troubles().items()}
-        return troubles | diverged_robots(units, brief.schedule.period_ns)
+        late = {
+            brief.schedule.when(stall.tick): "the plant, or its machine, stalled for"
+            f" {stall.lasted_s:.2f} s"
+            for stall in stalls
+        }
+        return troubles | late | diverged_robots(units, brief.schedule.period_ns)
 
     notice = link.publisher(keys.notice(name, "plant"))
     herald = Herald(news, lambda text: notice.put(Notice(text).encode()))
@@ -143,7 +151,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
         refused = go_realtime(PLANT_PRIORITY)
         record = partial(_record, link, others, rows[len(units) :], brief.schedule.period_s)
         wall = RealtimeLoop(brief, units, end, hub, poses, rows[: len(units)], say, taps, record)
-        counters, progress_of = wall.counters, wall.progress
+        counters, progress_of, stalls = wall.counters, wall.progress, wall.lateness.stalls
         body = partial(wall.run, epoch_ns)
     else:
         _await_controllers(brief, hub, hellos, stop)
@@ -180,6 +188,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
                 f"stopped.{robot}": why
                 for robot, why in diverged_robots(units, brief.schedule.period_ns).items()
             },
+            **{f"stall.{stall.tick}": stall.lasted_s for stall in stalls},
             **{f"trouble.{bus}": text for bus, text in end.troubles().items()},
             **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
         }

@@ -12,6 +12,7 @@ cyclically, as always.
 import time
 from collections.abc import Callable, Mapping, Sequence
 
+from bridge.awake import Lateness
 from bridge.can_bus.ends import DriveEnd
 from bridge.can_bus.hub import Hub
 from bridge.link import Publisher
@@ -59,6 +60,7 @@ class RealtimeLoop:
         self._epoch_ns = 0
         self._next_report_ns = 0
         self.counters = Counters()
+        self.lateness = Lateness(brief.schedule.period_s)
 
     def progress(self) -> Progress:
         """How far the plant is."""
@@ -79,6 +81,7 @@ class RealtimeLoop:
                 self._serve((due_ns - now_ns) * 1e-9, power_up_ns)
                 continue
             self.counters.overruns += now_ns > due_ns + schedule.period_ns
+            self.lateness.note(self._tick, (now_ns - due_ns) * 1e-9)
             self._keep_tick(power_up_ns)
             self._tick += 1
             if now_ns >= self._next_report_ns:

@@ -36,6 +36,8 @@ def stalled(summary: Summary) -> str:
     machine = summary.get("machine") or {}
     if machine.get("stalls"):
         return f"the machine stalled for {machine['longest_stall_s']:.2f} s"
+    if machine.get("plant_stalls"):
+        return f"the plant stalled {len(machine['plant_stalls'])} times"
     if machine.get("longest_late_s", 0.0) > LATE_S:
         return f"the launcher woke up {machine['longest_late_s']:.3f} s late"
     wall_s = max(summary["wall_s"] + summary["startup_s"] + summary["teardown_s"], 1e-3)

@@ -1,6 +1,8 @@
 """A clock that stands still while its process does."""
 
-from bridge.awake import LOOK_S, STALL_S, AwakeClock
+import pytest
+
+from bridge.awake import AFTERMATH_S, LATE_S, LOOK_S, STALL_S, AwakeClock, Lateness
 
 
 class Machine:
@@ -60,3 +62,23 @@ def test_work_is_no_stall() -> None:
     machine.passes(LOOK_S)
     assert machine.awake_s() == round(5.0 + LOOK_S, 6)
     assert machine.stalls == []
+
+
+def test_a_stall_of_who_keeps_deadlines_is_found_once_and_is_over_after_a_while() -> None:
+    lateness = Lateness(0.01)
+    found = [lateness.note(tick, 1e-4) for tick in range(100)]
+    # Stood still for 0.3 s: what was missed is caught up with, tick by tick.
+    found += [lateness.note(100 + n, 0.3 - 0.01 * n) for n in range(30)]
+    assert [tick for tick, begins in enumerate(found) if begins] == [100]
+    assert lateness.stalls == [(100, 0.3)]
+    over = next(
+        tick for tick in range(130, 1000) if not (lateness.note(tick, 0.0), lateness.late)[1]
+    )
+    assert over == pytest.approx(126 + AFTERMATH_S / 0.01 + LATE_S / 0.01, abs=4)
+    assert lateness.note(over + 1, 1.0)
+
+
+def test_late_by_less_than_two_slow_periods_is_no_stall() -> None:
+    lateness = Lateness(0.1)
+    assert not lateness.note(1, 0.19)
+    assert lateness.note(2, 0.21)

@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 
 from bridge.messages import (
     MAX_BYTES,
+    MAX_NOTICE,
     Go,
     LeaderSpeed,
+    Notice,
     PathState,
     PoseFix,
     Progress,
@@ -134,3 +136,13 @@ def test_the_leader_speed_holds_from_each_step_on_and_before_the_first() -> None
 
 def test_steps_out_of_order_are_no_leader_speed() -> None:
     assert LeaderSpeed.decode(msgpack.packb([1, [[10, 0.4], [0, 0.6]]])) is None
+
+
+@given(st.text(max_size=600))
+def test_a_notice_is_one_line_that_a_terminal_can_show(text: str) -> None:
+    notice = Notice.decode(Notice(text).encode())
+    assert notice is not None
+    assert notice.text.isprintable()
+    assert len(notice.text) == min(len(text), MAX_NOTICE)
+    assert Notice.decode(msgpack.packb([1, "x" * (MAX_NOTICE + 1)])) is None
+    assert Notice.decode(msgpack.packb([1, 7])) is None

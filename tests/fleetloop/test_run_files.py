@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,28 @@ def test_the_page_stands_alone_and_says_the_verdict(finished_run: Path) -> None:
     assert "<script" not in page
     assert "http://" not in page
     assert "https://" not in page
+
+
+def test_page_summary_and_terminal_say_the_same_of_what_went_wrong(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = Options(
+        in_process=True, out=tmp_path / "a", overrides=("robot.r1.v_m_s=1e6",), force=True
+    )
+    assert run_scenario("two_robots", options) == 1
+    printed, noted = capsys.readouterr()
+    summary = json.loads((tmp_path / "a" / "summary.json").read_text())
+    page = unescape((tmp_path / "a" / "report.html").read_text())
+    reason = summary["stopped_robots"]["r1"]
+    assert reason.startswith("tick 0 (t = 0.000 s): its motion diverged")
+    assert f"STOPPED r1: {reason}" in printed
+    assert f"<li>STOPPED r1: {reason}</li>" in page
+    assert f"plant: r1: {reason}" in noted.splitlines()
+    for notice in summary["notices"].get("r1", []):
+        assert f"r1: {notice}" in printed
+        assert f"r1: {notice}" in page
+    # Results come before the figures are made.
+    assert printed.index("verdict  failed") < printed.index("report ")
 
 
 def test_the_page_can_be_made_again_without_a_summary(finished_run: Path, tmp_path: Path) -> None:

@@ -33,6 +33,20 @@ def test_never_outside_is_zero_and_outside_at_the_end_is_never() -> None:
     assert settle_s(T, np.where(T > 5, np.nan, 0.0)) is None
 
 
+def test_s_dot_settles_to_the_leaders_speed_of_the_moment_or_never(finished_run: Path) -> None:
+    def settle(*overrides: str) -> float | None:
+        record = Record.open(finished_run / "record.mcap")
+        summary = summarise(record, load("two_robots", overrides), RunStats("lockstep"))
+        return summary["robots"]["r1"]["settle_s_dot_s"]
+
+    rows = Record.open(finished_run / "record.mcap").controller["r1"]
+    outside = rows["t_s"][np.abs(rows["s_dot"] - load("two_robots").leader.speed_m_s) > 0.05]
+    assert settle() == (outside[-1] if len(outside) else 0.0)
+    # Steady, but at a speed that nobody asked for.
+    assert settle("leader.speed_m_s=2.0") is None
+    assert settle("leader.steps=[{t_s=3.0, speed_m_s=2.0}]") is None
+
+
 def uneven(run: Path, *expect: Expect) -> Summary:
     scenario = load("two_robots").model_copy(update={"expect": expect})
     return summarise(Record.open(run / "record.mcap"), scenario, RunStats("lockstep"))

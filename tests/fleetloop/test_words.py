@@ -11,8 +11,8 @@ from bridge.link import Dropped
 from bridge.messages import MAX_TEXT, Progress, Report
 from configs.briefing import schedule
 from configs.loading import load
+from fleetloop.accounts import stats_of
 from fleetloop.launch import Outcome
-from fleetloop.run import _stats
 from fleetloop.words import Words
 
 SCENARIO = load("two_robots")
@@ -99,7 +99,7 @@ def test_what_found_no_room_is_counted_by_its_sender() -> None:
 
 values = st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False, allow_infinity=False)
 NAMES = """cpu_ns bus_ns misses skipped overruns frames.r1 trouble.r1 stopped stopped.r1 notices
-refused profile.law profile.x early failure ticks"""
+refused profile.law profile.x early failure ticks stall.3 stall.-7 stopped_tick"""
 names = st.sampled_from(NAMES.split()) | st.text(max_size=8)
 
 
@@ -113,4 +113,4 @@ def test_whatever_roles_report_there_are_statistics(reports) -> None:
     decoded = {process: Report.decode(said(report)) for process, report in reports.items()}
     outcome = Outcome(reports={p: report for p, report in decoded.items() if report is not None})
     for realtime in (False, True):
-        _stats(outcome, realtime=realtime)
+        stats_of(outcome, realtime=realtime, period_s=0.01)

@@ -53,3 +53,14 @@ def test_a_controller_that_is_killed_ends_a_real_time_run_with_its_name(tmp_path
         assert status == 3
         assert "agent/r3 was killed by SIGKILL, after " in out
         assert run.survivors() == []
+
+
+def test_a_controller_that_a_person_ends_leaves_a_run_that_is_not_checked(tmp_path: Path) -> None:
+    args = ("realtime_100hz", "--duration", "3", "--set", "expect=[]")
+    with running(tmp_path / "a", *args, bus_time_s=1.0) as run:
+        run.child("r3").terminate()
+        status, out = run.end()
+    assert (status, "verdict  not checked: r3: cut short at " in out) == (1, True), out
+    summary = run.summary()
+    assert "of 3 s: asked to stop" in summary["cut_short"]["r3"]
+    assert set(summary["cut_short"]) == {"r3"}
