@@ -20,7 +20,7 @@ from fleetloop.terminal import ResultConsole, say, say_json
 FINE, UNSOUND, WRONG = 0, 1, 2
 _VERDICTS = {
     "ok": "sound",
-    "warning": "sound as far as can be said, but for the warnings",
+    "warning": "no error; mind the warnings",
     "error": "would not work as it is",
 }
 _MARKS = {"ok": "[green]ok[/]", "warning": "[yellow]warning[/]", "error": "[red]error[/]"}

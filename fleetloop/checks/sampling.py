@@ -158,10 +158,8 @@ def _channel(
     if _CYCLES * slowest_s > scenario.duration_s:
         text = f"{said}: too slow for {scenario.duration_s:g} s; raise the lowest of k1, k2 v_r, k3"
         yield Finding("warning", title, text, key="control.k2")
-    elif margin_s < 0.25 * loop.period_s:
-        yield Finding(
-            "warning", title, f"{said}: less than a quarter of a period", key="control.k4"
-        )
+    elif margin_s < loop.period_s:
+        yield Finding("warning", title, f"{said}: less than a period", key="control.k4")
     else:
         yield Finding("ok", title, said)
 
