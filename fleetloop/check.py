@@ -117,7 +117,12 @@ def _say_json(
 ) -> None:
     sound = not problems and all(finding.level != "error" for finding in findings)
     listed = [asdict(finding) for finding in findings]
-    whole = {"sound": sound, "problems": list(problems), "findings": listed}
+    whole = {
+        "sound": sound,
+        "worst": "error" if problems else worst(findings),
+        "problems": list(problems),
+        "findings": listed,
+    }
     say_json(whole)
 
 

@@ -1,8 +1,11 @@
 """All checks together: shipped scenarios, and kinds of scenarios that don't run well."""
 
+import json
+
 import pytest
 
 from configs.loading import load, shipped
+from fleetloop.check import check_scenario
 from fleetloop.checks.examine import examine
 from fleetloop.checks.finding import Finding, alike, likewise, worst
 
@@ -78,3 +81,13 @@ def test_a_section_that_the_preset_does_not_look_at_is_warned_of() -> None:
     titles = [f.title for f in found("paper", *changed) if "not used" in f.text]
     assert titles == ["[motor]", "[encoder]"]
     assert not [f for f in found("paper", *changed, REALISTIC) if "not used" in f.text]
+
+
+def test_the_worst_level_is_told_to_machines(capsys: pytest.CaptureFixture[str]) -> None:
+    for change, worst_level in (
+        ("control.k1=2.0", "ok"),
+        ("control.torque_limit_N_m=0.9", "warning"),
+    ):
+        check_scenario("realtime_100hz", (change, "duration_s=30.0"), as_json=True)
+        said = json.loads(capsys.readouterr().out)
+        assert (said["sound"], said["worst"]) == (True, worst_level)
