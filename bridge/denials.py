@@ -75,6 +75,8 @@ class Denials:
         self._deaf: dict[str, bool] = {}
         self.cut_off: set[str] = set()
         """Users one of whose sessions was cut off because it did not read."""
+        self.flooders: set[str] = set()
+        """Users one of whose sessions was cut off because it said too much."""
         self._caching: dict[str, str] = {}  # the key whose permissions a thread looks up in advance
 
     def take(self, line: str) -> None:
@@ -109,6 +111,19 @@ class Denials:
         """The kinds of refusals that are new since the last call."""
         news, self._new = self._new, []
         return news
+
+    def peers(self, prefix: str) -> dict[str, str]:
+        """Users whose names begin like this, by where they are."""
+        known = list(self._users.values())
+        return {peer: user for user, peer in known if user.startswith(prefix)}
+
+    def note_flood(self, user: str, peer: str) -> None:
+        """Somebody was cut off because he said too much."""
+        self.flooders.add(user)
+        self._count(
+            f"cut off {_shown(user)} from {_host(peer)}: it said far more than the schedule lets"
+            " any controller say"
+        )
 
     def logins_of(self, user: str) -> list[str]:
         """What was refused to who wanted to be `user`."""

@@ -19,8 +19,9 @@ import zenoh
 from zenoh.handlers import Callback, RingChannel
 
 from bridge import zenoh_log
-from bridge.access import AccessPlan
+from bridge.access import AccessPlan, agent_user
 from bridge.denials import Denials, directives, is_ours
+from bridge.floods import FloodGuard
 from bridge.link import ROOM_BYTES, Arrival, Dropped, Inbox, Publisher
 from bridge.listening import accept_many, await_first_words, hasty, loopback
 from bridge.login import Obstacle, obstacle, taken
@@ -240,6 +241,13 @@ class RouterLink(ZenohLink):
         self.endpoint = endpoint
         self.denials = denials
         """Whom the router refused, from its log."""
+        self._guard = FloodGuard()
+
+    def look_for_floods(self, ticks: int, now_s: float) -> None:
+        """Cut off controllers that say far too much; call it several times a second."""
+        controllers = self.denials.peers(agent_user(""))
+        for peer in self._guard.look(controllers, ticks, now_s):
+            self.denials.note_flood(controllers[peer], peer)
 
 
 class StoppedError(Exception):

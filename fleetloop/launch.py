@@ -14,7 +14,7 @@ controllers follow it, the recorder takes what still comes; who doesn't is kille
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -61,6 +61,8 @@ MAX_NOTICES = 100
 """Of each process; what else it says is in nobody's interest."""
 UNREAD_SHARE = 0.25
 """Part of the tick deadline after which a client that doesn't read is cut off: all wait for it."""
+LOOK_EVERY_S = 0.2
+"""How often connections are looked at for who says far too much."""
 DRAIN_S = 2.0
 """How long the recorder may take to write what is still on its way, once all others have ended."""
 
@@ -111,6 +113,7 @@ class ProcessRun:
         self._processes = roles_of(scenario)
         self._children: list[Child] = []
         self._alive: set[str] = set()
+        self._next_look_s = 0.0
         self._words = Words(schedule(scenario, speed))
         self._vitals = Vitals()
         self._ticking = False
@@ -152,7 +155,7 @@ class ProcessRun:
             self._words.note_dropped(link.dropped())
             if refusals := self._words.refusals.lines():
                 self.outcome.notices.setdefault(access.LAUNCHER, []).extend(refusals)
-            self._blame_floods()
+            self._blame_floods(link.denials.flooders)
         finally:
             end(self._children, grace_s=0.0)
         return self.outcome
@@ -248,15 +251,21 @@ class ProcessRun:
                 return self._cause() or silent
         return None
 
-    def _blame_floods(self) -> None:
+    def _blame_floods(self, cut_off: Iterable[str]) -> None:
         """Who says so much that nobody has time for others is the cause of whoever is too late."""
         reports = self.outcome.reports.values()
         said = [str(report.values.get("flood", "")) for report in reports]
         floods = sorted({*filter(None, said), *self._words.refusals.floods()})
+        floods += [f"{user} (cut off by the router)" for user in sorted(cut_off)]
         if floods and self.outcome.ended == "aborted":
             self.outcome.reason += f"; flooded by {', '.join(floods)}"
 
     def _tell_refusals(self, link: RouterLink) -> None:
+        """Look for floods now and then, and tell whom the router refused or cut off."""
+        now_s = time.monotonic()
+        if now_s >= self._next_look_s:
+            self._next_look_s = now_s + LOOK_EVERY_S
+            link.look_for_floods(max(self.outcome.ticks, 0), now_s)
         for text in link.denials.news():
             self._on_notice("router", text)
 
