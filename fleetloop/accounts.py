@@ -15,6 +15,7 @@ def stats_of(outcome: Outcome, *, realtime: bool, period_s: float) -> RunStats:
     stats = RunStats(
         mode="realtime" if realtime else "lockstep",
         ended=outcome.ended,
+        began=outcome.startup_s > 0.0,
         reason=outcome.reason,
         timed=outcome.timed,
         wall_s=outcome.wall_s,

@@ -178,6 +178,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
                 break
             if now >= next_report:
                 next_report = now + PROGRESS_EVERY_S
+                record.check_place()
                 record.flush()
                 progress.put(Progress(recorder.ticks, 0, 0).encode())
         recorder.note_dropped(link.dropped())

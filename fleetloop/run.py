@@ -82,7 +82,8 @@ def run_scenario(source: str, options: Options) -> int:
         note(f"{scenario.name}: {line}")
     _look_ahead(source, scenario, force=options.force)
     started = datetime.now(UTC).astimezone()
-    folder = run_folder.create(scenario.name, options.out, now=started)
+    created = run_folder.create(scenario.name, options.out, now=started)
+    folder = created.path
     with (
         stop_on_signals() as stop,
         RunProgress(scenario.name, scenario.ends_at_s, quiet=options.as_json) as progress,
@@ -115,8 +116,12 @@ def run_scenario(source: str, options: Options) -> int:
                     period_s=scenario.clock.control_period_s,
                 )
         except InfrastructureError:
-            run_folder.remove_if_unused(folder)
+            run_folder.discard(created)
             raise
+    if not stats.began:
+        run_folder.discard(created)
+        note(f"{stats.ended}: {stats.reason}; the run did not begin")
+        return EXIT_CODES[stats.ended]
     stats.started = started.isoformat(timespec="seconds")
     return _finish(scenario, folder, stats, options)
 
@@ -184,6 +189,7 @@ def _in_process(
     return RunStats(
         mode="in-process",
         ended=ended,
+        began=any(run.frames.values()),
         reason=reason,
         wall_s=run.wall_s,
         startup_s=startup_s,
@@ -196,8 +202,8 @@ def _in_process(
 def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options) -> int:
     record = folder / run_folder.RECORD
     if not record.exists():
-        say(f"{stats.ended}: {stats.reason}; nothing was recorded")
-        return EXIT_CODES[stats.ended]
+        gone = stats.reason or f"{record} is not there: the run's folder was removed or moved"
+        raise InfrastructureError(gone)
     try:
         recorded = Record.open(record)
     except RecordError as error:

@@ -1,11 +1,14 @@
 """Where a run leaves its files: `runs/<time>-<scenario>/` or the folder that the user names."""
 
+import contextlib
 import os
 from datetime import datetime
 from pathlib import Path
+from typing import NamedTuple
 
 from configs.errors import FleetloopError, InfrastructureError, ScenarioError
 from fleetloop.record.reader import Record
+from fleetloop.record.run_record import CAN_FOLDER
 from fleetloop.terminal import note
 
 RECORD = "record.mcap"
@@ -19,8 +22,15 @@ class IncompleteError(FleetloopError):
     exit_code = 1
 
 
-def create(scenario_name: str, out: Path | None, *, now: datetime) -> Path:
-    """Make the run's folder and return it.
+class Created(NamedTuple):
+    """A run's folder."""
+
+    path: Path
+    new: tuple[Path, ...]  # it and its parents, innermost first, as far as they weren't there
+
+
+def create(scenario_name: str, out: Path | None, *, now: datetime) -> Created:
+    """Make the run's folder.
 
     Raises:
         ScenarioError: `out` exists and holds something already.
@@ -34,12 +44,13 @@ def create(scenario_name: str, out: Path | None, *, now: datetime) -> Path:
             raise ScenarioError(
                 f"--out {folder}: exists and is not an empty folder; name a new one"
             )
+        new = tuple(path for path in (folder, *folder.parents) if not path.exists())
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK | os.X_OK):
             raise PermissionError(13, "Permission denied", str(folder))
     except OSError as error:
         raise InfrastructureError(f"can't write the run's folder {folder}: {error}") from error
-    return folder
+    return Created(folder, new)
 
 
 def write(path: Path, content: str | bytes) -> None:
@@ -60,11 +71,15 @@ def write(path: Path, content: str | bytes) -> None:
         raise InfrastructureError(f"can't write {path}: {error.strerror or error}") from error
 
 
-def remove_if_unused(folder: Path) -> None:
-    """Remove the folder of a run that never started: it holds the scenario at most."""
-    if {item.name for item in folder.iterdir()} <= {SCENARIO}:
-        (folder / SCENARIO).unlink(missing_ok=True)
-        folder.rmdir()
+def discard(created: Created) -> None:
+    """Remove the folder of a run that never began, and what was made for it."""
+    can = created.path / CAN_FOLDER
+    with contextlib.suppress(OSError):
+        for file in (created.path / SCENARIO, created.path / RECORD, *can.glob("*.[bl][lo][fg]")):
+            file.unlink(missing_ok=True)
+    for folder in (can, *created.new):
+        with contextlib.suppress(OSError):
+            folder.rmdir()
 
 
 def record_of(run: Path) -> Path:

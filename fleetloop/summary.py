@@ -30,6 +30,7 @@ class RunStats:
     mode: str  # "lockstep" over processes, or "in-process"
     started: str = ""  # wall clock, ISO 8601
     ended: str = "completed"  # "completed", "interrupted", "aborted"
+    began: bool = True  # anything happened that could be recorded
     reason: str = ""
     timed: bool = True  # the reason says when
     wall_s: float = 0.0

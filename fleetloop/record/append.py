@@ -78,6 +78,13 @@ class AppendedFile:
         """Replace the first bytes."""
         os.pwrite(self._fd, head, 0)
 
+    def in_place(self) -> bool:
+        """Whether its path still leads to it: nobody removed or moved it, or its folder."""
+        try:
+            return os.path.samestat(self._path.stat(), os.fstat(self._fd))
+        except FileNotFoundError:
+            return False
+
     def close(self) -> None:
         """Give back what was reserved, and close. Idempotent."""
         if self._fd >= 0:

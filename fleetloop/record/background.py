@@ -5,6 +5,7 @@ background is raised by the next `add`, or by `close`.
 """
 
 import threading
+import time
 from collections.abc import Callable
 from functools import partial
 from queue import Queue
@@ -14,6 +15,7 @@ from typing import Self
 from fleetloop.record.run_record import RunRecord
 from fleetloop.record.writer import Source
 
+LOOK_EVERY_S = 0.25
 _MAX_BLOCKS = 256
 
 
@@ -55,11 +57,15 @@ class BackgroundWriter:
 
     def _write(self) -> None:
         failed = False
+        look_s = 0.0
         while (write := self._blocks.get()) is not None:
             if failed:
                 continue
             try:
                 write()
+                if (now_s := time.monotonic()) >= look_s:
+                    look_s = now_s + LOOK_EVERY_S
+                    self._record.check_place()
             except Exception as error:  # raised in the thread that fills
                 self._failure = error
                 failed = True

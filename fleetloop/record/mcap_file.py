@@ -120,6 +120,11 @@ class McapFile:
         if failure is not None:
             raise self._unwritable(failure) from failure
 
+    @property
+    def in_place(self) -> bool:
+        """Whether its path still leads to it."""
+        return self._file.in_place()
+
     def discard(self) -> None:
         """Close and remove it."""
         self._file.discard()

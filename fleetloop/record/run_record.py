@@ -87,6 +87,10 @@ class RunRecord:
         """Add frames that crossed a bus, in the records of `bridge.telemetry.FRAME_ROW`."""
         self._logs[bus].write(frames)
 
+    def check_place(self) -> None:
+        """See whether the files are where they were made, as `RecordWriter.check_place`."""
+        self._rows.check_place()
+
     def flush(self) -> None:
         """Put the buses' frames so far into their files."""
         for log in self._logs.values():

@@ -115,6 +115,18 @@ class RecordWriter:
         """Have the file say that something is missing in it."""
         self._lost = what
 
+    def check_place(self) -> None:
+        """See whether the file is still where it was made.
+
+        Raises:
+            InfrastructureError: it, or the folder that it is in, was removed or moved.
+        """
+        if not self._file.in_place:
+            raise InfrastructureError(
+                f"{self._path} was removed or moved during the run, or its folder: what was"
+                " recorded until then is in it, wherever it is now"
+            )
+
     def close(self) -> None:
         """Write what is left and complete the file.
 
