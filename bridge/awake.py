@@ -33,7 +33,7 @@ class AwakeClock:
     Args:
         look_s: longest time between two looks, if all is well [s].
         stall_s: what is later than that by so much is a stall [s].
-        held: whether those that are waited for are held up at this moment.
+        held: whether those that are waited for are held up at this moment; asked after real waits.
         on_stall: told of every stall: how long it was [s].
         monotonic: the clock of the machine [s].
     """
@@ -71,7 +71,7 @@ class AwakeClock:
         if gap_s > self._look_s + self._stall_s:
             self._lost_s += gap_s - self._look_s
             self._on_stall(gap_s - self._look_s)
-        elif gap_s > 0.0 and self._held():
+        elif gap_s >= 0.5 * self._look_s and self._held():
             self._lost_s += gap_s
         return now_s - self._lost_s
 
