@@ -63,8 +63,9 @@ UNREAD_SHARE = 0.25
 """Part of the tick deadline after which a client that doesn't read is cut off: all wait for it."""
 LOOK_EVERY_S = 0.2
 """How often connections are looked at for who says far too much."""
-DRAIN_S = 2.0
-"""How long the recorder may take to write what is still on its way, once all others have ended."""
+DRAIN_S, MOST_DRAIN_S = 2.0, 10.0
+"""How long the recorder may be silent while it writes what is still on its way, once all others
+have ended, and how long it may take."""
 
 
 @dataclass(slots=True)
@@ -412,9 +413,7 @@ class ProcessRun:
         self._hear_from_elsewhere(link)
         if outcome.ended != "completed":
             recorder.ask_to_stop()
-        deadline = self._now() + DRAIN_S
-        while not recorder.ended() and self._now() < deadline:
-            self._take(link.receive(WATCH_EVERY_S))
+        self._drain(link, recorder)
         for arrival in waiting(link):
             self._take(arrival)
         unfinished = not recorder.ended() or recorder.failure() is not None
@@ -422,9 +421,22 @@ class ProcessRun:
         if outcome.ended == "completed" and unfinished:
             outcome.ended = "aborted"
             lost = recorder.failure()
-            outcome.reason = lost.text if lost else f"recorder: not done within {DRAIN_S:g} s"
+            outcome.reason = (
+                lost.text if lost else "recorder: not done in time, once all others had ended"
+            )
         if unfinished:
             self._complete_record()
+
+    def _drain(self, link: Link, recorder: Child) -> None:
+        """Let the recorder write what is on its way, as long as it says that it does."""
+        began_s = now_s = self._now()
+        while not recorder.ended() and now_s < began_s + MOST_DRAIN_S:
+            silence = self._vitals.silence(recorder.name, now_s)
+            silent_since_s = now_s - silence.lasted_s if silence is not None else began_s
+            if now_s - max(silent_since_s, began_s) > DRAIN_S:
+                return
+            self._take(link.receive(WATCH_EVERY_S))
+            now_s = self._now()
 
     def _judge(self, stop: Stop, failure: Failure | None) -> None:
         """How the run ended; who gave up while the machine stood still is not the cause."""
