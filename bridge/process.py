@@ -19,7 +19,6 @@ import gc
 import json
 import os
 import pickle
-import select
 import signal
 import sys
 import threading
@@ -32,6 +31,7 @@ from typing import BinaryIO, TypeVar
 
 import setproctitle
 
+from bridge.waiting import readable
 from configs.errors import FleetloopError, PeerLostError
 
 GRACE_S = 3.0
@@ -64,7 +64,7 @@ class Stop:
 
     def requested_soon(self) -> bool:
         """Whether it is asked for, or will be at once: who lost a peer may stop for its cause."""
-        select.select([self.wake_fd], [], [], _SAME_CAUSE_S)
+        readable([self.wake_fd], _SAME_CAUSE_S)
         return self.requested
 
     def release(self) -> None:
@@ -82,7 +82,7 @@ class Stop:
         A network session that closes may drop what it has not sent yet; order is kept, so with the
         last word everything has arrived.
         """
-        select.select([self.release_fd], [], [], LINGER_S)
+        readable([self.release_fd], LINGER_S)
 
 
 @dataclass(frozen=True, slots=True)

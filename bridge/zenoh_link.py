@@ -7,7 +7,6 @@ that isn't can keep its process from ending. All are kept until it ends (`bridge
 
 import contextlib
 import os
-import select
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -36,6 +35,7 @@ from bridge.session import (
     set_key,
     settings,
 )
+from bridge.waiting import readable
 from configs.brief import LEASE_S, NetworkLink, Outside
 from configs.errors import InfrastructureError
 
@@ -293,7 +293,7 @@ def _client(network: NetworkLink, timeout_s: float, stop: Stop | None) -> zenoh.
                 f"{network.user}: no session with the router at {network.endpoint}{within}:"
                 f" {reason.text}"
             )
-        if select.select(wake, [], [], pause_s)[0]:
+        if readable(wake, pause_s):
             raise StoppedError
         pause_s = min(1.5 * pause_s, _LAST_RETRY_S)
 

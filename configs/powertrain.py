@@ -47,7 +47,7 @@ class Encoder(Section):
     noise_counts: Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)] = Field(
         0.0, description="rms, of the angle before it is counted"
     )
-    pll_bandwidth_rad_s: Positive = 1000.0
+    pll_bandwidth_rad_s: Annotated[float, Field(ge=1, le=1e6, allow_inf_nan=False)] = 1000.0
     pll_rate_Hz: Annotated[float, Field(ge=100, le=100_000, allow_inf_nan=False)] = Field(
         8000.0, description="rate of the drive's control loop"
     )

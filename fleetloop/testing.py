@@ -153,7 +153,7 @@ class EmulatedPlant:
         deadline = time.monotonic() + within_s
         while b"\n" not in self._unread:
             left_s = deadline - time.monotonic()
-            if left_s <= 0.0 or not select.select([stdout], [], [], left_s)[0]:
+            if left_s <= 0.0 or not _readable(stdout, left_s):
                 raise PlantError(f"the plant said nothing for {within_s:g} s")
             more = os.read(stdout.fileno(), 65536)
             if not more:
@@ -162,6 +162,12 @@ class EmulatedPlant:
         line, _, self._unread = self._unread.partition(b"\n")
         answer: dict[str, Any] = json.loads(line)
         return answer
+
+
+def _readable(stream: IO[bytes], within_s: float) -> bool:
+    poller = select.poll()
+    poller.register(stream, select.POLLIN)
+    return bool(poller.poll(within_s * 1e3))
 
 
 @pytest.fixture

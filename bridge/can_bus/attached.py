@@ -26,6 +26,7 @@ from bridge.can_bus.convert import to_frame, to_message
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.opening import open_bus
 from bridge.frame import Frame
+from bridge.waiting import readable
 from configs.brief import Settings
 from configs.errors import InfrastructureError
 
@@ -130,7 +131,7 @@ class AttachedBuses:
 
     def serve(self, timeout_s: float) -> None:
         """Take what came on the buses; waits at most `timeout_s`, to the microsecond."""
-        if select.select([self._epoll], [], [], self.patience(timeout_s))[0]:
+        if readable([self._epoll], self.patience(timeout_s)):
             for fd, _ in self._epoll.poll(0.0):
                 self._receive(self._by_fd[fd])
         if self._polled:

@@ -23,7 +23,10 @@ takes with `say` who sent what, gives with `pass_on` what ended when and who had
 with `left_queue` whose transmit queue has room again.
 """
 
+import contextlib
+import errno
 import hmac
+import os
 import select
 import socket
 import time
@@ -33,6 +36,7 @@ from bridge.can_bus import packet as wire
 from bridge.can_bus.connection import Bus, Connection, Counters
 from bridge.can_bus.traffic import Key, Passed, Said, Stamped
 from bridge.frame import ERR, Frame
+from bridge.waiting import readable
 
 MAX_CLIENTS = 64
 MAX_STRANGERS = 64
@@ -72,6 +76,7 @@ class Hub:
         }
         self._joined = 0
         self._epoll = select.epoll()
+        self._spare = os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC)  # see `_turn_away`
         self._poll = self._epoll.poll
         self._readers: dict[int, Connection | Bus | None] = {}
         self._answered: list[str] = []
@@ -184,7 +189,7 @@ class Hub:
 
     def serve(self, timeout_s: float) -> None:
         """Handle what happens on the buses; waits at most `timeout_s`, to the microsecond."""
-        if select.select([self._epoll], [], [], max(timeout_s, 0.0))[0]:
+        if readable([self._epoll], max(timeout_s, 0.0)):
             self._handle(0.0)
 
     @property
@@ -266,6 +271,7 @@ class Hub:
                 reader.sock.close()
         self._readers.clear()
         self._epoll.close()
+        os.close(self._spare)
 
     def _let_catch_up(self, behind: Sequence[Connection]) -> None:
         now_s = time.monotonic()
@@ -384,7 +390,9 @@ class Hub:
     def _accept(self, bus: Bus) -> None:
         try:
             sock, _ = bus.listener.accept()
-        except OSError:
+        except OSError as error:
+            if error.errno in (errno.EMFILE, errno.ENFILE):
+                self._turn_away(bus)
             return
         sock.setblocking(False)
         stranger = Connection(sock, bus, _READ)
@@ -392,6 +400,13 @@ class Hub:
         bus.strangers.append(stranger)
         if len(bus.strangers) > MAX_STRANGERS:
             self._drop(bus.strangers[0])
+
+    def _turn_away(self, bus: Bus) -> None:
+        """Tell a client that there is no descriptor for it: waiting, it would wake us for ever."""
+        os.close(self._spare)
+        with contextlib.suppress(OSError), bus.listener.accept()[0] as sock:
+            sock.send(wire.encode_text(wire.REFUSED, "too many open files here (ulimit -n)"))
+        self._spare = os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC)
 
     def _welcome(self, client: Connection, hello: wire.Packet) -> None:
         bus = client.bus

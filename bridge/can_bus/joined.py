@@ -3,12 +3,12 @@
 Whoever waits here waits for all buses at once.
 """
 
-import select
 from collections.abc import Sequence
 
 from bridge.can_bus.attached import AttachedBuses
 from bridge.can_bus.ends import Crossed, DriveEnd
 from bridge.frame import Frame
+from bridge.waiting import readable
 
 
 class JoinedEnds:
@@ -29,7 +29,7 @@ class JoinedEnds:
 
     def serve(self, timeout_s: float) -> None:
         """Handle what happens on the buses; waits at most `timeout_s`."""
-        select.select(self._both, [], [], self._others.patience(timeout_s))
+        readable(self._both, self._others.patience(timeout_s))
         for end in self._both:
             end.serve(0.0)
 

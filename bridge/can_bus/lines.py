@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Protocol
 
 from bridge.can_bus import packet as wire
+from bridge.waiting import readable
 
 FINE_S = 0.05
 """Waits below this are kept to the microsecond; the kernel's own bound counts in its ticks."""
@@ -55,7 +56,8 @@ class UnixLine:
             # The kernel's own bound: a socket that doesn't block is refused where others wait too.
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _timeval(timeout_s))
             self._socket.connect(str(path))
-            self._send(hello)
+            with contextlib.suppress(BrokenPipeError):  # it said why: that is still to be read
+                self._send(hello)
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _timeval(None))
         except BlockingIOError as error:
             self._socket.close()
@@ -85,7 +87,7 @@ class UnixLine:
                     self._limit(wait_s)
                 return self._recv(wire.MAX_BYTES)
             if wait_s > 0.0:
-                select.select([self._socket], [], [], wait_s)
+                readable([self._socket], wait_s)
             return self._recv(wire.MAX_BYTES, socket.MSG_DONTWAIT)
         except BlockingIOError:
             return None

@@ -4,6 +4,8 @@ import errno
 import select
 import socket
 import struct
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 
@@ -356,3 +358,43 @@ def test_with_bit_timing_what_drives_sent_is_counted_and_error_frames_are_not(
     counters = serving.hub.counters("r1")
     assert (counters.from_drives, counters.from_clients) == (2, 1)
     serving.close()
+
+
+FULL = """
+import os, resource, sys
+from bridge.can_bus import places
+from bridge.can_bus.hub import Hub
+
+with places.run_folder("full") as folder:
+    hub = Hub(places.listen(folder, ("r1",)))
+    last = os.dup(0)
+    os.close(last)
+    hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    resource.setrlimit(resource.RLIMIT_NOFILE, (last, hard))
+    print(folder / "r1.can", flush=True)
+    hub.serve(30.0)
+    hub.serve(0.0)
+    print(sum(hub.serve(0.01) is None for _ in range(3)), flush=True)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (last + 8, hard))
+    while not hub.clients():
+        hub.serve(30.0)
+    hub.close("done")
+"""
+
+
+def test_a_client_for_which_there_is_no_descriptor_is_told_so_and_the_next_is_taken() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", FULL], stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True
+    )
+    assert process.stdout is not None
+    with process, process.stdout as said:
+        channel = said.readline().strip()
+        with pytest.raises(can.CanInitializationError, match=r"too many open files .*ulimit -n"):
+            can.Bus(interface="fleetloop", channel=channel)
+        assert said.readline() == "3\n"
+        with (
+            can.Bus(interface="fleetloop", channel=channel) as bus,
+            pytest.raises(can.CanOperationError, match="done"),
+        ):
+            bus.recv(10.0)
+        assert process.wait(30) == 0
