@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+from addresses import free_port
 from certificates import certificates
 
 from bridge import access, listening
@@ -15,13 +16,6 @@ from configs.brief import NetworkLink, Outside, TlsFiles
 from configs.errors import InfrastructureError
 
 RUN = "test"
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 import re
 import secrets
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from addresses import free_port, multicast_bus, multicast_goes_nowhere
 from certificates import certificates
 from system.processes import Run
 
@@ -50,12 +50,6 @@ def agents() -> Iterator[list[Agent]]:
     yield started
     for agent in started:
         agent.kill()
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def deployment(folder: Path, scheme: str = "tcp", extra: str = "", name: str = "where") -> Path:
@@ -98,16 +92,6 @@ def test_a_controller_elsewhere_drives_its_robot_to_the_end_of_the_run(tmp_path,
     assert "router" not in run.summary()["notices"]
 
 
-def multicast_goes_nowhere() -> bool:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
-        try:
-            probe.sendto(b"", ("239.74.163.9", 43118))
-        except OSError:
-            return True
-    return False
-
-
 @pytest.mark.skipif(multicast_goes_nowhere(), reason="no route for multicast here")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL, signal.SIGSTOP])
 def test_a_controller_elsewhere_stops_when_the_launcher_does(
@@ -115,8 +99,7 @@ def test_a_controller_elsewhere_stops_when_the_launcher_does(
 ) -> None:
     where = with_password(tmp_path)
     # On a bus that outlives the launcher, as a real one does.
-    multicast = 'interface = "udp_multicast", channel = "239.74.163.9", port = 43117'
-    bus = f"[robot.r2]\nemulated = true\nbus = {{ {multicast}, hop_limit = 0 }}\n"
+    bus = f"[robot.r2]\nemulated = true\n{multicast_bus()}\n"
     where.write_text(where.read_text() + bus)
     agents.append(Agent("r2", where))
     run = start(tmp_path, where)

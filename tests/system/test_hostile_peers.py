@@ -2,7 +2,6 @@
 
 import json
 import re
-import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,6 +10,7 @@ from pathlib import Path
 import msgpack
 import psutil
 import pytest
+from addresses import free_port
 from system.processes import Run
 
 from bridge import access, keys
@@ -44,12 +44,6 @@ class Attacked:
 
     def key(self, of: Callable[[str, str], str], name: str) -> str:
         return of(self.name, name)
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @contextmanager

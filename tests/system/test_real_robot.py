@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from addresses import free_port, multicast_bus, multicast_goes_nowhere
 from snippets import snippets
 from system.processes import Run
-from system.test_elsewhere import free_port, multicast_goes_nowhere
 
 from fleetloop.record.reader import Record
 from fleetloop.testing import EmulatedPlant
@@ -23,7 +23,6 @@ pytestmark = [
     pytest.mark.wall_clock,
     pytest.mark.skipif(multicast_goes_nowhere(), reason="no route for multicast here"),
 ]
-BUS = 'bus = { interface = "udp_multicast", channel = "239.74.163.9", port = 43116, hop_limit = 0 }'
 PERIOD_NS = 10_000_000
 
 
@@ -54,15 +53,15 @@ class Localisation:
 
 
 def test_a_real_robot_and_an_emulated_one_keep_their_formation(tmp_path: Path) -> None:
-    emulated = tmp_path / "hardware.toml"
-    emulated.write_text(f"[robot.r2]\nemulated = true\n{BUS}\n")
+    emulated, bus = tmp_path / "hardware.toml", multicast_bus()
+    emulated.write_text(f"[robot.r2]\nemulated = true\n{bus}\n")
     password, port = secrets.token_hex(8), free_port()
     (tmp_path / "users").write_text(f"localisation:{password}\n")
     (tmp_path / "users").chmod(0o600)
     where = tmp_path / "where.toml"
     where.write_text(
         f'[network]\nendpoint = "tcp/127.0.0.1:{port}"\nusers = "users"\nrun = "lab"\n'
-        f"[robot.r2]\n{BUS}\n"
+        f"[robot.r2]\n{bus}\n"
     )
     with EmulatedPlant("two_robots_100hz", robots=["r2"], deployment=emulated) as hardware:
         run = Run(tmp_path / "run", "two_robots_100hz", "--deployment", str(where))

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import can
 import pytest
+from addresses import free_port
+from certificates import certificates
 from odrive_can import ODriveCAN
 from system.processes import Run, running
-from system.test_elsewhere import certificates, free_port
 
 pytestmark = pytest.mark.system
 

@@ -11,9 +11,10 @@ from pathlib import Path
 
 import can
 import pytest
+from addresses import free_port
+from certificates import certificates
 from snippets import Snippet, snippets
 from system.processes import completed, running
-from system.test_elsewhere import certificates, free_port
 
 pytestmark = pytest.mark.system
 TIMEOUT_S = 60.0
