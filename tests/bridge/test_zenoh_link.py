@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from bridge.session import few_threads
+
 DROPS = """
 import gc, itertools, sys, threading
 from pathlib import Path
@@ -115,3 +117,13 @@ def test_without_ipv4_the_loopback_of_ipv6_serves(tmp_path: Path, first: str, sa
         env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
     )
     assert re.fullmatch(said, done.stdout), done.stderr
+
+
+def test_threads_may_open_their_first_sessions_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("ZENOH_RUNTIME", raising=False)
+    one, other = few_threads("one"), few_threads("other")
+    with one:
+        del os.environ["ZENOH_RUNTIME"]  # the other looked before this one had set it
+        with other:
+            assert os.environ["ZENOH_RUNTIME"] == "other"
+    assert "ZENOH_RUNTIME" not in os.environ
