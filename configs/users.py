@@ -19,5 +19,6 @@ def read_users(path: Path, what: str) -> dict[str, str]:
         raise ScenarioError(f"{what} = {path}: {reason}") from error
     if mode & 0o077:
         raise ScenarioError(f"{what} = {path}: others may read it; chmod 600 {path}")
-    rows = [row.strip().partition(":") for row in text.splitlines() if ":" in row]
-    return {identity: password for identity, _, password in rows}
+    rows = [row.partition(":") for row in text.splitlines() if ":" in row]
+    # Zenoh takes no spaces around a password, and people put one behind a colon.
+    return {identity.strip(): password.strip() for identity, _, password in rows}

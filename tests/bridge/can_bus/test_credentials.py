@@ -83,3 +83,9 @@ def test_a_file_of_passwords_is_ones_own_and_has_ones_line(tmp_path: Path) -> No
         network_of({**TCP, "users": users(tmp_path, mode=0o644)})
     with pytest.raises(ScenarioError, match="no line bench:<password>"):
         network_of({**TCP, "users": users(tmp_path, "boss:x\n")})
+
+
+def test_blanks_around_identities_and_passwords_of_a_file_count_for_nothing(tmp_path: Path) -> None:
+    file = users(tmp_path, " boss : two words \n\nbench:\t0123\r\n")
+    assert network_of({**TCP, "users": file}).password == "123"
+    assert network_of({**TCP, "user": "boss", "users": file}).password == "two words"
