@@ -139,8 +139,8 @@ def trouble_lines(summary: Summary) -> Iterator[str]:
 
 def machine_lines(summary: Summary) -> Iterator[str]:
     """How often launcher and plant stood still; nothing if they didn't, or nobody watched."""
-    machine = summary.get("machine") or {}
-    if machine.get("stalls"):
+    machine = {"stalls": 0, **(summary["machine"] or {})}
+    if machine["stalls"]:
         stops = machine["stopped_and_continued"]
         yield (
             f"MACHINE stalled {machine['stalls']} times, {machine['stalled_s']:.2f} s in all,"

@@ -71,6 +71,33 @@ class _Realtime(BaseModel):
     refused: list[str]
 
 
+class _Stall(BaseModel):
+    t_s: float
+    lasted_s: float
+
+
+class _Machine(BaseModel):
+    """Of the launcher's view all is there or nothing."""
+
+    stalls: int = 0
+    stalled_s: float | None = None
+    longest_stall_s: float | None = None
+    longest_stall_at_s: float | None = None
+    stopped_and_continued: int | None = None
+    plant_stalls: list[_Stall] = []
+
+    @model_validator(mode="after")
+    def _tells_of_its_stalls(self) -> Self:
+        if self.stalls and None in (
+            self.stalled_s,
+            self.longest_stall_s,
+            self.longest_stall_at_s,
+            self.stopped_and_continued,
+        ):
+            raise ValueError("stalls without how long and when")
+        return self
+
+
 class _Summary(BaseModel):
     verdict: str
     reason: str
@@ -96,6 +123,7 @@ class _Summary(BaseModel):
     bus_troubles: dict[str, str]
     cpu_s: dict[str, float]
     realtime: _Realtime | None
+    machine: _Machine | None
     seed: int
     versions: dict[str, str]
 

@@ -91,6 +91,14 @@ def test_whatever_is_read_can_be_shown(finished_run: Path, folder: Path) -> None
         "cpu_percent_of_one_core": 90.0,
         "refused": ["SCHED_FIFO"],
     }
+    summary["machine"] = {
+        "stalls": 1,
+        "stalled_s": 0.7,
+        "longest_stall_s": 0.7,
+        "longest_stall_at_s": 1.0,
+        "stopped_and_continued": 1,
+        "plant_stalls": [{"t_s": 1.0, "lasted_s": 0.7}],
+    }
     record, scenario = Record.open(finished_run / "record.mcap"), load("two_robots")
     refused = 0
     for at in paths(summary):
