@@ -105,16 +105,17 @@ def _check(
         problems = complaints(error, data)
         if (rest := salvage(error, data)) is not None:
             problems += filter(rest.believes, cross_problems(rest.scenario))
-    found += [_blamed(name, problem, overrides) for problem in problems]
+    found += [blamed(name, problem, overrides) for problem in problems]
     if found or scenario is None:
         raise refusal(found)
     return scenario
 
 
-def _blamed(name: str, problem: Problem, overrides: Sequence[Override]) -> Complaint:
+def blamed(name: str, problem: Problem, overrides: Sequence[str | Override]) -> Complaint:
     """A problem with whom it is to be blamed on: the last option that set the key, or the file."""
-    for override in reversed(overrides):
-        if override.is_about(problem.key):
+    for text in reversed(overrides):
+        override = Override.from_set(text) if isinstance(text, str) else text
+        if isinstance(override, Override) and override.is_about(problem.key):
             key = "" if problem.key == override.key else problem.key
             return Complaint(override.option, key, problem.value, problem.right)
     return Complaint(name, *problem)

@@ -86,7 +86,7 @@ def _find(
     source: str, overrides: Overrides, deployment: Path | None
 ) -> tuple[Scenario, list[Finding]]:
     scenario = load(source, overrides)
-    found = examine(source, scenario)
+    found = examine(source, scenario, overrides)
     if worst(found) != "error":
         found += rehearse(scenario)
     if deployment is not None:

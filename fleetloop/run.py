@@ -80,7 +80,7 @@ def run_scenario(source: str, options: Options) -> int:
         note(long)
     for line in out_of_reach(scenario):
         note(f"{scenario.name}: {line}")
-    _look_ahead(source, scenario, force=options.force)
+    _look_ahead(source, scenario, options)
     started = datetime.now(UTC).astimezone()
     created = run_folder.create(scenario.name, options.out, now=started)
     folder = created.path
@@ -126,16 +126,17 @@ def run_scenario(source: str, options: Options) -> int:
     return _finish(scenario, folder, stats, options)
 
 
-def _look_ahead(source: str, scenario: Scenario, *, force: bool) -> None:
+def _look_ahead(source: str, scenario: Scenario, options: Options) -> None:
     """Say what `fleetloop check` has against a scenario, but for its rehearsal: here is the run.
 
     Raises:
         ScenarioError: it has an error against it.
     """
-    found = [finding for finding in examine(source, scenario) if finding.level != "ok"]
+    examined = examine(source, scenario, options.overrides)
+    found = [finding for finding in examined if finding.level != "ok"]
     for finding in likewise(found):
         note(f"{finding.level}: {titled(finding)}: {finding.text}")
-    if worst(found) == "error" and not force:
+    if worst(found) == "error" and not options.force:
         raise ScenarioError(f"{source}: would not work as it is; --force runs it all the same")
 
 

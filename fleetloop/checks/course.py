@@ -17,7 +17,9 @@ from agents.paths import RobotPath, robot_path
 from configs.brief import WorldOffset
 from configs.briefing import formation_offset, reference_path
 from configs.complaints import refusal
-from configs.errors import Complaint
+from configs.cross_checks import Problem
+from configs.loading import blamed
+from configs.overrides import Overrides
 from configs.scenario import Scenario
 from configs.sections import Robot
 from fleetloop.checks.coordination import Forecast
@@ -62,8 +64,12 @@ def path_of(scenario: Scenario, robot: Robot) -> RobotPath:
     return robot_path(reference_path(scenario.path), formation_offset(robot.offset))
 
 
-def refuse_irregular(source: str, scenario: Scenario, ahead: Forecast) -> None:
+def refuse_irregular(
+    source: str, scenario: Scenario, ahead: Forecast, overrides: Overrides = ()
+) -> None:
     """Refuse a scenario in which a robot's path stands still somewhere on its way.
+
+    Whoever set the key is blamed: the file `source`, or one of the options `overrides`.
 
     Raises:
         ScenarioError: naming robots, keys and places.
@@ -75,7 +81,7 @@ def refuse_irregular(source: str, scenario: Scenario, ahead: Forecast) -> None:
         places = np.linspace(first, last, count).tolist()
         at, slowest = slowest_place(path_of(scenario, robot), places)
         if slowest < STANDS_STILL:
-            problems.append(_irregular(source, scenario, robot, at))
+            problems.append(blamed(source, _irregular(scenario, robot, at), overrides))
     if problems:
         raise refusal(problems)
 
@@ -111,7 +117,7 @@ def slowest_place(path: RobotPath, places: Sequence[float]) -> tuple[float, floa
     return best
 
 
-def _irregular(source: str, scenario: Scenario, robot: Robot, at: float) -> Complaint:
+def _irregular(scenario: Scenario, robot: Robot, at: float) -> Problem:
     """What to change: the offset, unless the centre's own path stands still there."""
     law = "the law wants v̄_d > 0 everywhere (Assumption 2.4)"
     centre = robot_path(reference_path(scenario.path), WorldOffset(0.0, 0.0))
@@ -120,8 +126,8 @@ def _irregular(source: str, scenario: Scenario, robot: Robot, at: float) -> Comp
         right = f"the path stands still at s = {at:.4g} m; {law}"
         if scenario.path.kind == "spline":
             value: object = scenario.path.points_m
-            return Complaint(source, "path.points_m", value, f"{right}: don't turn back on a point")
-        return Complaint(source, "path", scenario.path.model_dump(), right)
+            return Problem("path.points_m", value, f"{right}: don't turn back on a point")
+        return Problem("path", scenario.path.model_dump(), right)
     turn = abs(centre(at).omega_bar)
     right = f"{robot.name}'s path stands still at s = {at:.4g} m; {law}"
     if turn > 0.0:
@@ -130,8 +136,8 @@ def _irregular(source: str, scenario: Scenario, robot: Robot, at: float) -> Comp
     kind = offset.pop("kind")
     if kind == "structure":
         key = f"robot.{robot.name}.offset.left_m"
-        return Complaint(source, key, offset["left_m"], right)
-    return Complaint(source, f"robot.{robot.name}.offset", offset, right)
+        return Problem(key, offset["left_m"], right)
+    return Problem(f"robot.{robot.name}.offset", offset, right)
 
 
 def _speed_and_heading(path: RobotPath, s: float) -> tuple[float, float]:

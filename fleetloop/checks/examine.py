@@ -1,6 +1,7 @@
 """All checks of a scenario in order."""
 
 from configs.briefing import robot_briefs
+from configs.overrides import Overrides
 from configs.scenario import Scenario
 from fleetloop.bus_load import bus_findings
 from fleetloop.checks.coordination import forecast
@@ -12,14 +13,16 @@ from fleetloop.checks.start import start_findings
 from fleetloop.checks.torque import torque_findings
 
 
-def examine(source: str, scenario: Scenario) -> list[Finding]:
-    """All that follows from a valid scenario without running it; `source` names its file.
+def examine(source: str, scenario: Scenario, overrides: Overrides = ()) -> list[Finding]:
+    """All that follows from a valid scenario without running it.
+
+    `source` names its file, `overrides` are what options set in it.
 
     Raises:
         ScenarioError: a robot's path isn't regular.
     """
     ahead = forecast(scenario)
-    refuse_irregular(source, scenario, ahead)
+    refuse_irregular(source, scenario, ahead, overrides)
     along = courses(scenario, ahead)
     return alike(
         [

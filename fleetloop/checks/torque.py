@@ -17,7 +17,7 @@ Where need exceeds it, only a part f < 1 of the speed is kept up; the robot fall
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import inf, pi, sqrt
+from math import inf, log1p, pi, sqrt
 
 import numpy as np
 
@@ -172,7 +172,7 @@ def _torque(scenario: Scenario, course: Course, need: Need, bounds: list[Limit])
         level, words = "warning", f"{words}; keep twice the need: change {limit.key}"
     if ratios[tightest] < 1.0:
         words = f"{said}, gets {given:.3g} N·m, {limit.words}: change {limit.key}, or go slower"
-        if limit.speed_m_s < inf:
+        if limit.speed_m_s < asked_m_s:
             words += f" (it allows {limit.speed_m_s:.3g} m/s of {asked_m_s:.3g})"
         if behind[-1] > BEHIND_M:
             level = "error"
@@ -199,25 +199,62 @@ def _behind(scenario: Scenario, course: Course, need: Need, bounds: list[Limit])
 
 
 def _heat(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:
-    """Steady windings, R i² R_th above ambient, against where drives begin to derate."""
+    """When windings or FETs, R i² R_th above ambient, are where drives begin to derate.
+
+    Derating then holds them where (5) meets the heat that is left of the current.
+
+        i = i_max (T_to − T) / (T_to − T_from),  T = T_ambient + R R_th i²              (5)
+    """
     drive, motor = scenario.drive, scenario.motor
     if drive.preset != "realistic":
         return
     gear = scenario.mounting_of(course.robot).gear_ratio
     constant = motor.torque_constant_N_m_A or drive.torque_constant_N_m_A
-    amps = np.abs(need.torque_N_m) / gear / constant
+    # What limits don't let through makes no heat.
+    most_A = min(limit.torque_N_m for limit in limits(scenario, course.robot)) / gear / constant
+    amps = np.minimum(np.abs(need.torque_N_m) / gear / constant, most_A)
     square = float((amps**2).mean(axis=0).max())
-    rise = motor.motor_thermal_resistance_K_W * motor.winding_resistance_ohm * square
-    hot = motor.ambient_C + rise
-    if hot > drive.derate_from_C:
-        yield Finding(
-            "warning",
-            "motor temperature",
-            f"{sqrt(square):.3g} A rms take the windings to {hot:.0f} °C in some"
-            f" {motor.motor_thermal_time_s:g} s; derating begins at {drive.derate_from_C:g} °C",
-            (course.robot.name,),
-            "mounting.gear_ratio",
+    allowed_K = drive.derate_from_C - motor.ambient_C
+    parts = [
+        (*_warm_up_s(per_A2 * square, allowed_K, time_s), per_A2, part)
+        for part, per_A2, time_s in (
+            (
+                "windings",
+                motor.motor_thermal_resistance_K_W * motor.winding_resistance_ohm,
+                motor.motor_thermal_time_s,
+            ),
+            (
+                "FETs",
+                motor.fet_thermal_resistance_K_W * motor.fet_resistance_ohm,
+                motor.fet_thermal_time_s,
+            ),
         )
+    ]
+    after_s, rise_K, per_A2, part = min(parts)
+    if after_s == inf:
+        return
+    span_K = drive.derate_to_C - drive.derate_from_C
+    slope = span_K / drive.current_limit_A
+    above_K = drive.derate_to_C - motor.ambient_C
+    left_A = (sqrt(slope**2 + 4.0 * per_A2 * max(above_K, 0.0)) - slope) / (2.0 * per_A2)
+    text = (
+        f"{sqrt(square):.3g} A rms take the {part} to {drive.derate_from_C:g} °C, where derating"
+        f" begins, after {after_s:.2g} s, and would to {motor.ambient_C + rise_K:.0f} °C; it leaves"
+        f" {gear * constant * left_A:.3g} N·m in the long run"
+    )
+    title, robots = "motor temperature", (course.robot.name,)
+    if after_s > scenario.ends_at_s:
+        yield Finding("ok", title, f"{text}, not in these {scenario.ends_at_s:g} s", robots)
+    else:
+        remedy = "a larger mounting.gear_ratio or cooler motors, or a shorter run"
+        yield Finding("warning", title, f"{text}: {remedy}", robots, "mounting.gear_ratio")
+
+
+def _warm_up_s(rise_K: float, allowed_K: float, time_s: float) -> tuple[float, float]:
+    """(time to `allowed_K` on the way to `rise_K`, infinite if never; `rise_K`)."""
+    if rise_K <= allowed_K:
+        return inf, rise_K
+    return -time_s * log1p(-max(allowed_K, 0.0) / rise_K), rise_K
 
 
 def _slew(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:

@@ -27,6 +27,14 @@ def test_an_offset_to_the_centre_of_a_circle_is_refused_by_name() -> None:
         refuse(CIRCLE + ROBOT.format(offset))
 
 
+def test_an_option_that_moves_a_robot_to_the_centre_is_blamed() -> None:
+    text = CIRCLE + ROBOT.format('{ kind = "structure", left_m = 1.0 }')
+    overrides = ("path.radius_m=3", "robot.r1.offset.left_m=3")
+    scenario = loads("file.toml", text, overrides)
+    with pytest.raises(ScenarioError, match=r"^--set robot.r1.offset.left_m=3: r1's path stands"):
+        refuse_irregular("file.toml", scenario, forecast(scenario), overrides)
+
+
 @pytest.mark.parametrize("left_m", [-5.0, 0.0, 1.9, 2.1, 5.0])
 def test_other_offsets_on_a_circle_are_regular(left_m: float) -> None:
     refuse(CIRCLE + ROBOT.format(f'{{ kind = "structure", left_m = {left_m} }}'))

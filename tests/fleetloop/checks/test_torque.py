@@ -25,9 +25,13 @@ LIMITED = "drive = { preset = 'limited', velocity_limit_rev_s = 1000.0, current_
 
 
 def scenario_of(*lines: str, path: str = '{ kind = "line" }', law: str = "") -> Scenario:
+    return loads("file.toml", scenario_text(*lines, path=path, law=law))
+
+
+def scenario_text(*lines: str, path: str = '{ kind = "line" }', law: str = "") -> str:
     text = FILE.replace('path = { kind = "line" }', f"path = {path}")
     text = text.replace("k4 = 0.18", f"k4 = 0.18{law}")
-    return loads("file.toml", text + "\n".join(lines))
+    return text + "\n".join(lines)
 
 
 def finding_of(scenario: Scenario) -> Finding:
@@ -119,9 +123,14 @@ def test_supply_and_limiter_take_from_the_torque_as_the_shaft_speeds_up() -> Non
     assert supply.torque_N_m == pytest.approx(2.0 * 0.05 * np.sqrt(0.75) * 24.0 / 0.22)
 
 
-def test_motors_that_grow_too_hot_in_the_long_run_are_warned_of() -> None:
-    hot = scenario_of(
-        "drive = { preset = 'realistic', current_limit_A = 12.0 }", law=", torque_limit_N_m = 1.0"
-    )
-    found = list(torque_findings(hot, courses(hot, forecast(hot))))
-    assert any(finding.title == "motor temperature" for finding in found)
+@pytest.mark.parametrize(("duration_s", "level"), [("20.0", "ok"), ("60.0", "warning")])
+def test_motors_that_grow_too_hot_before_the_end_are_warned_of(duration_s: str, level: str) -> None:
+    # 0.308 N·m at 0.05 N·m/A, 15 K/W × 0.3 Ω: 171 K in all, the first 75 K after 35 s.
+    text = scenario_text("drive = { preset = 'realistic' }\nmotor.winding_resistance_ohm = 0.3\n")
+    hot = loads("file.toml", text.replace("duration_s = 20.0", f"duration_s = {duration_s}"))
+    found = torque_findings(hot, courses(hot, forecast(hot)))
+    (finding,) = [finding for finding in found if finding.title == "motor temperature"]
+    assert finding.level == level
+    assert "to 100 °C, where derating begins, after 35 s" in finding.text
+    # 10 A (120 − T) / 20 K meets T = 25 + 4.5 i² at 4.38 A.
+    assert "leaves 0.219 N·m" in finding.text
