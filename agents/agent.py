@@ -85,6 +85,8 @@ class Agent:
         self._encoders = EncoderCheck(brief.host.encoder_mismatch_limit_rad, self._h)
         fused = brief.localisation == "fused"
         self._pose_mismatch_m = brief.host.pose_mismatch_limit_m if fused else inf
+        self.last_tick = brief.schedule.ticks
+        """The closing tick: of the scenario, or of a run that ends before it."""
         self.closed = False
         """Whether the closing tick has come."""
         self.late_s = self.round_trip_s = 0.0
@@ -181,7 +183,7 @@ class Agent:
             sense = self._take_newest(tick, sense)
         elif self._schedule.owes(tick):
             sense = self._take_due(tick, sense)
-        if tick >= self._schedule.ticks:
+        if tick >= self.last_tick:
             self.closed = True
             return self._guard.leave()
         if not self._guard.begun:

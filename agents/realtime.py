@@ -108,7 +108,10 @@ class RealtimeLoop:
         return None
 
     def _epoch_ns(self, payload: bytes) -> int | None:
-        """When tick 0 is by this machine's monotonic clock, None if that can't be."""
+        """When tick 0 is by this machine's monotonic clock, None if that can't be.
+
+        A run may end before its scenario: this controller then ends with it.
+        """
         refusals = self._agent.admission.refusals
         go = Go.decode(payload)
         if go is None:
@@ -118,6 +121,7 @@ class RealtimeLoop:
         if far := implausible_start(epoch_ns, self._schedule.longest_start_s):
             refusals.note("go", LAUNCHER, "clocks", far)
             return None
+        self._agent.last_tick = min(self._schedule.ticks, max(go.ticks, 0))
         return epoch_ns
 
     def run(self, epoch_ns: int, stop: Stop) -> None:

@@ -233,16 +233,17 @@ class Go(NamedTuple):
     """Everybody is ready; in real time, tick 0 is at this reading of the wall clock."""
 
     epoch_ns: int
+    ticks: int  # of the run
 
     def encode(self) -> bytes:
         """Bytes for the wire."""
-        return _pack((VERSION, self.epoch_ns))
+        return _pack((VERSION, *self))
 
     @classmethod
     def decode(cls, payload: bytes) -> "Go | None":
         """The message in the bytes, None if there is none."""
-        fields = _unpack(payload, 2)
-        return cls(fields[1]) if fields is not None and _ints(fields[1:]) else None
+        fields = _unpack(payload, 3)
+        return cls(*fields[1:]) if fields is not None and _ints(fields[1:]) else None
 
 
 def printable(text: str) -> str:

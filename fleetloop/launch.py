@@ -223,7 +223,8 @@ class ProcessRun:
                 )
             if ready and not gone:
                 gone = True
-                hellos.add(go, Go(wall_of(time.monotonic_ns() + countdown_ns)).encode())
+                epoch_ns = wall_of(time.monotonic_ns() + countdown_ns)
+                hellos.add(go, Go(epoch_ns, ticks.ticks).encode())
             self._take(link.receive(min(hellos.say(), WATCH_EVERY_S)))
             self._tell_refusals(link)
         return None

@@ -55,7 +55,7 @@ def test_progress_survives_the_wire(progress: Progress) -> None:
 def test_a_report_and_a_go_survive_the_wire() -> None:
     report = Report({"ticks": 3, "stopped": "because", "share": 0.5})
     assert Report.decode(report.encode()) == report
-    assert Go.decode(Go(5).encode()) == Go(5)
+    assert Go.decode(Go(5, 400).encode()) == Go(5, 400)
 
 
 def test_a_path_state_is_a_msgpack_array_that_begins_with_its_version() -> None:
