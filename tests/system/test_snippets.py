@@ -104,7 +104,7 @@ def test_an_example_of_the_fixture_passes(snippet: Snippet, tmp_path: Path) -> N
 
 
 def test_recordings_are_read_as_shown(tmp_path: Path) -> None:
-    run = ("two_robots", "--in-process", "--duration", "0.2")
+    run = ("two_robots", "--in-process", "--duration", "0.2", "--allow-unchecked")
     assert completed(tmp_path / "run", *run)[0] == 0
     (block,) = (s for s in snippets("sh") if "can.player" in s.text)
     lines = [line.partition(" #")[0].split() for line in block.text.splitlines()]
