@@ -19,12 +19,14 @@ _KEY = "[key]"  # pydantic's mark for what is wrong with a key rather than its v
 
 _WORDS = {
     "missing": "must be given",
-    "greater_than": "must be greater than {gt:g}",
-    "greater_than_equal": "must be {ge:g} or more",
-    "less_than": "must be less than {lt:g}",
-    "less_than_equal": "must be {le:g} or less",
+    "greater_than": "must be greater than {gt}",
+    "greater_than_equal": "must be {ge} or more",
+    "less_than": "must be less than {lt}",
+    "less_than_equal": "must be {le} or less",
     "finite_number": "must be a finite number",
     "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "int_parsing": "must be a whole number",
     "int_type": "must be a whole number",
     "int_from_float": "must be a whole number",
     "int_parsing_size": "is too large",
@@ -69,7 +71,12 @@ def complaints(
     error: ValidationError, data: dict[str, Any], model: type[BaseModel] = Scenario
 ) -> list[Problem]:
     """All that pydantic has against the parsed file `data`, which should be a `model`."""
-    return [_problem(dict(item), data, model) for item in error.errors(include_url=False)]
+    return [_problem(dict(item), data, model) for item in _errors(error)]
+
+
+def in_words(error: ValidationError) -> str:
+    """What pydantic has against one value, in our words."""
+    return _right(error.errors(include_url=False)[0])
 
 
 class Salvage(NamedTuple):
@@ -92,13 +99,22 @@ def salvage(error: ValidationError, data: dict[str, Any]) -> Salvage | None:
     for _ in range(_ROUNDS):
         if found is None:
             break
-        for item in found.errors(include_url=False):
+        for item in _errors(found):
             lost |= _repair(rest, item)
         try:
             return Salvage(Scenario.model_validate(rest), tuple(lost))
         except ValidationError as more:
             found = more
     return None
+
+
+def _errors(error: ValidationError) -> list[dict[str, Any]]:
+    """Without lists that are called too short only because of what is wrong in their entries."""
+    return [
+        dict(item)
+        for item in error.errors(include_url=False)
+        if item["type"] != "too_short" or len(item["input"]) < item["ctx"]["min_length"]
+    ]
 
 
 def _repair(data: dict[str, Any], item: Mapping[str, Any]) -> set[str]:
@@ -164,7 +180,7 @@ def _problem(item: dict[str, Any], data: dict[str, Any], model: type[BaseModel])
 
 def _unknown(loc: Sequence[int | str], model: type[BaseModel]) -> str:
     known = _known_keys(loc[:-1], model)
-    close = difflib.get_close_matches(str(loc[-1]), known, 1, cutoff=0.5)
+    close = difflib.get_close_matches(str(loc[-1]), known, 1)
     hint = f"; did you mean {close[0]}?" if close else ""
     return f"unknown key{hint} (known here: {', '.join(known)})" if known else "unknown key"
 
@@ -211,7 +227,8 @@ def _right(item: Mapping[str, Any]) -> str:
         return str(about["error"])
     if kind == "string_pattern_mismatch":
         return WORDS.get(about["pattern"], f"must match {about['pattern']}")
-    return _WORDS.get(kind, "is of the wrong kind").format(**about)
+    shown = {k: f"{v:g}" if isinstance(v, float) else v for k, v in about.items()}
+    return _WORDS.get(kind, "is of the wrong kind").format(**shown)
 
 
 def _shown(value: object) -> str:

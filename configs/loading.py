@@ -80,15 +80,17 @@ def _read(source: str) -> tuple[str, str]:
     path = Path(source)
     try:
         return str(path), path.read_text("utf-8")
-    except (FileNotFoundError, IsADirectoryError) as error:
+    except FileNotFoundError as error:
         close = difflib.get_close_matches(source, shipped(), 1)
         hint = f" (did you mean {close[0]}?)" if close else ""
         raise ScenarioError(
             f"{source}: no such file, and no shipped scenario of that name{hint};"
             f" shipped: {', '.join(shipped())}"
         ) from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{source}: can't be read: {error}") from error
+    except UnicodeDecodeError as error:
+        raise ScenarioError(f"{source}: not a TOML file: no text in UTF-8") from error
+    except OSError as error:
+        raise ScenarioError(f"{source}: can't be read: {error.strerror or error}") from error
 
 
 # --- check ----------------------------------------------------------------------------------------

@@ -56,6 +56,7 @@ class Override(NamedTuple):
             holder[last] = self.value
         elif isinstance(holder, list) and (at := _find(holder, last)) is not None:
             holder[at] = self.value
+            last = _names(holder)[at]  # what is no table any more has lost its name
         else:
             return self._complain(f"{last} names nothing there")
         return self._replace(key=".".join([*names, last]))

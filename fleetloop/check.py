@@ -56,7 +56,7 @@ def _table(scenario: Scenario, findings: Sequence[Finding]) -> Table:
     """A row for each; what is well differs in numbers only, so there one robot stands for all."""
     graph = scenario.topology
     table = Table(
-        title=f"{scenario.name}: {len(graph.robots)} robots, {len(graph.edges)} edges",
+        title=f"{scenario.name}: robots {len(graph.robots)}, edges {len(graph.edges)}",
         show_header=False,
         box=None,
         padding=(0, 1),

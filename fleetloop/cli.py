@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     name="fleetloop",
+    cls=numbers.OurWords,
     help="Run cooperating differential-drive robots in emulation: one controller process per robot,"
     " Zenoh between them, a python-can bus to emulated drives.",
     epilog="Start with: fleetloop run paper",
@@ -184,9 +185,9 @@ def agent(
 def plant(
     scenario: ScenarioArg,
     robots: Annotated[
-        str,
-        typer.Option(metavar="R1,R2", help="Only these robots; all that are emulated if not given"),
-    ] = "",
+        str | None,
+        typer.Option(metavar="R1,R2", help="Only these robots; else all that are emulated."),
+    ] = None,
     duration: Annotated[
         float | None,
         typer.Option(
@@ -219,7 +220,7 @@ def plant(
 
     _refuse_lockstep(clock)
     options = Options(
-        robots=tuple(filter(None, robots.split(","))),
+        robots=_listed("--robots", robots),
         duration_s=duration,
         deployment=deployment,
         overrides=_changes(overrides, clock=clock, seed=seed),
@@ -277,14 +278,16 @@ def export(
         Path, typer.Argument(metavar="FILE.csv|FILE.npz", help="What to write; the ending decides.")
     ],
     signals: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="NAME,NAME",
             help="Only these signals, in this order, after t_s and robot; 'all' for every recorded"
             " one. Else truth, path variable, errors, torques.",
         ),
-    ] = "",
-    robots: Annotated[str, typer.Option(metavar="R1,R2", help="Only these robots; else all.")] = "",
+    ] = None,
+    robots: Annotated[
+        str | None, typer.Option(metavar="R1,R2", help="Only these robots; else all.")
+    ] = None,
     from_s: Annotated[
         float | None,
         typer.Option(
@@ -312,8 +315,8 @@ def export(
     from fleetloop.terminal import say
 
     chosen = Selection(
-        signals=tuple(filter(None, map(str.strip, signals.split(",")))),
-        robots=tuple(filter(None, map(str.strip, robots.split(",")))),
+        signals=_listed("--signals", signals),
+        robots=_listed("--robots", robots),
         from_s=from_s,
         to_s=to_s,
     )
@@ -344,6 +347,14 @@ def init(
     from fleetloop.init import write_starter
 
     write_starter(file)
+
+
+def _listed(option: str, text: str | None) -> tuple[str, ...]:
+    """Names with commas between; none if the option wasn't given."""
+    names = tuple(filter(None, map(str.strip, (text or "").split(","))))
+    if text is not None and not names:
+        raise ScenarioError(f"{option} {text!r}: names nothing; leave it out for all")
+    return names
 
 
 def _changes(

@@ -50,7 +50,7 @@ def judge(expect: Expect, record: Record, scenario: Scenario) -> Judged:
         found |= {"min": float(values.min()), "max": float(values.max())}
         held = _within(expect, values, found)
         judged |= {"held": held if whole or not held else None, "found": found}
-    return judged if judged["held"] is not None else judged | {"seen_to_s": seen_to_s}
+    return judged if judged["held"] is not None else judged | {"seen_to_s": round(seen_to_s, 9)}
 
 
 def verdict(expected: Sequence[Judged], *, stopped: bool, cut_short: bool) -> str:

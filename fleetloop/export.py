@@ -85,6 +85,8 @@ class Selection:
         """
         from_s = 0.0 if self.from_s is None else self.from_s
         to_s = np.inf if self.to_s is None else self.to_s
+        if from_s > to_s:
+            raise ScenarioError(f"--from {from_s:g}: must not be after --to {to_s:g}")
         chosen: np.ndarray = (t_s >= from_s) & (t_s <= to_s)
         if not chosen.any() and (self.from_s is not None or self.to_s is not None):
             asked = [f"--from {from_s:g}"] if self.from_s is not None else []

@@ -93,7 +93,10 @@ def graph(_: Record, scenario: Scenario) -> Figure:
             connectionstyle="arc3,rad=0.15" if dash == "solid" else "arc3",
         )
     axes.set_title(f"Directed graph of {scenario.name}: arrows from who speaks to who hears")
-    axes.margins(0.15)
+    heights = [float(place[1]) for place in places.values()]
+    room = 0.3 * max(max(heights) - min(heights), 0.5)  # for nodes and bent arrows
+    axes.set_ylim(min(heights) - room, max(heights) + room)
+    axes.margins(x=0.15)
     axes.set_axis_off()
     return figure
 

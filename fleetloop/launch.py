@@ -383,13 +383,18 @@ class ProcessRun:
             if (notice := self._words.notice(process, arrival.payload)) is not None:
                 self._tell(self.outcome.said.setdefault(process, []), process, notice.text)
         else:
-            if (report := self._words.report(process, arrival.payload)) is not None:
-                self._vitals.end(process)
-                self.outcome.reports[process] = report
-                self._elsewhere.note_report(process, report)
-            for child in self._children:
-                if child.name == process:
-                    child.release()
+            self._take_report(process, arrival.payload)
+
+    def _take_report(self, process: str, payload: bytes) -> None:
+        if (report := self._words.report(process, payload)) is not None:
+            self._vitals.end(process)
+            self.outcome.reports[process] = report
+            self._elsewhere.note_report(process, report)
+            if (early := report.values.get("early")) and self.outcome.ended == "completed":
+                self._on_notice(process, f"left the run early: {early}")
+        for child in self._children:
+            if child.name == process:
+                child.release()
 
     # --- end ---------------------------------------------------------------------------------
 
@@ -447,8 +452,13 @@ class ProcessRun:
         elif failure is not None:
             outcome.ended, outcome.reason = "aborted", failure.text
             outcome.timed = not failure.unexpected
-            if failure.rank >= GAVE_UP and (stall := self._machine.lately(self._limit_s() + 1.0)):
+            if failure.rank < GAVE_UP:
+                return
+            if stall := self._machine.lately(self._limit_s() + 1.0):
                 outcome.reason = f"{stall}; {failure.text}"
+            elif left := [name for name, it in outcome.reports.items() if it.values.get("early")]:
+                early = outcome.reports[left[0]].values["early"]
+                outcome.reason = f"{left[0]}: left the run early: {early}; {failure.text}"
 
     def _complete_record(self) -> None:
         """Give the record the end that its writer didn't."""

@@ -1,13 +1,33 @@
-"""Numbers on the command line: within bounds, told in the words of this program."""
+"""Values of options: within bounds, told in the words of this program."""
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import typer
+from typer.core import TyperGroup
 
 LONGEST_S = 1e9
 FASTEST, SLOWEST = 1e6, 1e-6
 """Multiples of real time."""
+
+
+class OurWords(TyperGroup):
+    """Verbs whose options say in our words why a value is none, whatever has read it."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a verb."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            from pydantic import ValidationError
+
+            from configs.complaints import in_words
+
+            if isinstance(cause := error.__cause__, ValidationError):
+                value = cause.errors(include_url=False)[0]["input"]
+                error.message = f"{value}: {in_words(cause)}."
+            raise
 
 
 def between(least: float, most: float) -> Callable[[float | None], float | None]:

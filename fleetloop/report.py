@@ -19,6 +19,7 @@ from fleetloop.figures import Captioned, all_figures
 from fleetloop.record.reader import Record
 from fleetloop.results import (
     claim,
+    final_line,
     mark,
     realtime_lines,
     robot_header,
@@ -96,8 +97,8 @@ def _page(
         verdict_class=summary["verdict"].replace(" ", "-"),
         reason=escape(summary["reason"]),
         troubles=_list(trouble_lines(summary)),
-        robots=_table(robot_header(summary), robot_rows(summary)),
-        spread=escape(spread_line(summary)),
+        robots=_table(robot_header(), robot_rows(summary)),
+        spread=escape(f"{final_line(summary)}. {spread_line(summary)}"),
         expectations=_table(
             ("", "expectation"), ((mark(item), claim(item)) for item in summary["expectations"])
         ),
@@ -139,8 +140,8 @@ def _list(lines: Iterable[str]) -> str:
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
     css = ' class="text"' if len(header) == 2 else ""
+    head = "".join(f"<th{css}>{escape(cell)}</th>" for cell in header)
     lines = ("".join(f"<td{css}>{escape(cell)}</td>" for cell in row) for row in rows)
     body = "".join(f"<tr>{line}</tr>" for line in lines)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

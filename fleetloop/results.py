@@ -19,6 +19,8 @@ _RULE = box.Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
 """`box.SIMPLE_HEAD` in ASCII."""
 HOLDS_PERCENT = 2.0
 """More misses than this, and the machine is said not to hold the rate."""
+EARLY_S = 0.05
+"""A robot whose rows end so long before the run's took part in a part of it [s]."""
 _SYMBOLS = {"x_e_m": ("x_e", "m"), "y_e_m": ("y_e", "m"), "theta_e_rad": ("θ_e", "rad")}
 
 
@@ -31,12 +33,8 @@ def print_results(summary: Summary, folder: Path) -> None:
 
     if summary["robots"]:
         title = f"{summary['scenario']}: path following, {summary['mode']}"
-        table = Table(
-            title=title,
-            box=_RULE if console.options.ascii_only else box.SIMPLE_HEAD,
-            pad_edge=False,
-        )
-        first, *others = robot_header(summary, break_lines=True)
+        table = Table(title=title, box=_rules(), padding=(0, 1, 0, 0), pad_edge=False)
+        first, *others = robot_header(break_lines=True)
         table.add_column(first, no_wrap=True)
         for header in others:
             table.add_column(escape(header), justify="right", no_wrap=True)
@@ -44,7 +42,8 @@ def print_results(summary: Summary, folder: Path) -> None:
             if row[0] == "worst":
                 table.add_section()
             table.add_row(*row)
-        console.print(table)
+        console.print_whole(table)
+        line(final_line(summary))
         line(spread_line(summary))
     for expect in summary["expectations"]:
         line(f"{mark(expect):<11}  {claim(expect)}")
@@ -58,7 +57,7 @@ def print_results(summary: Summary, folder: Path) -> None:
             f" overruns {summary['overruns']})"
         )
     if summary["profile_us_per_tick"]:
-        console.print(_profile(summary["profile_us_per_tick"]))
+        console.print_whole(_profile(summary["profile_us_per_tick"]))
     for text in realtime_lines(summary):
         line(text)
     reason = f": {summary['reason']}" if summary["reason"] else ""
@@ -88,38 +87,45 @@ def _profile(profile: dict[str, dict[str, float]]) -> Table:
     return table
 
 
-def robot_header(summary: Summary, *, break_lines: bool = False) -> list[str]:
+def robot_header(*, break_lines: bool = False) -> list[str]:
     """Headers of `robot_rows`."""
     gap = "\n" if break_lines else " "
     settled = [f"{_SYMBOLS[name][0]}{gap}settled" for name in ERRORS]
-    when = f"last {_final_s(summary):g} s"
-    final = [f"{_SYMBOLS[name][0]} [{_SYMBOLS[name][1]}]{gap}{when}" for name in ERRORS]
+    final = [f"{_SYMBOLS[name][0]} [{_SYMBOLS[name][1]}]{gap}final" for name in ERRORS]
     return ["robot", *settled, *final, f"τ [N·m]{gap}peak"]
 
 
 def robot_rows(summary: Summary) -> Iterator[list[str]]:
-    """A row per robot; with several, a last one named worst."""
+    """A row per robot, with its end if it was early; with several robots a last one, worst."""
     for robot, values in summary["robots"].items():
-        yield [robot, *_cells(values)]
+        yield [robot + _early(summary, values, " to"), *_cells(values)]
     if len(summary["robots"]) > 1:
         yield ["worst", *_cells(summary["worst"])]
 
 
+def final_line(summary: Summary) -> str:
+    """What is called final."""
+    return f"final: the greatest of a robot's last {min(FINAL_S, summary['simulated_s']):g} s"
+
+
 def spread_line(summary: Summary) -> str:
-    """The spread of the path variables in one line."""
+    """The spread of the path variables in one line; it ends with the first robot that ends."""
     spread = summary["s_spread"]
-    if spread is None:
+    if spread is None or not summary["robots"]:
         return ""
+    first = min(summary["robots"].values(), key=lambda values: values["ticks"])
     return (
-        f"spread of s: peak {_number(spread['peak'], '.4f')} m,"
+        f"spread of s{_early(summary, first, ' up to')}: peak {_number(spread['peak'], '.4f')} m,"
         f" settled {_time(spread['settle_s'])},"
-        f" at most {_number(spread['final'], '.2e')} m in the last {_final_s(summary):g} s"
+        f" final {_number(spread['final'], '.2e')} m"
     )
 
 
-def _final_s(summary: Summary) -> float:
-    """How much of a run, at its end, its final values are of [s]."""
-    return min(FINAL_S, round(float(summary["simulated_s"]), 3))
+def _early(summary: Summary, robot: dict[str, Any], word: str) -> str:
+    """When a robot ended that ended well before the run did, after a word; else nothing."""
+    period_s = float(summary["simulated_s"]) / max(1, summary["ticks"])
+    left_s = period_s * (int(summary["ticks"]) - int(robot["ticks"]))
+    return f"{word} {period_s * int(robot['ticks']):.6g} s" if left_s > EARLY_S else ""
 
 
 def trouble_lines(summary: Summary) -> Iterator[str]:
@@ -127,7 +133,10 @@ def trouble_lines(summary: Summary) -> Iterator[str]:
     for robot, reason in summary["stopped_robots"].items():
         yield f"STOPPED {robot}: {reason}"
     for robot, notices in summary["notices"].items():
-        yield from (f"{robot}: {notice}" for notice in notices)
+        told = summary["stopped_robots"].get(robot)
+        for notice in notices:
+            if notice.replace("STOPPED: ", "", 1) != told:
+                yield f"{robot}: {notice}"
     for bus, trouble in summary["bus_troubles"].items():
         yield f"BUS {bus}: {trouble}"
     if summary["record_lost"]:

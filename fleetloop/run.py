@@ -29,7 +29,7 @@ from fleetloop.record.scan import RecordError
 from fleetloop.results import print_report, print_results
 from fleetloop.signals import stop_on_signals
 from fleetloop.summary import RunStats, Summary, summarise, to_json
-from fleetloop.terminal import RunProgress, note, say, say_json
+from fleetloop.terminal import RunProgress, note, say_json
 
 EXIT_CODES = {"held": 0, "failed": 1, "not checked": 1, "aborted": 3, "interrupted": 130}
 
@@ -208,7 +208,7 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options)
     try:
         recorded = Record.open(record)
     except RecordError as error:
-        say(f"{stats.ended}: {stats.reason}; {error}")
+        note(f"{stats.ended}: {stats.reason}; {error}")
         return EXIT_CODES["aborted" if stats.ended == "completed" else stats.ended]
     summary = summarise(recorded, scenario, stats)
     unsaved: InfrastructureError | None = None

@@ -49,7 +49,8 @@ def create(scenario_name: str, out: Path | None, *, now: datetime) -> Created:
         if not os.access(folder, os.W_OK | os.X_OK):
             raise PermissionError(13, "Permission denied", str(folder))
     except OSError as error:
-        raise InfrastructureError(f"can't write the run's folder {folder}: {error}") from error
+        why = error.strerror or error
+        raise InfrastructureError(f"can't write the run's folder {folder}: {why}") from error
     return Created(folder, new)
 
 

@@ -18,8 +18,10 @@ PLAIN = "fleetloop-plain"
 """Name of the codecs' error handler that writes what an encoding lacks in ASCII."""
 _WORDS = {
     "×": "x", "·": ".", "−": "-", "≤": "<=", "≥": ">=", "≠": "!=", "→": "->", "←": "<-",
-    "°": "deg", "±": "+/-", "√": "sqrt", "∞": "inf", "’": "'", "µ": "u", "│": "|", "└": "`",
+    "°": "deg", "±": "+/-", "√": "sqrt", "∞": "inf", "’": "'", "µ": "u", "ṡ": "s_dot",
+    "│": "|", "└": "`",
 }  # fmt: skip
+_MARKS = {"\N{COMBINING CIRCUMFLEX ACCENT}": "_hat", "\N{COMBINING MACRON}": "_bar"}
 _INPUT, _OUTPUT, _ERROR = range(3)
 
 
@@ -127,7 +129,7 @@ def _spelled(character: str) -> str:
     if character in _WORDS:
         return _WORDS[character]
     if unicodedata.combining(character):
-        return ""
+        return _MARKS.get(character, "")
     name = unicodedata.name(character, "")
     if name.startswith("GREEK "):
         letter = name.split()[3] if len(name.split()) > 3 else "?"

@@ -126,7 +126,12 @@ def settle_s(t: np.ndarray, values: np.ndarray, band: float = SETTLE_BAND) -> fl
     outside = np.flatnonzero(~(np.abs(values) <= band))
     if not len(outside):
         return 0.0
-    return float(t[outside[-1]]) if outside[-1] < len(values) - 1 else None
+    return _seconds(t[outside[-1]]) if outside[-1] < len(values) - 1 else None
+
+
+def _seconds(t_s: float) -> float:
+    """A time of the record without what is left of its multiplication."""
+    return round(float(t_s), 9)
 
 
 def _final(t: np.ndarray) -> slice:
@@ -166,7 +171,7 @@ def _robot(rows: np.ndarray, speed: Callable[[np.ndarray], np.ndarray]) -> dict[
         "ticks": len(rows),
         "settle_s": {name: settle_s(t, rows[name]) for name in ERRORS},
         "final_max": {name: _peak(rows[name][last]) for name in ERRORS},
-        "final_from_s": float(t[last][0]),
+        "final_from_s": _seconds(t[last][0]),
         "peak_torque_N_m": torque,
         "settle_s_dot_s": settle_s(t, rows["s_dot"] - speed(np.rint(t * 1e9).astype(np.int64))),
     }
@@ -196,7 +201,7 @@ def _spread_of(controllers: dict[str, np.ndarray]) -> dict[str, float | None] | 
         "peak": float(values.max()),
         "settle_s": settle_s(t, values),
         "final": float(values[_final(t)].max()),
-        "final_from_s": float(t[_final(t)][0]),
+        "final_from_s": _seconds(t[_final(t)][0]),
     }
 
 

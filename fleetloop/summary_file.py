@@ -150,7 +150,7 @@ def read_summary(folder: Path) -> Summary | None:
     except (ValueError, RecursionError) as error:
         raise _refusal(path, f"not JSON ({error})") from error
     if not isinstance(summary, dict):
-        raise _refusal(path, f"a {type(summary).__name__}, not an object of what a run came to")
+        raise _refusal(path, "not an object of what a run came to")
     try:
         _Summary.model_validate(summary, strict=True)
     except ValidationError as error:

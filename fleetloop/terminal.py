@@ -11,7 +11,9 @@ from types import TracebackType
 from typing import Any, Self
 
 from rich.console import Console
+from rich.measure import Measurement
 from rich.progress import BarColumn, Progress, TaskID, TextColumn
+from rich.table import Table
 from rich.text import Text
 
 from fleetloop.streams import forget_output, spelled_for
@@ -40,6 +42,12 @@ class ResultConsole(Console):
     def render_str(self, text: str, **options: Any) -> Text:
         """As the stream will show it."""
         return super().render_str(spelled_for(self.file, text), **options)
+
+    def print_whole(self, table: Table) -> None:
+        """Print a table that loses nothing, however narrow the terminal is."""
+        needed = Measurement.get(self, self.options.update(width=sys.maxsize), table).maximum
+        self.width = max(self.width, needed)
+        self.print(table)
 
     def on_broken_pipe(self) -> None:
         """Go on in silence."""

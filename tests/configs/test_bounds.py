@@ -31,7 +31,7 @@ from configs.loading import load
         ("leader.speed_m_s=-1e300", "must be -1e+12 or more"),
         ("robot.r1.pose.x_m=1e308", "must be 1e+12 or less"),
         ("mounting.gear_ratio=1e-308", "must be 1e-06 or more"),
-        ("seed=100000000000000000000", "must be 9.0072e+15 or less"),
+        ("seed=100000000000000000000", "must be 9007199254740991 or less"),
     ],
 )
 def test_a_number_beyond_all_bounds_is_refused(override: str, right: str) -> None:

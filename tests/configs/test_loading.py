@@ -214,6 +214,7 @@ def test_what_an_option_set_is_blamed_on_the_option_whoever_finds_it() -> None:
     assert line.startswith("--set clock.share_period_s=0.0015: must be a whole multiple of")
     (line,) = blamed("path={kind='circle'}")
     assert line == "--set path={kind='circle'}: path.radius_m = (missing): must be given"
+    assert blamed("robot.r2=3") == ["--set robot.r2=3: must be a table"]
     (line,) = blamed("robot.0.v_m_s='fast'")
     assert line == "--set robot.0.v_m_s='fast': must be a number"
 
@@ -283,6 +284,30 @@ def test_all_problems_come_at_once_across_sections_whatever_is_missing() -> None
     # What would follow from values put in for wrong ones isn't said.
     assert "share_period_s" not in text
     assert len(text.splitlines()) == 12
+
+
+def test_robots_that_are_all_wrong_hide_nothing_else() -> None:
+    text = SMALL.replace("x_m = 0.0", 'x_m = "a"') + '[graph]\nedges = ["r1 -> r9"]\n'
+    lines = problems(text)
+    assert [line.split(" = ")[0] for line in lines] == [
+        "file.toml: robot.r1.pose.x_m",
+        "file.toml: robot.r2.pose.x_m",
+        "file.toml: graph.edges",
+    ]
+
+
+def test_bounds_are_told_to_the_last_digit() -> None:
+    (line,) = blamed(f"seed={2**60}")
+    assert line.endswith("must be 9007199254740991 or less")
+
+
+def test_what_is_no_scenario_is_named_for_what_it_is(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="can't be read: Is a directory"):
+        load(tmp_path)
+    file = tmp_path / "file.toml"
+    file.write_bytes(b"\xff\x00")
+    with pytest.raises(ScenarioError, match="no text in UTF-8"):
+        load(file)
 
 
 WRONG = ["x", -1, float("nan"), {"a": 1}]

@@ -258,7 +258,25 @@ def test_a_role_is_not_started_by_hand(tmp_path: Path) -> None:
     assert b"no AgentBrief" in done.stderr
 
 
-@pytest.mark.parametrize("value", ["nan", "inf", "-1", "1e308"])
+@pytest.mark.parametrize(
+    "args",
+    [
+        ("plant", "two_robots", "--robots", ""),
+        ("export", "run", "out.csv", "--robots", ","),
+        ("export", "run", "out.csv", "--signals", " "),
+    ],
+)
+def test_an_option_that_names_nothing_is_not_taken_for_all(args: tuple[str, ...]) -> None:
+    from typer.testing import CliRunner
+
+    from fleetloop.cli import app
+
+    done = CliRunner().invoke(app, args)
+    assert isinstance(done.exception, ScenarioError)
+    assert str(done.exception).startswith(f"{args[-2]} {args[-1]!r}: names nothing")
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-1", "1e308", "ten", ""])
 @pytest.mark.parametrize(
     ("args", "option"),
     [
@@ -281,4 +299,5 @@ def test_a_number_that_is_none_is_blamed_on_its_option(
     said = f"{done.stderr} {done.exception}"
     assert option in said
     assert "must be" in said
+    assert "Input" not in said
     assert done.exit_code == 2 or isinstance(done.exception, ScenarioError)

@@ -100,7 +100,7 @@ def test_all_signals_are_every_recorded_one_once(finished_run: Path) -> None:
         ),
         (Selection(robots=("r1", "r7")), r"--robots r7: no such robot in .*; there are r1, r2"),
         (Selection(from_s=99.0), r"--from 99: no row in that time; rows are from 0 to 3.998 s"),
-        (Selection(from_s=3.0, to_s=2.0), r"--from 3 --to 2: no row"),
+        (Selection(from_s=3.0, to_s=2.0), r"--from 3: must not be after --to 2"),
         (Selection(to_s=float("nan")), r"--to nan: no row"),
     ],
 )

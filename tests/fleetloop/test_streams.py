@@ -37,7 +37,8 @@ def fleetloop(*args: str, cwd: Path, shell: str = "", **env: str) -> subprocess.
     ("text", "encoding", "shown"),
     [
         ("τ [N·m], 2.5 × real time", "latin-1", "tau [N·m], 2.5 × real time"),
-        ("p²/q ≥ 4 → θ̂, Δ", "ascii", "p^2/q >= 4 -> theta, Delta"),
+        ("p²/q ≥ 4 → θ̂, Δ", "ascii", "p^2/q >= 4 -> theta_hat, Delta"),
+        ("v̂_r → v_r, v̄_d, ṡ > 0", "ascii", "v_hat_r -> v_r, v_bar_d, s_dot > 0"),
         ("no such bus '\udcff'", "utf-8", "no such bus '?'"),
         ("…−√°µ漢", "ascii", "...-sqrtdegu?"),
     ],
@@ -58,7 +59,7 @@ def test_what_an_encoding_lacks_is_spelled_in_ascii(text: str, encoding: str, sh
 def test_a_terminal_without_unicode_shows_everything(env: dict[str, str], tmp_path: Path) -> None:
     done = fleetloop("check", "two_robots", cwd=tmp_path, **env)
     assert (done.returncode, done.stderr) == (0, b"")
-    assert b"v_r -> v_r" in done.stdout
+    assert b"v_hat_r -> v_r" in done.stdout
     done = fleetloop(*IN_PROCESS, cwd=tmp_path, **env)
     assert done.returncode == 0, done.stderr
     assert b"theta_e [rad]" in done.stdout

@@ -10,7 +10,7 @@ from configs.loading import load
 from configs.sections import Expect
 from fleetloop.figures import all_figures
 from fleetloop.record.reader import Record
-from fleetloop.results import robot_rows
+from fleetloop.results import final_line, print_results, robot_rows, spread_line, trouble_lines
 from fleetloop.summary import RunStats, Summary, settle_s, summarise, to_json
 
 T = np.arange(0.0, 10.0, 0.1)
@@ -63,6 +63,38 @@ def test_every_robot_is_judged_by_all_its_own_rows(uneven_run: Path, finished_ru
     assert summary["robots"]["r2"] != uneven(finished_run)["robots"]["r2"]
 
 
+def test_what_a_value_is_of_is_said(uneven_run: Path, finished_run: Path) -> None:
+    summary = uneven(uneven_run)
+    assert [row[0] for row in robot_rows(summary)] == ["r1", "r2 to 2.4 s", "worst"]
+    assert spread_line(summary).startswith("spread of s up to 2.4 s: peak ")
+    whole = uneven(finished_run)
+    assert [row[0] for row in robot_rows(whole)] == ["r1", "r2", "worst"]
+    assert spread_line(whole).startswith("spread of s: peak ")
+    assert final_line(whole) == "final: the greatest of a robot's last 4 s"
+
+
+def test_a_stop_is_told_once(finished_run: Path) -> None:
+    summary = uneven(finished_run)
+    summary["stopped_robots"] = {"r1": "tick 3 (t = 0.006 s): no encoder frames any more"}
+    notices = [
+        "tick 2 (t = 0.004 s): odd",
+        "tick 3 (t = 0.006 s): STOPPED: no encoder frames any more",
+    ]
+    summary["notices"] = {"r1": notices}
+    assert list(trouble_lines(summary)) == [
+        "STOPPED r1: tick 3 (t = 0.006 s): no encoder frames any more",
+        "r1: tick 2 (t = 0.004 s): odd",
+    ]
+
+
+def test_a_narrow_terminal_gets_every_figure(finished_run: Path, monkeypatch, capsys) -> None:
+    monkeypatch.setenv("COLUMNS", "30")
+    print_results(uneven(finished_run), finished_run)
+    shown = capsys.readouterr().out
+    assert "…" not in shown
+    assert all(cell in shown for row in robot_rows(uneven(finished_run)) for cell in row)
+
+
 def test_an_expectation_needs_rows_of_every_robot_that_it_is_about(uneven_run: Path) -> None:
     late = {"signal": "x_e_m", "from_s": 3.0}
     fine, broken = {"max_abs": 1e3}, {"max_abs": 1e-12}
@@ -105,7 +137,13 @@ def test_figures_bear_a_robot_without_any_row(uneven_run: Path) -> None:
 def test_what_is_no_number_is_null_in_the_file_and_said_in_the_table() -> None:
     errors = dict.fromkeys(("x_e_m", "y_e_m", "theta_e_rad"), None)
     robot = {"settle_s": errors, "final_max": dict.fromkeys(errors, np.nan), "peak_torque_N_m": 0.0}
-    said = {"robots": {"r1": robot}, "found": [np.inf, 1.0, "text", None]}
+    robot |= {"ticks": 1}
+    said = {
+        "ticks": 1,
+        "simulated_s": 0.1,
+        "robots": {"r1": robot},
+        "found": [np.inf, 1.0, "text", None],
+    }
     read = json.loads(to_json(said), parse_constant=pytest.fail)
     assert read["found"] == [None, 1.0, "text", None]
     assert read["robots"]["r1"]["final_max"] == errors
