@@ -94,6 +94,7 @@ class Forecast:
     t_s: Matrix
     s: Matrix
     s_dot: Matrix
+    v_hat: Matrix
     v_r: Matrix
 
     @property
@@ -101,6 +102,12 @@ class Forecast:
         """max_i s_i − min_i s_i at every instant."""
         difference: Matrix = self.s.max(axis=1) - self.s.min(axis=1)
         return difference
+
+    @property
+    def speed_error(self) -> Matrix:
+        """max_i |v̂_i − v_r| at every instant."""
+        error: Matrix = np.abs(self.v_hat - self.v_r[:, None]).max(axis=1)
+        return error
 
 
 def forecast(scenario: Scenario) -> Forecast:
@@ -132,7 +139,8 @@ def forecast(scenario: Scenario) -> Forecast:
         age_s += step_s
         if ageing:
             heard = heard + heard[:, :1] * np.array([0.0, step_s])
-    return Forecast(times, states[:, :, 2], states[:, :, 0] + states[:, :, 1], speeds)
+    v_hat, mu, s = (states[:, :, n] for n in range(3))
+    return Forecast(times, s, v_hat + mu, v_hat, speeds)
 
 
 def _speeds(scenario: Scenario, times: Matrix) -> Matrix:

@@ -13,11 +13,15 @@ import numpy as np
 
 from configs.scenario import Scenario
 from configs.topology import Graph
-from fleetloop.checks.coordination import Forecast, delay_margin_s, radii
+from fleetloop.checks.coordination import Forecast, Matrix, delay_margin_s, radii
 from fleetloop.checks.finding import Finding, Level
 
 SETTLED_M = 0.05
 """As in a run's summary: a spread within this has settled."""
+SETTLED_M_S, SETTLED_PART = 0.05, 0.1
+"""Speed estimates within this of v_r, and within this part of it, have settled."""
+FINAL_S, FINAL_PART = 5.0, 0.25
+"""The end of a run, its last part if it is short: there all should have settled."""
 _EFOLDS = 3.0
 """An error that grows for less than this many time constants stays small in a short run."""
 LOST_M = 0.5
@@ -38,6 +42,7 @@ def graph_findings(scenario: Scenario, ahead: Forecast) -> list[Finding]:
         _sharing(scenario, ahead),
         *_leader(scenario),
         _agreement(scenario, ahead),
+        _speed_estimates(scenario, ahead),
         *_backwards(scenario, ahead),
     ]
 
@@ -157,23 +162,39 @@ def _leader(scenario: Scenario) -> list[Finding]:
 
 def _agreement(scenario: Scenario, ahead: Forecast) -> Finding:
     """When the path variables will have agreed, by the coordination alone."""
-    title = "max s_i − min s_i"
-    spread = ahead.spread
-    apart = np.flatnonzero(spread > SETTLED_M)
-    peak = f"at most {float(spread.max()):.3g} m"
+    return _settling(scenario, ahead, ahead.spread, "max s_i − min s_i", "m", SETTLED_M)
+
+
+def _speed_estimates(scenario: Scenario, ahead: Forecast) -> Finding:
+    """When all have the leader's speed: on dense graphs they agree long before."""
+    settled = min(SETTLED_M_S, SETTLED_PART * float(np.abs(ahead.v_r).max()))
+    return _settling(scenario, ahead, ahead.speed_error, "max |v̂_i − v_r|", "m/s", settled)
+
+
+def _settling(
+    scenario: Scenario, ahead: Forecast, error: Matrix, title: str, unit: str, settled: float
+) -> Finding:
+    """Whether an error of the coordination is small throughout the end of the run."""
+    end_s = scenario.ends_at_s
+    apart = np.flatnonzero(error > settled)
+    peak = f"at most {float(error.max()):.3g} {unit}"
     if not len(apart):
         return Finding("ok", title, peak)
-    last = int(apart[-1])
-    if last < len(spread) - 1:
-        return Finding("ok", title, f"{peak}, within {SETTLED_M:g} m after {ahead.t_s[last]:.3g} s")
-    text = f"{peak}, still {float(spread[-1]):.3g} m after {ahead.t_s[-1] + 1e-9:.3g} s"
-    if scenario.coordination.v_hat_0 != scenario.leader.speed_m_s:
+    last = min(int(apart[-1]) + 1, len(error) - 1)
+    after = f"within {settled:.2g} {unit} after {ahead.t_s[last]:.3g} s"
+    final_s = end_s - min(FINAL_S, FINAL_PART * end_s)
+    if ahead.t_s[last] <= final_s and error[-1] <= settled:
+        return Finding("ok", title, f"{peak}, {after}")
+    if error[-1] > settled:
+        after = f"still {float(error[-1]):.3g} {unit} after {ahead.t_s[-1]:.3g} s"
+    text = f"{peak}, {after}: late in a run of {end_s:g} s; "
+    if np.any(ahead.v_hat[0] != scenario.leader.speed_m_s):
         text += (
-            f"; coordination.v_hat_0 = {scenario.leader.speed_m_s:g}, equal s_0, or more leader"
-            " links make it quicker"
+            f"coordination.v_hat_0 = {scenario.leader.speed_m_s:g},"
+            f"{' equal s_0,' if unit == 'm' else ''} or more leader links make it quicker"
         )
         return Finding("warning", title, text, key="coordination.v_hat_0")
-    return Finding("warning", title, f"{text}: a longer duration_s shows it", key="duration_s")
+    return Finding("warning", title, f"{text}a longer duration_s shows it", key="duration_s")
 
 
 def _backwards(scenario: Scenario, ahead: Forecast) -> list[Finding]:

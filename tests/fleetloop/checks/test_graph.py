@@ -74,6 +74,21 @@ def test_path_variables_that_have_not_agreed_at_the_end_are_warned_of() -> None:
     )
 
 
+def test_path_variables_that_agree_only_at_the_last_moment_are_warned_of() -> None:
+    assert text_of("max s_i", "duration_s=15.0", "expect=[]").level == "warning"
+    assert text_of("max s_i", "duration_s=19.0", "expect=[]").level == "ok"
+
+
+def test_speed_estimates_that_rise_together_but_late_are_warned_of() -> None:
+    # All of four hear each other, one the leader: min eig(L + H) = 0.21, so 4.8 s ln(0.6/0.05).
+    late = "graph.edges=%r" % [f"r{i} -> r{j}" for i in range(1, 5) for j in range(1, 5) if i != j]
+    assert text_of("max s_i", late, "duration_s=14.0", "expect=[]").level == "ok"
+    finding = text_of("max |v̂_i − v_r|", late, "duration_s=14.0", "expect=[]")
+    assert (finding.level, finding.key) == ("warning", "coordination.v_hat_0")
+    assert "within 0.05 m/s after 12.5 s" in finding.text
+    assert text_of("max |v̂_i − v_r|", late, "duration_s=20.0", "expect=[]").level == "ok"
+
+
 def test_who_starts_ahead_goes_back_to_meet_the_others() -> None:
     finding = text_of("ṡ > 0: path variables", "robot.r4.s_0=2.0")
     assert (finding.robots, finding.key) == (("r4",), "robot.r4.s_0")
