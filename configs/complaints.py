@@ -88,7 +88,7 @@ class Salvage(NamedTuple):
     def believes(self, problem: Problem) -> bool:
         """Whether a problem is the file's, not one of what was put in for lost keys."""
         text = f"{problem.key} {problem.right}"
-        return not any(key in text for key in self.lost)
+        return not any(key in text or key.startswith(f"{problem.key}.") for key in self.lost)
 
 
 def salvage(error: ValidationError, data: dict[str, Any]) -> Salvage | None:
@@ -102,7 +102,8 @@ def salvage(error: ValidationError, data: dict[str, Any]) -> Salvage | None:
         for item in _errors(found):
             lost |= _repair(rest, item)
         try:
-            return Salvage(Scenario.model_validate(rest), tuple(lost))
+            scenario = Scenario.model_validate(rest)
+            return Salvage(scenario, tuple(lost - {"name"}))  # nothing depends on its name
         except ValidationError as more:
             found = more
     return None

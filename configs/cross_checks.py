@@ -299,4 +299,4 @@ def _graph(scenario: Scenario) -> Iterator[Problem]:
 
 
 def _known(scenario: Scenario) -> str:
-    return f"no such robot; known: {', '.join(scenario.names)}"
+    return f"no such robot; known: {', '.join(dict.fromkeys(scenario.names))}"

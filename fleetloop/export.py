@@ -161,12 +161,13 @@ def export(
     columns = table(read_record(run, partial=partial), selection)
     part = target.with_name(f".{target.name}.{os.getpid()}")
     try:
-        (_write_npz if target.suffix == ".npz" else _write_csv)(part, columns)
-        part.replace(target)
+        try:
+            (_write_npz if target.suffix == ".npz" else _write_csv)(part, columns)
+            part.replace(target)
+        finally:
+            part.unlink(missing_ok=True)
     except OSError as error:
         raise InfrastructureError(f"can't write {target}: {error.strerror or error}") from error
-    finally:
-        part.unlink(missing_ok=True)
     return len(columns["t_s"])
 
 

@@ -183,6 +183,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> 
             "cpu_ns": cpu_ns() - began_ns,
             "processor_ns": processor_wait_ns() - waited_ns,
             "refused": ", ".join(refused),
+            "early": stop.reason if counters.ticks < brief.schedule.ticks else "",
             **bus_frames(counters),
             **{
                 f"stopped.{robot}": why

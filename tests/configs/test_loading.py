@@ -296,6 +296,16 @@ def test_robots_that_are_all_wrong_hide_nothing_else() -> None:
     ]
 
 
+def test_what_is_wrong_with_a_bound_or_a_name_is_said_alone_and_hides_nothing() -> None:
+    text = SMALL.replace('"small"', '"Not So"').replace('"r2"', '"r1"')
+    lines = problems(text, "expect=[{signal='s', max_abs=-1.0}]")
+    assert [line.split(" = ")[0] for line in lines] == [
+        "file.toml: name",
+        "file.toml: expect.0.max_abs",
+        "file.toml: robot.name",
+    ]
+
+
 def test_bounds_are_told_to_the_last_digit() -> None:
     (line,) = blamed(f"seed={2**60}")
     assert line.endswith("must be 9007199254740991 or less")

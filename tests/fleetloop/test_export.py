@@ -149,3 +149,9 @@ def test_the_command_line_takes_all_of_it(finished_run: Path, tmp_path: Path) ->
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "wrote a.csv: 6 rows\n", "")
     assert list(read(tmp_path / "a.csv")[0]) == ["t_s", "robot", "mu", "x_m"]
+
+
+def test_a_place_that_can_not_be_written_is_named(finished_run: Path) -> None:
+    target = finished_run / "record.mcap" / "out.csv"
+    with pytest.raises(InfrastructureError, match=r"can't write .*out\.csv: Not a directory"):
+        export(finished_run, target)

@@ -75,13 +75,20 @@ def test_what_happens_to_a_robot_is_said_when_it_happens(tmp_path: Path) -> None
     assert "r1" in run.summary()["stopped_robots"]
 
 
-@pytest.mark.parametrize(("scenario", "status"), [("paper", 3), ("realtime_100hz", 1)])
-def test_a_controller_that_is_told_to_leave_is_named_at_once(
-    scenario: str, status: int, tmp_path: Path
+@pytest.mark.parametrize(
+    ("scenario", "child", "status", "cause"),
+    [
+        ("paper", "r2", 3, "agent/r2: left the run early"),
+        ("paper", "plant", 3, "plant: left the run early"),
+        ("realtime_100hz", "r2", 1, "r2: cut short at"),
+        ("realtime_100hz", "plant", 3, "plant: left the run early"),
+    ],
+)
+def test_who_is_told_to_leave_is_named_at_once(
+    scenario: str, child: str, status: int, cause: str, tmp_path: Path
 ) -> None:
     with running(tmp_path / "a", scenario, "--duration", "6") as run:
-        run.child("r2").terminate()
-        run.await_line(r"r2: left the run early: asked to stop", 5.0)
+        run.child(child).terminate()
+        run.await_line(rf"{child}: left the run early: asked to stop", 5.0)
         assert run.end()[0] == status
-    reason = run.summary()["reason"]
-    assert reason.startswith(("agent/r2: left the run early", "r2: cut short at"))
+    assert run.summary()["reason"].startswith(cause)
