@@ -29,8 +29,8 @@ Whoever may say something may still not say it at any length or rate: the router
 longer than anything honest on that key (`bridge.messages.MOST_BYTES`). In real time, where the
 newest wins, it also drops what comes faster than `MOST_PER_PERIOD` times as often as the schedule
 says. In lockstep every message counts and two may arrive together, so there is no rate for it to
-keep: there hearers keep but few of each (`bridge.zenoh_link.POLLED_DEPTH`), and count, and a
-controller that says far more than the ticks allow is hung up on (`bridge.floods`).
+keep: there hearers keep but few of each (`bridge.zenoh_link.POLLED_DEPTH`), and count, and of
+a controller that says far more than the ticks allow nothing more is taken (`bridge.floods`).
 
 The launcher's own session is inside the router and isn't subject to the rules. Flows are named from
 the router's side: a process that publishes is an ingress put, and it must be told (egress

@@ -15,6 +15,7 @@ was dropped before. What is kept is bounded.
 
 import re
 from collections import Counter
+from collections.abc import Callable
 from typing import TypeVar
 
 _LOGINS = "zenoh_transport::unicast::establishment::accept=trace,zenoh_link_tls::unicast=debug"
@@ -77,6 +78,8 @@ class Denials:
         """Users one of whose sessions was cut off because it did not read."""
         self.flooders: set[str] = set()
         """Users one of whose sessions was cut off because it said too much."""
+        self.turn_away: Callable[[str], None] = lambda _: None
+        """Told, on the log's thread, where somebody is who was cut off for saying too much."""
         self._caching: dict[str, str] = {}  # the key whose permissions a thread looks up in advance
 
     def take(self, line: str) -> None:
@@ -98,6 +101,7 @@ class Denials:
             self._take_syn(syn["kind"], syn["peer"], text)
         elif wrong := _WRONG.match(text):
             user, peer = self._latest
+            self._users = {zid: at for zid, at in self._users.items() if at != (user, peer)}
             who = f"the login of {_shown(user)}" if user else "a login"
             self._count(f"refused {who} from {_host(peer)}: {_WHY[wrong['why']]}")
 
@@ -138,6 +142,9 @@ class Denials:
         login = _LOGIN.search(text)
         user = _user_of(bytes.fromhex(login["bytes"].replace(", ", ""))) if login else ""
         self._latest = (user, peer)
+        if user in self.flooders:
+            self.turn_away(peer)
+            self._count(f"turned away {_shown(user)} from {_host(peer)}: it was cut off before")
         if (zid_of_peer := self._zids.pop(peer, "")) and user:
             _remember(self._users, zid_of_peer, (user, peer))
 

@@ -2,23 +2,25 @@
 
 Zenoh's own limit on rates drops messages by the time between two of them, and in lockstep no honest
 message may be dropped. So the kernel's counters of each connection are looked at instead, several
-times a second: a bucket leaks what a controller may say, and whose runs over is hung up on. A
-controller says at most one path state per tick, and its rows by the block.
+times a second: a bucket leaks what a controller may say, and from whose runs over nothing more is
+taken. A controller says at most one path state per tick, and its rows by the block.
 
     leak        `MESSAGES_PER_TICK`, `BYTES_PER_TICK` for each tick that the run went on
                 `MESSAGES_PER_S`, `BYTES_PER_S` for the start and for what isn't known here
     runs over   at `BURST_MESSAGES`, `BURST_BYTES`
 
-Whoever is hung up on may come again and starts anew. The socket is Zenoh's, found by its descriptor
-as in `bridge.listening`. Messages are counted as TCP segments with data: those that travel together
-count once, and cost as little.
+The kernel then drops what comes; hung up on, Zenoh's clients would be back at once. Whoever was cut
+off is so again at every login from then on (`bridge.denials`). The socket is Zenoh's, found by its
+descriptor as in `bridge.listening`. Messages are counted as TCP segments with data: those that
+travel together count once, and cost as little.
 """
 
 import contextlib
+import ctypes
 import os
 import socket
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -29,6 +31,18 @@ MESSAGES_PER_S, BYTES_PER_S = 1000, 1 << 17
 BURST_MESSAGES, BURST_BYTES = 2000, 1 << 20
 _TCP_INFO = struct.Struct("=128x Q 16x I")
 """Of Linux's tcp_info: bytes received in order, and segments that brought data."""
+_SO_ATTACH_FILTER = 26
+_NO_DATA = (
+    (0x30, 0, 0, 12),  # A = byte 12 of the TCP header, where its length is
+    (0x54, 0, 0, 0xF0),
+    (0x74, 0, 0, 2),  # A >>= 2: the length in bytes
+    (0x07, 0, 0, 0),  # X = A
+    (0x80, 0, 0, 0),  # A = length of the packet
+    (0x1D, 0, 1, 0),  # nothing behind the header?
+    (0x06, 0, 0, 0xFFFF_FFFF),  # take it
+    (0x06, 0, 0, 0),  # drop it
+)
+"""A classic BPF program that takes acknowledgements, which who answers waits for, and no data."""
 
 
 class Received(NamedTuple):
@@ -64,11 +78,11 @@ class FloodGuard:
         self._buckets: dict[str, Bucket] = {}  # by peer
         self._before: tuple[int, float] | None = None  # ticks and seconds at the last look
 
-    def look(self, users: Mapping[str, str], ticks: int, now_s: float) -> list[str]:
-        """Hang up on peers that say too much; return which.
+    def look(self, users: Container[str], ticks: int, now_s: float) -> list[str]:
+        """Take nothing more from peers that say too much; return which.
 
         Args:
-            users: who is where: controllers by "address:port"; nobody else is looked at.
+            users: where controllers are, as "address:port"; nobody else is looked at.
             ticks: how far the run is.
             now_s: seconds on any clock.
         """
@@ -81,14 +95,29 @@ class FloodGuard:
                 received = _received(connection)
                 bucket = buckets.get(peer) or Bucket(received)
                 if bucket.fill(received, went_on, passed_s):
-                    connection.shutdown(socket.SHUT_RDWR)
+                    _take_nothing(connection)
                     cut.append(peer)
                 else:
                     self._buckets[peer] = bucket
         return cut
 
 
-def _connections(users: Mapping[str, str]) -> Iterator[tuple[str, socket.socket]]:
+def deafen(peer: str) -> None:
+    """Take nothing more from this peer; after Zenoh's lease the router ends its session."""
+    for _, connection in _connections({peer}):
+        with connection:
+            _take_nothing(connection)
+
+
+def _take_nothing(connection: socket.socket) -> None:
+    """Let the kernel drop what comes: the peer isn't told, and so doesn't come again at once."""
+    code = b"".join(struct.pack("HBBI", *instruction) for instruction in _NO_DATA)
+    kept = ctypes.create_string_buffer(code, len(code))
+    program = struct.pack("HL", len(_NO_DATA), ctypes.addressof(kept))
+    connection.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, program)
+
+
+def _connections(users: Container[str]) -> Iterator[tuple[str, socket.socket]]:
     """This process's connections to these peers, each by a descriptor of its own."""
     found = set()
     for descriptor in Path("/proc/self/fd").iterdir():

@@ -18,6 +18,8 @@ MOST_AT_ONCE = 10_000
 """Messages that one look takes: whoever drains comes to an end, however fast others say more."""
 ROOM_BYTES = 1 << 18
 """Of one subscription, if the subscriber asks for no other."""
+MOST_WAITING = 1 << 14
+"""Messages of one subscription, however small: who floods with little ones takes time to read."""
 _OVERHEAD_BYTES = 256
 """What a message takes besides its payload."""
 
@@ -90,12 +92,13 @@ def waiting(link: Link, most: int = MOST_AT_ONCE) -> Iterator[Arrival]:
 class Mailbox:
     """The room of one subscription. Filled from whatever thread, emptied by one."""
 
-    __slots__ = ("_given", "_lock", "_room", "_taken", "dropped")
+    __slots__ = ("_admitted", "_given", "_lock", "_removed", "_room", "_taken", "dropped")
 
     def __init__(self, room_bytes: int) -> None:
         self.dropped = 0
         self._room = room_bytes
         self._given = self._taken = 0
+        self._admitted = self._removed = 0
         self._lock = threading.Lock()
 
     def admit(self, payload_bytes: int) -> bool:
@@ -103,15 +106,18 @@ class Mailbox:
         size = payload_bytes + _OVERHEAD_BYTES
         with self._lock:
             held = self._given - self._taken
-            if held and held + size > self._room:
+            full = self._admitted - self._removed >= MOST_WAITING
+            if full or (held and held + size > self._room):
                 self.dropped += 1
                 return False
             self._given += size
+            self._admitted += 1
         return True
 
     def take(self, payload_bytes: int) -> None:
         """A message has been taken out."""
         self._taken += payload_bytes + _OVERHEAD_BYTES
+        self._removed += 1
 
 
 class Inbox:

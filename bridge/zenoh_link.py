@@ -20,7 +20,7 @@ from zenoh.handlers import Callback, RingChannel
 from bridge import zenoh_log
 from bridge.access import AccessPlan, agent_user
 from bridge.denials import Denials, directives, is_ours
-from bridge.floods import FloodGuard
+from bridge.floods import FloodGuard, deafen
 from bridge.link import ROOM_BYTES, Arrival, Dropped, Inbox, Publisher
 from bridge.listening import accept_many, await_first_words, hasty, loopback
 from bridge.login import Obstacle, obstacle, taken
@@ -46,7 +46,7 @@ _ATTEMPT_S, _LISTEN_S = 5.0, 10.0
 _BLOCKED_S = 5.0
 """Zenoh's own: a put that waits for longer closes its session."""
 _PORT_TRIES = 5
-POLLED_DEPTH = 4096
+POLLED_DEPTH = 1 << 15
 """Messages on a key that wait for who polls, the newest: many times more than any schedule lets be
 on their way (`configs.brief.LEAD_TICKS`), so that a flood doesn't wash away what is due."""
 _YIELDS = 20
@@ -242,6 +242,7 @@ class RouterLink(ZenohLink):
         self.denials = denials
         """Whom the router refused, from its log."""
         self._guard = FloodGuard()
+        denials.turn_away = deafen
 
     def look_for_floods(self, ticks: int, now_s: float) -> None:
         """Cut off controllers that say far too much; call it several times a second."""

@@ -61,7 +61,7 @@ MAX_NOTICES = 100
 """Of each process; what else it says is in nobody's interest."""
 UNREAD_SHARE = 0.25
 """Part of the tick deadline after which a client that doesn't read is cut off: all wait for it."""
-LOOK_EVERY_S = 0.2
+LOOK_EVERY_S = 0.1
 """How often connections are looked at for who says far too much."""
 DRAIN_S, MOST_DRAIN_S = 2.0, 10.0
 """How long the recorder may be silent while it writes what is still on its way, once all others

@@ -90,7 +90,7 @@ class _Recorder:
     def note_dropped(self, dropped: Iterable[Dropped]) -> None:
         """Count what found no room."""
         for tag, _, count in dropped:
-            self._refuse(tag, f"{ROOM_BYTES >> 20} MiB of it waited already", count)
+            self._refuse(tag, "more of it waited already than there is room for", count)
 
     def _refuse(self, tag: str, why: str, count: int = 1) -> None:
         kind, _, name = tag.partition("/")
@@ -174,6 +174,8 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
             now = time.monotonic()
             if arrival is not None and recorder.take(arrival):
                 quiet_since = now
+            elif arrival is not None:
+                time.sleep(0.0)  # of a flood: let the network's thread have its turn
             elif stop.requested and now - quiet_since > QUIET_S:
                 break
             if now >= next_report:

@@ -168,3 +168,25 @@ def test_no_line_whatever_breaks_the_reader_and_what_it_keeps_is_bounded() -> No
     assert len(denials.notes()) == MOST + 1
     assert denials.notes()[-1] == f"refused much else ({2 * MOST} times)"
     assert denials.news() and not denials.news()
+
+
+FLOODS = """
+with open_router(None, plan, folder, outside) as router:
+    with login("agent-r1", "one"):
+        time.sleep(0.1)
+    router.denials.note_flood("agent-r1", "127.0.0.1:1")
+    with login("agent-r1", "one") as again, login("agent-r2", "two") as other:
+        for robot in ("r1", "r2"):
+            router.subscribe(keys.path("t", robot), robot)
+        time.sleep(0.1)  # the log's reader looks a little later
+        again.publisher(keys.path("t", "r1")).put(b"flood")
+        other.publisher(keys.path("t", "r2")).put(b"honest")
+        print(router.receive(5.0).tag, router.receive(0.3))
+    said_last(router)
+"""
+
+
+def test_who_was_cut_off_for_a_flood_is_turned_away_when_he_comes_again(tmp_path) -> None:
+    (heard, *lines), _ = notes(FLOODS, tmp_path, "tcp")
+    assert heard == "r2 None"
+    assert "turned away 'agent-r1' from 127.0.0.1: it was cut off before" in lines

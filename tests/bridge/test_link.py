@@ -2,7 +2,7 @@
 
 import threading
 
-from bridge.link import Arrival, Dropped, Inbox, Mailbox, waiting
+from bridge.link import MOST_WAITING, Arrival, Dropped, Inbox, Mailbox, waiting
 
 
 def put(inbox: Inbox, tag: str, payloads: list[bytes], room_bytes: int) -> None:
@@ -38,6 +38,14 @@ def test_room_comes_back_with_what_is_taken() -> None:
         assert arrival is not None
         assert arrival.payload == bytes([n]) * 500
     assert inbox.dropped() == []
+
+
+def test_little_messages_are_bounded_by_their_number() -> None:
+    box = Mailbox(1 << 40)
+    assert [box.admit(1) for _ in range(MOST_WAITING + 2)] == [True] * MOST_WAITING + [False] * 2
+    box.take(1)
+    assert box.admit(1)
+    assert box.dropped == 2
 
 
 def test_a_single_message_always_finds_room() -> None:

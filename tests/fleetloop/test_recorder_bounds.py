@@ -88,4 +88,4 @@ def test_what_is_no_frame_of_the_run_is_refused(
 def test_what_found_no_room_is_named(recorder: _Recorder) -> None:
     recorder.note_dropped([Dropped("controller/r2", "key", 7)])
     (line,) = recorder.refusals.lines()
-    assert line.startswith("refused 7 row blocks of r2's controller: 64 MiB")
+    assert line.startswith("refused 7 row blocks of r2's controller: more of it waited")
