@@ -28,7 +28,7 @@ from plant.robot import Robot, State
 
 Vector = NDArray[np.float64]
 _NUDGE = 1e-6
-MAX_PERIODS = 400
+MAX_PERIODS = 200
 """Control periods between two fixes that are simulated; longer ones are taken as this."""
 
 
@@ -71,14 +71,31 @@ def speed_loop_radius(gain: float, delay_periods: float) -> float:
 
 def channel_radius(loop: Loop, v_bar: float, omega_bar: float, s_dot: float) -> float:
     """Spectral radius of (2) per control period, on an arc of this v̄_d and ω̄_d at speed ṡ."""
-    run, size, periods = _channel(loop, v_bar, omega_bar, s_dot)
-    columns = []
-    for n in range(size):
-        nudge = np.zeros(size)
-        nudge[n] = _NUDGE
-        columns.append((run(nudge) - run(-nudge)) / (2.0 * _NUDGE))
-    largest = float(np.abs(np.linalg.eigvals(np.array(columns).T)).max())
+    periods, late = min(loop.pose_every, MAX_PERIODS), min(loop.pose_delay, MAX_PERIODS)
+    tick = -late % periods  # of an interval, at which the pose is that becomes a fix
+    whole = _whole_map(_interval(loop, v_bar, omega_bar, s_dot, tick), waits=-(-late // periods))
+    largest = float(np.abs(np.linalg.eigvals(whole)).max())
     return float(largest ** (1.0 / periods))
+
+
+def _whole_map(interval: Vector, *, waits: int) -> Vector:
+    """The map from fix to fix; its state ends with the fixes on their way, the next one first.
+
+    `interval` goes from state and fix, its last three inputs, to the state an interval later and
+    the pose that is the fix `waits` intervals later; without waiting the pose of the state itself.
+    """
+    state = interval.shape[1] - 3
+    on, used = interval[:, :state], interval[:, state:]
+    if waits == 0:
+        on[:state, :3] += used[:state]
+        return on[:state]
+    size = state + 3 * waits
+    whole = np.zeros((size, size))
+    whole[:state, :state], whole[:state, state : state + 3] = on[:state], used[:state]
+    whole[state : size - 3, state + 3 :] = np.eye(3 * (waits - 1))
+    whole[size - 3 :, :state] = on[state:]
+    whole[size - 3 :, state : state + 3] += used[state:]
+    return whole
 
 
 def delay_margin_s(loop: Loop, v_bar: float, omega_bar: float, s_dot: float) -> float:
@@ -125,63 +142,51 @@ def bisect(holds: Callable[[float], bool], low: float, high: float, steps: int) 
     return low
 
 
-def _channel(
-    loop: Loop, v_bar: float, omega_bar: float, s_dot: float
-) -> tuple[Callable[[Vector], Vector], int, int]:
-    """(map of a small deviation over one fix, size of the state, control periods that it takes)."""
+def _interval(loop: Loop, v_bar: float, omega_bar: float, s_dot: float, tick: int) -> Vector:
+    """What small deviations of state and fix make of the state after an interval between fixes.
+
+    Its last three rows are the pose at a tick of the interval.
+    """
     h, periods = loop.period_s, min(loop.pose_every, MAX_PERIODS)
+    late_s = min(loop.pose_delay, MAX_PERIODS) * h
     law = LAWS[loop.law](loop.gains, loop.wheels, h)
     whole = int(loop.torque_delay_s / h)
     part = loop.torque_delay_s / h - whole
     v, omega = v_bar * s_dot, omega_bar * s_dot
-    held = loop.pose_every > 1 or loop.pose_delay > 0
-    late = min(loop.pose_delay, MAX_PERIODS) if held else 0
     rows = loop.theta[:4], loop.theta[4:]
     at = _Frame(v, omega)
     steady = _steady_torques(loop.body, v, omega)
-    size = 8 + 2 * (whole + 1) + (3 * (late + 1) if held else 0)
+    size = 8 + 2 * (whole + 1)
 
     def run(deviation: Vector) -> Vector:
         x, y, theta, dv, domega, a_theta, a_v, a_omega = deviation[:8].tolist()
         state = State(*at.in_world(0.0, x, y, theta), v + dv, omega + domega, 0.0, 0.0)
         torques = deque(
             (steady[0] + r, steady[1] + left)
-            for r, left in deviation[8 : 10 + 2 * whole].reshape(-1, 2).tolist()
+            for r, left in deviation[8:size].reshape(-1, 2).tolist()
         )
-        # Poses of the past `late` periods, as they were, oldest first; the oldest is the fix.
-        poses: deque[tuple[float, float, float]] = deque()
-        if held:
-            old = deviation[10 + 2 * whole :].reshape(-1, 3).tolist()
-            poses.extend(at.in_world((n - late) * h, *pose) for n, pose in enumerate(old))
-            poses[-1] = (state.x, state.y, state.theta)
+        fix = at.in_world(-late_s, *deviation[size:].tolist())
         memory = LawState(a_theta, v + a_v, omega + a_omega, *rows, 0.0)  # type: ignore[arg-type]
-        fix = poses[0] if held else None
+        pose = (x, y, theta)
         for n in range(periods):
-            seen = fix if fix is not None else (state.x, state.y, state.theta)
-            sense = Sense(*seen, state.v, state.omega)
             t = n * h
-            place = at.in_world(t, 0.0, 0.0, 0.0)
-            reference = Reference(*place, v_bar, omega_bar)
-            out = law(memory, sense, reference, s_dot)
+            if n == tick:
+                pose = at.in_path(t, state.x, state.y, state.theta)
+            reference = Reference(*at.in_world(t, 0.0, 0.0, 0.0), v_bar, omega_bar)
+            out = law(memory, Sense(*fix, state.v, state.omega), reference, s_dot)
             memory = out.state._replace(theta_1=memory.theta_1, theta_2=memory.theta_2, kappa=0.0)
             torques.append((out.tau_right, out.tau_left))
             if part > 0.0:
                 state = _moved(loop.body, state, torques[0], part * h)
             state = _moved(loop.body, state, torques[1], (1.0 - part) * h)
             torques.popleft()
-            if held:
-                poses.append((state.x, state.y, state.theta))
-                poses.popleft()
-        t = periods * h
-        pose = at.in_path(t, state.x, state.y, state.theta)
+        end = at.in_path(periods * h, state.x, state.y, state.theta)
         filters = memory.alpha_theta, memory.alpha_v - v, memory.alpha_omega - omega
         queue = [value - s for pair in torques for value, s in zip(pair, steady, strict=True)]
-        past = [
-            value for n, old in enumerate(poses) for value in at.in_path(t + (n - late) * h, *old)
-        ]
-        return np.array([*pose, state.v - v, state.omega - omega, *filters, *queue, *past])
+        return np.array([*end, state.v - v, state.omega - omega, *filters, *queue, *pose])
 
-    return run, size, periods
+    nudges = _NUDGE * np.eye(size + 3)
+    return np.array([(run(nudge) - run(-nudge)) / (2.0 * _NUDGE) for nudge in nudges]).T
 
 
 def _moved(body: Robot, state: State, torques: tuple[float, float], span_s: float) -> State:

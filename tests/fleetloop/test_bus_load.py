@@ -52,6 +52,13 @@ def test_a_wire_over_the_ceiling_is_refused_with_the_numbers() -> None:
         assert part in finding.text
 
 
+def test_a_ceiling_that_is_raised_allows_what_the_wire_can_carry() -> None:
+    finding = found("bus.bitrate_bit_s=500000", "bus.load_ceiling=0.95")
+    assert finding.level == "warning"
+    assert "when all are due at once" in finding.text
+    assert found("bus.bitrate_bit_s=250000", "bus.load_ceiling=1.0").level == "error"
+
+
 def test_an_ideal_bus_is_only_told_what_a_wire_could_not_do() -> None:
     finding = first_of(load("paper", ("bus.bitrate_bit_s=125000",)))
     assert finding.level == "warning"

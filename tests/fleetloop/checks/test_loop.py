@@ -3,8 +3,11 @@
 from dataclasses import replace
 from math import isclose, pi, sin
 
+import numpy as np
 import pytest
 
+from agents.laws import LAWS, Sense
+from agents.paths import Reference
 from configs.loading import load
 from fleetloop.checks.loop import (
     Loop,
@@ -16,6 +19,8 @@ from fleetloop.checks.loop import (
     speed_loop_radius,
 )
 from fleetloop.checks.sampling import loop_of
+from plant.integrate import rk4
+from plant.robot import State
 
 STRAIGHT = 1.0, 0.0, 0.6
 
@@ -66,6 +71,38 @@ def test_poses_that_are_held_for_long_are_worse_than_fresh_ones(paper: Loop) -> 
     held = replace(paper, pose_every=1500, pose_delay=1)
     assert channel_radius(replace(paper, pose_every=5, pose_delay=1), *STRAIGHT) < 1.0
     assert channel_radius(held, *STRAIGHT) > channel_radius(paper, *STRAIGHT)
+
+
+@pytest.mark.parametrize(("every", "late"), [(50, 70), (20, 130), (100, 100)])
+def test_held_and_late_poses_decay_as_the_law_itself_has_it(
+    paper: Loop, every: int, late: int
+) -> None:
+    loop = replace(paper, pose_every=every, pose_delay=late)
+    off = _offsets(loop, v=0.6, fixes=20_000 // every)
+    ticks = every * np.arange(len(off))
+    later = slice(len(off) // 4, None)
+    slope = np.polyfit(ticks[later], np.log(off[later]), 1)[0]
+    assert channel_radius(loop, *STRAIGHT) == pytest.approx(np.exp(slope), abs=5e-5)
+    assert channel_radius(loop, *STRAIGHT) > channel_radius(paper, *STRAIGHT) + 5e-5
+
+
+def _offsets(loop: Loop, *, v: float, fixes: int) -> np.ndarray:
+    """|y_e| at each fix of a robot that starts a micrometre off a line, tick by tick."""
+    h = loop.period_s
+    law, memory = LAWS[loop.law](loop.gains, loop.wheels, h), None
+    state = State(0.0, 1e-6, 0.0, v, 0.0, 0.0, 0.0)
+    poses = [(v * h * n, 0.0, 0.0) for n in range(-loop.pose_delay, 0)]
+    off = []
+    for tick in range(fixes * loop.pose_every):
+        poses.append((state.x, state.y, state.theta))
+        if tick % loop.pose_every == 0:
+            fix = poses[tick]
+            off.append(abs(state.y))
+        reference = Reference(v * h * tick, 0.0, 0.0, 1.0, 0.0)
+        out = law(memory, Sense(*fix, state.v, state.omega), reference, v)
+        memory = out.state._replace(theta_1=loop.theta[:4], theta_2=loop.theta[4:], kappa=0.0)
+        state = rk4(loop.body, state, out.tau_right, out.tau_left, 0.0, h)
+    return np.array(off)
 
 
 def test_late_torques_make_the_channel_unstable_where_the_speed_loop_is(paper: Loop) -> None:
