@@ -325,7 +325,7 @@ class Bus(Section):
         ("blf",), description="recordings of every bus in the run's folder: Vector BLF, candump log"
     )
     load_ceiling: Annotated[float, Field(gt=0, le=1)] = Field(
-        0.7, description="worst-case load above which a bus on a wire is refused"
+        0.7, description="worst-case load above which a check warns of a bus on a wire"
     )
 
 

@@ -32,8 +32,9 @@ _TYPICAL_N_M = 0.05
 def bus_findings(scenario: Scenario, robots: Sequence[RobotBrief]) -> list[Finding]:
     """One finding per bus of the robots.
 
-    On a wire it is an error if the worst load is above the ceiling, which is 1 at most; below it a
-    backlog works itself off, so it is a warning if a message can be late when all are due at once.
+    On a wire it is an error if even the mean load is more than the wire carries: a backlog grows for
+    ever. Below that a backlog works itself off, so a load above the ceiling, or a message that can be
+    late when all are due at once, is a warning.
     """
     buses: dict[str, list[RobotBrief]] = {}
     for robot in robots:
@@ -113,11 +114,12 @@ def _finding(scenario: Scenario, robots: tuple[str, ...], analysis: Analysis) ->
         text += f"; {late} of {count} can come too late"
     if scenario.bus.timing == "ideal":
         return Finding("warning", title, f"{text}: no real bus can, the ideal one does", robots)
-    if analysis.worst_load <= ceiling:
-        usually = all(message.usually_schedulable for message in analysis.messages)
-        text += ", but only when all are due at once" + (" and longest" if usually else "")
+    if analysis.mean_load < 1.0:
+        if late:
+            usually = all(message.usually_schedulable for message in analysis.messages)
+            text += ", but only when all are due at once" + (" and longest" if usually else "")
+        if analysis.worst_load > ceiling:
+            text += ": lower the rates, put fewer robots on a bus, or raise bus.load_ceiling"
         return Finding("warning", title, text, robots, "bus.bitrate_bit_s")
     text += ": lower the rates, or put fewer robots on a bus"
-    if analysis.mean_load < 1.0:
-        text += ", or allow it by bus.load_ceiling"
     return Finding("error", title, text, robots, "bus.bitrate_bit_s")
