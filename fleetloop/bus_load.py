@@ -32,9 +32,9 @@ _TYPICAL_N_M = 0.05
 def bus_findings(scenario: Scenario, robots: Sequence[RobotBrief]) -> list[Finding]:
     """One finding per bus of the robots.
 
-    On a wire it is an error if even the mean load is more than the wire carries: a backlog grows for
-    ever. Below that a backlog works itself off, so a load above the ceiling, or a message that can be
-    late when all are due at once, is a warning.
+    On a wire it is an error if even the mean load is more than it carries: a backlog grows. Below
+    that a backlog works itself off, so a load above the ceiling, or a message that can be late when
+    all are due at once, is a warning.
     """
     buses: dict[str, list[RobotBrief]] = {}
     for robot in robots:
