@@ -10,7 +10,7 @@ ruff check .
 mypy
 lint-imports
 # Both take minutes; a hang ends red long before CI's patience does.
-tests/within.sh 40m pytest "$@"
+tests/support/within.sh 40m pytest "$@"
 if [[ $# -eq 0 ]]; then
-    tests/within.sh 30m tests/socketcan/in_guest.sh
+    tests/support/within.sh 30m tests/socketcan/in_guest.sh
 fi

@@ -14,17 +14,18 @@ import can
 
 from agents.agent import Agent
 from agents.guard import Phase
-from agents.loop import Counters, LockstepLoop, give
+from agents.lockstep import Counters, LockstepLoop, give
 from agents.realtime import Counters as Clock
 from agents.realtime import RealtimeLoop
-from bridge import keys
-from bridge.barrier import Hellos, await_hellos
-from bridge.can_bus.convert import to_message
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.opening import open_bus
+from bridge.can_bus.pythoncan import to_message
 from bridge.launcher import follow_launcher
-from bridge.link import Arrival, Link, Publisher
-from bridge.messages import Notice, Report, Rows
+from bridge.network import keys
+from bridge.network.barrier import Hellos, await_hellos
+from bridge.network.link import Arrival, Link, Publisher
+from bridge.network.messages import Notice, Report, Rows
+from bridge.network.zenoh_link import POLLED_DEPTH, StoppedError, open_polled
 from bridge.process import (
     Stop,
     cpu_ns,
@@ -36,7 +37,6 @@ from bridge.process import (
 )
 from bridge.profile import Sampler
 from bridge.telemetry import AGENT_ROW, RowBuffer
-from bridge.zenoh_link import POLLED_DEPTH, StoppedError, open_polled
 from configs.brief import AgentBrief
 from configs.errors import FleetloopError, InfrastructureError
 

@@ -17,8 +17,8 @@ sums.
 
 from collections import Counter
 
-from bridge.messages import LeaderSpeed, PathState, PoseFix
-from bridge.refusals import Refusals
+from bridge.network.messages import LeaderSpeed, PathState, PoseFix
+from bridge.network.refusals import Refusals
 from configs.brief import LEAD_TICKS, AgentBrief
 from configs.reach import within_world
 

@@ -36,7 +36,7 @@ from agents.localisation import Localiser
 from agents.neighbours import Neighbours
 from agents.paths import Reference, robot_path
 from bridge.frame import Frame
-from bridge.messages import LeaderSpeed, PathState, PoseFix
+from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.telemetry import RowBuffer
 from configs.brief import AgentBrief
 from configs.signals import LAW_SIGNALS

@@ -23,16 +23,16 @@ import can
 from agents.agent import Agent
 from agents.bus_health import BusHealth
 from agents.guard import Phase
-from agents.loop import did_not_start, give
-from bridge.access import LAUNCHER
+from agents.lockstep import did_not_start, give
 from bridge.awake import STALL_S, Lateness
-from bridge.barrier import Hellos
-from bridge.can_bus.convert import can_id_of, to_frame, to_message
 from bridge.can_bus.echo import Echoes, hands_back
+from bridge.can_bus.pythoncan import can_id_of, to_frame, to_message
 from bridge.clock import implausible_start, monotonic_of
 from bridge.frame import ERR, Frame
-from bridge.link import Link, Publisher, waiting
-from bridge.messages import Go, Progress
+from bridge.network.access import LAUNCHER
+from bridge.network.barrier import Hellos
+from bridge.network.link import Link, Publisher, waiting
+from bridge.network.messages import Go, Progress
 from bridge.process import Stop
 
 ARRIVALS_PER_TICK = 64

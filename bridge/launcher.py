@@ -6,11 +6,11 @@ the way to it.
 
 from functools import partial
 
-from bridge import keys
-from bridge.access import LAUNCHER
-from bridge.messages import Report
+from bridge.network import keys
+from bridge.network.access import LAUNCHER
+from bridge.network.messages import Report
+from bridge.network.zenoh_link import ZenohLink
 from bridge.process import LAUNCHER_GONE, Stop
-from bridge.zenoh_link import ZenohLink
 
 RUN_ENDED = "the run was ended"
 

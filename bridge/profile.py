@@ -17,13 +17,13 @@ _PLACES = (
     ("/site-packages/can/", "bus"),
     ("/bridge/drives/", "drives"),
     ("/bridge/telemetry.py", "record"),
-    ("/bridge/messages.py", "Zenoh"),
-    ("/bridge/link.py", "Zenoh"),
-    ("/bridge/zenoh_link.py", "Zenoh"),
+    ("/bridge/network/messages.py", "Zenoh"),
+    ("/bridge/network/link.py", "Zenoh"),
+    ("/bridge/network/zenoh_link.py", "Zenoh"),
     ("/msgpack/", "Zenoh"),
-    ("/agents/loop.py", "bus"),
+    ("/agents/lockstep.py", "bus"),
     ("/agents/", "law"),
-    ("/plant/loop.py", "bus"),
+    ("/plant/lockstep.py", "bus"),
     ("/plant/", "plant"),
 )
 

@@ -478,7 +478,7 @@ class PowertrainModel:
 
 @dataclass(frozen=True, slots=True)
 class WireModel:
-    """How a bus is emulated that has a bit rate: see `bridge.can_bus.wire`."""
+    """How a bus is emulated that has a bit rate: see `bridge.wire.wire`."""
 
     bitrate_bit_s: int
     txqueuelen: int  # frames in a host's transmit queue

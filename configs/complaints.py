@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 
-from configs.cross_checks import Problem
+from configs.checks import Problem
 from configs.errors import Complaint, ScenarioError
 from configs.patterns import WORDS
 from configs.scenario import Scenario

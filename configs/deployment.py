@@ -17,8 +17,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from configs import patterns
 from configs.brief import OURS, Settings, TlsFiles
+from configs.checks import Problem
 from configs.complaints import MISSING, complaints, refusal
-from configs.cross_checks import Problem
 from configs.errors import Complaint, ScenarioError
 from configs.files import expanded
 from configs.scenario import Scenario

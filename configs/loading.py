@@ -14,8 +14,8 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
+from configs.checks import Problem, cross_problems
 from configs.complaints import complaints, refusal, salvage
-from configs.cross_checks import Problem, cross_problems
 from configs.errors import Complaint, ScenarioError
 from configs.overrides import Override
 from configs.scenario import Scenario

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from configs.graph import Graph, generated, parse_edge, random_rooted
 from configs.host import Host
 from configs.powertrain import Encoder, Motor, Supply
 from configs.sections import (
@@ -33,7 +34,6 @@ from configs.sections import (
     Section,
     Seed,
 )
-from configs.topology import Graph, generated, parse_edge, random_rooted
 
 ETSRO = "etsro"
 """The robot type that every scenario knows: the paper's."""

@@ -7,6 +7,8 @@ from fleetloop.packages import load_own
 if TYPE_CHECKING:
     from bridge.can_bus.interface import FleetloopBus
 else:
-    FleetloopBus = load_own("bridge.can_bus.interface", "bridge.can_bus.remote").FleetloopBus
+    FleetloopBus = load_own(
+        "bridge.can_bus.interface", "bridge.can_bus.zenoh_transport"
+    ).FleetloopBus
 
 __all__ = ["FleetloopBus"]

@@ -144,7 +144,7 @@ def run(
     ] = False,
 ) -> None:
     """Run a scenario, record everything, check its expectations, print and save the results."""
-    from fleetloop.run import Options, run_scenario
+    from fleetloop.launch.run import Options, run_scenario
 
     options = Options(
         in_process=in_process,
@@ -174,7 +174,7 @@ def agent(
     overrides: SetOption = None,
 ) -> None:
     """Run one robot's controller on its own, as on the robot: its CAN bus, a router elsewhere."""
-    from fleetloop.agent_alone import run_agent
+    from fleetloop.launch.agent import run_agent
 
     _refuse_lockstep(clock)
     changes = _changes(overrides, clock=clock, seed=seed)
@@ -216,7 +216,7 @@ def plant(
     ] = False,
 ) -> None:
     """Emulate drives and physics alone, in real time, for your own CAN host code."""
-    from fleetloop.plant_alone import Options, run_plant
+    from fleetloop.launch.plant import Options, run_plant
 
     _refuse_lockstep(clock)
     options = Options(
@@ -250,7 +250,7 @@ def check(
     ] = False,
 ) -> None:
     """Check a scenario without running it: schema, graph conditions, stability, gains, torque."""
-    from fleetloop.check import check_scenario, list_scenarios, print_schema
+    from fleetloop.check.command import check_scenario, list_scenarios, print_schema
 
     if schema:
         print_schema()
@@ -264,9 +264,9 @@ def check(
 @app.command()
 def report(run: RunArg, partial: PartialOption = False) -> None:
     """Make report.html and the figures of a run again from its record."""
-    from fleetloop.report import write_report
-    from fleetloop.results import print_report
-    from fleetloop.run_folder import read_record
+    from fleetloop.results.report import write_report
+    from fleetloop.results.run_folder import read_record
+    from fleetloop.results.tables import print_report
 
     print_report(write_report(run, read_record(run, partial=partial)))
 
@@ -310,8 +310,8 @@ def export(
     partial: PartialOption = False,
 ) -> None:
     """Write one row per tick and robot, each robot up to its own end."""
-    from fleetloop.export import Selection
-    from fleetloop.export import export as export_run
+    from fleetloop.results.export import Selection
+    from fleetloop.results.export import export as export_run
     from fleetloop.terminal import say
 
     chosen = Selection(
@@ -332,7 +332,7 @@ def diff(
     partial: PartialOption = False,
 ) -> None:
     """Compare two runs bit for bit; name the first tick, robot and field that differ."""
-    from fleetloop.diff import print_comparison
+    from fleetloop.results.diff import print_comparison
 
     raise typer.Exit(print_comparison(a, b, as_json=as_json, partial=partial))
 
@@ -421,7 +421,7 @@ def main() -> None:
     except FleetloopError as error:
         sys.stderr.write(f"fleetloop: {error}\n")
         status = error.exit_code
-    link = sys.modules.get("bridge.zenoh_link")
+    link = sys.modules.get("bridge.network.zenoh_link")
     if link is not None and link.ZenohLink.stuck:
         sys.stdout.flush()
         sys.stderr.flush()

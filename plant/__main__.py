@@ -10,15 +10,16 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
 
-from bridge import keys
 from bridge.awake import Stall
-from bridge.barrier import Hellos, await_hellos
-from bridge.can_bus.ends import DriveEnd
+from bridge.can_bus.drive_port import DriveEnd
 from bridge.can_bus.hub import Hub
 from bridge.clock import implausible_start, monotonic_of
 from bridge.launcher import follow_launcher
-from bridge.link import Arrival, Link, Publisher, waiting
-from bridge.messages import Go, Notice, PoseFix, Progress, Report, Rows
+from bridge.network import keys
+from bridge.network.barrier import Hellos, await_hellos
+from bridge.network.link import Arrival, Link, Publisher, waiting
+from bridge.network.messages import Go, Notice, PoseFix, Progress, Report, Rows
+from bridge.network.zenoh_link import StoppedError, open_client
 from bridge.process import (
     Stop,
     cpu_ns,
@@ -29,14 +30,13 @@ from bridge.process import (
 )
 from bridge.profile import Sampler
 from bridge.telemetry import PLANT_ROW, FrameBuffer, RowBuffer
-from bridge.zenoh_link import StoppedError, open_client
 from configs.brief import PlantBrief, Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError
 from plant.herald import Herald
-from plant.loop import Counters, LockstepLoop, bus_frames
+from plant.lockstep import Counters, LockstepLoop, bus_frames
+from plant.real_robot import Witness
 from plant.realtime import RealtimeLoop
-from plant.unit import diverged_robots, unit_of
-from plant.witness import Witness
+from plant.robot import diverged_robots, unit_of
 
 PLANT_PRIORITY = 45
 """SCHED_FIFO, above the controllers'."""
@@ -87,7 +87,7 @@ def join(hub: Hub, attached: Sequence[tuple[str, Settings]]) -> DriveEnd:
     """
     if not attached:
         return hub
-    from bridge.can_bus.attached import AttachedBuses
+    from bridge.can_bus.external import AttachedBuses
     from bridge.can_bus.joined import JoinedEnds
 
     names = [name for name, _ in attached]

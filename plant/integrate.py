@@ -6,8 +6,8 @@ that are linear in (v, ω), so they come from the same stages.
 
 from math import cos, sin
 
+from plant.body import Robot, State
 from plant.divergence import FARTHEST
-from plant.robot import Robot, State
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 

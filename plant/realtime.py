@@ -13,16 +13,16 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 
 from bridge.awake import Lateness
-from bridge.can_bus.ends import DriveEnd
+from bridge.can_bus.drive_port import DriveEnd
 from bridge.can_bus.hub import Hub
-from bridge.link import Publisher
-from bridge.messages import PoseFix, Progress
+from bridge.network.link import Publisher
+from bridge.network.messages import PoseFix, Progress
 from bridge.process import Stop
 from bridge.telemetry import RowBuffer, Tap
 from configs.brief import PlantBrief
-from plant.live import WireLive, live_buses
-from plant.loop import REPORT_EVERY_NS, Counters
-from plant.unit import Unit
+from plant.bus.live import WireLive, live_buses
+from plant.lockstep import REPORT_EVERY_NS, Counters
+from plant.robot import Unit
 
 FAREWELL_S = 0.5
 """How long the plant stays for controllers that act after its last tick."""

@@ -1,102 +1,231 @@
-"""The rigid body of a differential-drive robot, equations (2)-(4), in body speeds ξ = (v, ω).
+"""One emulated robot: body, and behind each wheel a drive, a motor and an encoder.
 
-m   = m_c + n m_w,  n = `wheels_in_mass`: 1 as the paper prints it, 2 physically
-I   = m_c a² + 2 m_w b² + I_c + 2 I_m
-m11 = r²/(4b²) (m b² + I) + I_w,   m12 = r²/(4b²) (m b² − I),   c = r² m_c a / (2b)
-m̄_1 = m11 + m12,  m̄_2 = m11 − m12          M̄ = diag(m̄_1, m̄_2), inertias seen at the wheels
-D̄_11 = D̄_22 = (d11 + d22)/2,  D̄_12 = b (d11 − d22)/2,  D̄_21 = (d11 − d22)/(2b)
+    bus frames ─► drive ─torque demand─► motor ─torque─► body ─wheel angle, speed─► encoder ─► drive
 
-x' = v cos θ,  y' = v sin θ,  θ' = ω
-m̄_1 v' =  c b ω²      − D̄_11 v − D̄_12 ω + r/2 (τ_R + τ_L − Δ_R − Δ_L)
-m̄_2 ω' = −(c/b) v ω   − D̄_21 v − D̄_22 ω + r/(2b) (τ_R − τ_L − Δ_R + Δ_L)
-ν_R = (v + b ω)/r,  ν_L = (v − b ω)/r                                        (3)
+A unit is told the time and never asks for it. A step of the integration holds the torques.
+Drives, motors and encoders are at the motor shaft, the body and what is recorded at the wheel:
 
-x, y [m]   θ [rad]   v [m/s]   ω [rad/s]   ν wheel speeds [rad/s]   τ, Δ [N·m] at the wheels
+    wheel torque = gear × shaft torque,  shaft angle = gear × wheel angle,  gear = sign × gear ratio
+
+    Unit        ideal motors and encoders: what a drive asks for acts at once, what it hears is true
+    RealUnit    motors, supply and encoders of `plant.powertrain`
 """
 
-from collections.abc import Callable
-from math import cos, sin
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
 
-from configs.brief import Body, Disturbance
-from plant.divergence import FASTEST_WHEEL_RAD_S
+from bridge.drives import DRIVES, DriveNode
+from bridge.drives.feeling import Feeling
+from bridge.frame import Frame
+from configs.brief import PowertrainModel, RobotBrief, when
+from plant.body import Robot, State
+from plant.divergence import Divergence
+from plant.encoder import PER_RADIAN
+from plant.integrate import rk4
+from plant.powertrain import powertrain
 
-Accelerations = Callable[[float, float, float, float], tuple[float, float]]
-
-
-class State(NamedTuple):
-    """Motion of one robot; the wheel angles are what its encoders count."""
-
-    x: float
-    y: float
-    theta: float
-    v: float
-    omega: float
-    right_angle: float
-    left_angle: float
+FEEL_EVERY_S = 0.001
+"""How often a drive's firmware reads its thermistors and currents, at most."""
 
 
-class Robot:
-    """Constants of (4) for one robot."""
+class Unit:
+    """One robot on its bus."""
 
-    def __init__(self, body: Body, disturbance: Disturbance) -> None:
-        r, b, a = body.wheel_radius_m, body.half_track_m, body.com_offset_m
-        mass = body.body_mass_kg + body.wheels_in_mass * body.wheel_mass_kg
-        inertia = (
-            body.body_mass_kg * a * a
-            + 2.0 * body.wheel_mass_kg * b * b
-            + body.body_inertia_kg_m2
-            + 2.0 * body.wheel_diameter_inertia_kg_m2
+    __slots__ = (
+        "_answered_ns",
+        "_body",
+        "_demand_left",
+        "_demand_right",
+        "_gear_left",
+        "_gear_right",
+        "_left",
+        "_right",
+        "_torque_left",
+        "_torque_right",
+        "brief",
+        "divergence",
+        "drives",
+        "moved_ns",
+        "state",
+    )
+
+    def __init__(self, brief: RobotBrief) -> None:
+        node = DRIVES[brief.drive.protocol].node
+        self.brief = brief
+        self._body = Robot(brief.body, brief.disturbance)
+        self._right = node(brief.drive, brief.right_node, brief.drive.serial_number)
+        self._left = node(brief.drive, brief.left_node, brief.drive.serial_number + 1)
+        self.drives: tuple[DriveNode, DriveNode] = (self._right, self._left)
+        self.divergence: Divergence | None = None
+        """Why the body stands still for good, None if it doesn't."""
+        self.moved_ns = 0
+        """Bus time up to which the body has moved, for who moves it from event to event."""
+        mounting = brief.mounting
+        self._gear_right = mounting.right_sign * mounting.gear_ratio
+        self._gear_left = mounting.left_sign * mounting.gear_ratio
+        self._answered_ns = 0
+        self._demand_right = self._demand_left = 0.0
+        self._torque_right = self._torque_left = 0.0
+        pose = brief.pose
+        self.state = State(
+            pose.x_m, pose.y_m, pose.theta_rad, brief.v_m_s, brief.omega_rad_s, 0.0, 0.0
         )
-        scale = r * r / (4.0 * b * b)
-        m11 = scale * (mass * b * b + inertia) + body.wheel_axle_inertia_kg_m2
-        m12 = scale * (mass * b * b - inertia)
-        self.r, self.b, self.inv_r = r, b, 1.0 / r
-        self.fastest_m_s = r * FASTEST_WHEEL_RAD_S
-        """No wheel's rim moves faster."""
-        self.c = r * r * body.body_mass_kg * a / (2.0 * b)
-        self.mbar_1, self.mbar_2 = m11 + m12, m11 - m12
-        right, left = body.damping_right_N_m_s, body.damping_left_N_m_s
-        self._damping = (
-            0.5 * (right + left) / self.mbar_1,
-            0.5 * b * (right - left) / self.mbar_1,
-            0.5 * (right - left) / b / self.mbar_2,
-            0.5 * (right + left) / self.mbar_2,
+
+    def feed(self) -> None:
+        """Tell both drives what their encoders see."""
+        state = self.state
+        right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
+        right, left = PER_RADIAN * self._gear_right, PER_RADIAN * self._gear_left
+        self._right.feed(state.right_angle * right, right_speed * right)
+        self._left.feed(state.left_angle * left, left_speed * left)
+
+    def feedback(self, now_ns: int) -> Sequence[Frame]:
+        """Both encoder frames, once both drives have taken a set-point since the last ones."""
+        if min(self._right.fed_ns, self._left.fed_ns) <= self._answered_ns:
+            return ()
+        self._answered_ns = now_ns
+        self.feed()
+        return self._right.feedback(now_ns), self._left.feedback(now_ns)
+
+    def frames_due(self, now_ns: int) -> list[Frame]:
+        """What both drives send at this instant, in order of arbitration."""
+        self.feed()
+        frames = [*self._right.due(now_ns), *self._left.due(now_ns)]
+        if len(frames) > 1:
+            frames.sort()
+        return frames
+
+    def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
+        """Give one frame from the bus to the drives that it may concern; return their replies."""
+        can_id, right, left = frame[0], self._right, self._left
+        if can_id == right.setpoint_id != left.setpoint_id:
+            return right.hear(frame, now_ns)
+        if can_id == left.setpoint_id != right.setpoint_id:
+            return left.hear(frame, now_ns)
+        replies = right.hear(frame, now_ns), left.hear(frame, now_ns)
+        return [*replies[0], *replies[1]] if any(replies) else ()
+
+    def advance(self, t_s: float, period_s: float, substeps: int) -> None:
+        """Integrate one control period from scenario time `t_s`, torques held."""
+        state = self.state
+        right = self._right.torque_demand(period_s) * self._gear_right
+        left = self._left.torque_demand(period_s) * self._gear_left
+        self._torque_right = self._demand_right = right
+        self._torque_left = self._demand_left = left
+        if self.divergence is not None:
+            return
+        step = period_s / substeps
+        for n in range(substeps):
+            after = rk4(self._body, state, right, left, t_s + n * step, step)
+            if after is None:
+                state = self._stop(state, Divergence(t_s, state.v, state.omega, right, left))
+                break
+            state = after
+        self.state = state
+
+    def move(self, to_ns: int, zero_ns: int, step_ns: int) -> None:
+        """Move on to a bus time, in steps of at most `step_ns`, and tell the drives where that is.
+
+        Before `zero_ns` the body is held; time doesn't go back.
+        """
+        from_ns = max(self.moved_ns, zero_ns)
+        if to_ns > from_ns:
+            span_ns = to_ns - from_ns
+            self.advance((from_ns - zero_ns) * 1e-9, span_ns * 1e-9, -(-span_ns // step_ns))
+        if to_ns > self.moved_ns:
+            self.moved_ns = to_ns
+            self.feed()
+
+    def _stop(self, sound: State, divergence: Divergence) -> State:
+        """The motion diverged: the state at rest where it was sound at last."""
+        self.divergence = divergence
+        self._right.lose_estimate()
+        self._left.lose_estimate()
+        return sound._replace(v=0.0, omega=0.0)
+
+    def row(self, t_s: float) -> tuple[float, ...]:
+        """The signals of `configs.signals.PLANT_SIGNALS` at this instant."""
+        x, y, theta, v, omega, _, _ = self.state
+        return (
+            t_s,
+            x,
+            y,
+            theta,
+            v,
+            omega,
+            self._right.input_torque * self._gear_right,
+            self._left.input_torque * self._gear_left,
+            self._demand_right,
+            self._demand_left,
+            self._torque_right,
+            self._torque_left,
         )
-        self.accelerations = self._equations()
-        """(v, ω, right, left) ↦ (v', ω') under net wheel torques τ − Δ [N·m]."""
-        self.disturbed = disturbance.amplitude_N_m != 0.0
-        self._amplitude = disturbance.amplitude_N_m
-        self._rate, self._phase = disturbance.rate_rad_s, disturbance.phase_rad
 
-    def wheel_speeds(self, v: float, omega: float) -> tuple[float, float]:
-        """(right, left) wheel speeds ν [rad/s], equation (3)."""
-        turn = self.b * omega
-        return (v + turn) * self.inv_r, (v - turn) * self.inv_r
 
-    def disturbance(self, t_s: float) -> tuple[float, float]:
-        """Δ(t) at the (right, left) wheel [N·m]; zero before t = 0."""
-        if not self.disturbed or t_s < 0.0:
-            return 0.0, 0.0
-        angle = self._rate * t_s + self._phase
-        return self._amplitude * sin(angle), self._amplitude * cos(angle)
+class RealUnit(Unit):
+    """One robot with real motors, supply and encoders."""
 
-    def net(self, right: float, left: float, t_s: float) -> tuple[float, float]:
-        """τ − Δ(t) at the (right, left) wheel [N·m]."""
-        d_right, d_left = self.disturbance(t_s)
-        return right - d_right, left - d_left
+    __slots__ = ("_felt_s", "_train")
 
-    def _equations(self) -> Accelerations:
-        """(v', ω') of (4), its constants bound once."""
-        centrifugal, coriolis = self.c * self.b / self.mbar_1, self.c / self.b / self.mbar_2
-        d11, d12, d21, d22 = self._damping
-        g1 = 0.5 * self.r / self.mbar_1
-        g2 = 0.5 * self.r / self.b / self.mbar_2
+    def __init__(self, brief: RobotBrief, model: PowertrainModel) -> None:
+        super().__init__(brief)
+        self._train = powertrain(model, self._shaft_inertia(brief.mounting.gear_ratio))
+        self._felt_s = 0.0
 
-        def accelerations(v: float, omega: float, right: float, left: float) -> tuple[float, float]:
-            return (
-                centrifugal * omega * omega - d11 * v - d12 * omega + g1 * (right + left),
-                -coriolis * v * omega - d21 * v - d22 * omega + g2 * (right - left),
-            )
+    def _shaft_inertia(self, gear_ratio: float) -> float:
+        """What a motor turns at least, seen at its shaft [kg·m²]."""
+        return min(self._body.mbar_1, self._body.mbar_2) / (gear_ratio * gear_ratio)
 
-        return accelerations
+    def feed(self) -> None:
+        """The encoders have told their drives already, at every step."""
+
+    def advance(self, t_s: float, period_s: float, substeps: int) -> None:
+        """Integrate one span from scenario time `t_s`; drives, motors and encoders step with it."""
+        step = period_s / substeps
+        state, body, train = self.state, self._body, self._train
+        right, left = self._right, self._left
+        gear_r, gear_l = self._gear_right, self._gear_left
+        demands = torques = (0.0, 0.0)
+        for n in range(substeps):
+            demands = right.torque_demand(step), left.torque_demand(step)
+            right_speed, left_speed = body.wheel_speeds(state.v, state.omega)
+            shafts = train.step(demands, (right_speed * gear_r, left_speed * gear_l), step)
+            torques = shafts[0] * gear_r, shafts[1] * gear_l
+            if self.divergence is None:
+                after = rk4(body, state, *torques, t_s + n * step, step)
+                if after is None:
+                    after = self._stop(state, Divergence(t_s, state.v, state.omega, *torques))
+                state = after
+            right.feed(*train.right_encoder.step(state.right_angle * gear_r, step))
+            left.feed(*train.left_encoder.step(state.left_angle * gear_l, step))
+        self.state = state
+        self._demand_right, self._demand_left = demands[0] * gear_r, demands[1] * gear_l
+        self._torque_right, self._torque_left = torques
+        self._felt_s += period_s
+        if self._felt_s >= FEEL_EVERY_S:
+            self._felt_s = 0.0
+            self._feel()
+
+    def _feel(self) -> None:
+        """Tell both drives what they measure of their motors and of the supply."""
+        train = self._train
+        supply = train.supply
+        for drive, motor, amps in (
+            (self._right, train.right_motor, supply.right_A),
+            (self._left, train.left_motor, supply.left_A),
+        ):
+            torque, current = motor.sense()
+            drive.feel(Feeling(torque, current, motor.fet_C, motor.motor_C, supply.bus_V, amps))
+
+
+def unit_of(brief: RobotBrief) -> Unit:
+    """The emulation of a robot as its brief wants it."""
+    return Unit(brief) if brief.powertrain is None else RealUnit(brief, brief.powertrain)
+
+
+def diverged_robots(units: Iterable[Unit], period_ns: int) -> dict[str, str]:
+    """Robots whose motion diverged: the tick that did it, and how."""
+    return {
+        unit.brief.robot: f"{when(round(found.t_s * 1e9) // period_ns, period_ns)}: {found}"
+        for unit in units
+        if (found := unit.divergence) is not None
+    }

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from snippets import Snippet, commands, snippets
+from support.snippets import Snippet, commands, snippets
 
 from configs.deployment import check_deployment
 from configs.loading import load, loads

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from can.util import cast_from_string
 
-from bridge.tls import check_tls
+from bridge.network.tls import check_tls
 from configs.brief import NetworkLink, TlsFiles
 from configs.errors import ScenarioError
 from configs.files import expanded

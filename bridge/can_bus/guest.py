@@ -9,8 +9,8 @@ import socket
 from collections import deque
 
 from bridge.can_bus import packet as wire
-from bridge.can_bus.window import Receiver, Sender
-from bridge.link import Publisher
+from bridge.can_bus.flow_control import Receiver, Sender
+from bridge.network.link import Publisher
 
 READ, WRITE = select.EPOLLIN, select.EPOLLOUT
 _BYE = bytes((wire.BYE,))

@@ -34,11 +34,11 @@ from typing import Any
 import can
 from can.typechecking import AutoDetectedConfig, CanFilters
 
-from bridge.can_bus import options, places
+from bridge.can_bus import options, sockets
 from bridge.can_bus import packet as wire
-from bridge.can_bus.convert import to_frame, to_message
 from bridge.can_bus.credentials import OPTIONS, as_option, network_of
-from bridge.can_bus.lines import Line, UnixLine
+from bridge.can_bus.pythoncan import to_frame, to_message
+from bridge.can_bus.transport import Line, UnixLine
 from bridge.frame import Frame
 from configs.errors import ScenarioError
 
@@ -117,9 +117,9 @@ class FleetloopBus(can.BusABC):
 
     def _open_line(self, hello: bytes, timeout_s: float, remote: dict[str, str]) -> Line:
         if not remote:
-            return UnixLine(places.find(self.channel), hello, timeout_s)
+            return UnixLine(sockets.find(self.channel), hello, timeout_s)
         # Zenoh costs nobody anything who doesn't need it.
-        from bridge.can_bus.remote import RemoteLine
+        from bridge.can_bus.zenoh_transport import RemoteLine
 
         return RemoteLine(network_of(remote), self.channel, hello, timeout_s)
 
@@ -132,7 +132,7 @@ class FleetloopBus(can.BusABC):
         try:
             line = self._open_line(hello, timeout_s, remote)
             said = line.receive(timeout_s)
-        except (OSError, ValueError, places.NoSuchBusError, ScenarioError) as error:
+        except (OSError, ValueError, sockets.NoSuchBusError, ScenarioError) as error:
             if line is not None:
                 line.close()
             late = isinstance(error, TimeoutError) and not remote
@@ -238,8 +238,8 @@ class FleetloopBus(can.BusABC):
     @staticmethod
     def _detect_available_configs() -> list[AutoDetectedConfig]:
         return [
-            {"interface": "fleetloop", "channel": places.name_of(path)}
-            for path in places.live_buses()
+            {"interface": "fleetloop", "channel": sockets.name_of(path)}
+            for path in sockets.live_buses()
         ]
 
     # --- packets ---------------------------------------------------------------------------------

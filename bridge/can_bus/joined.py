@@ -5,8 +5,8 @@ Whoever waits here waits for all buses at once.
 
 from collections.abc import Sequence
 
-from bridge.can_bus.attached import AttachedBuses
-from bridge.can_bus.ends import Crossed, DriveEnd
+from bridge.can_bus.drive_port import Crossed, DriveEnd
+from bridge.can_bus.external import AttachedBuses
 from bridge.frame import Frame
 from bridge.waiting import readable
 

@@ -8,9 +8,9 @@ to the hub a guest is a client like any other. The router's access control binds
 guest's keys to its login; the relay lets a user onto the buses that it was granted, and says why it
 refuses.
 
-Nothing waits here. Both ways a window (`bridge.can_bus.window`) bounds what is on its way: a guest
-whose hub is busy sees its transmit buffer full, and what a guest doesn't read stays with the hub,
-which keeps and counts it as it does for all its clients. So one thread serves all guests.
+Nothing waits here. Both ways a window (`bridge.can_bus.flow_control`) bounds what is on its way: a
+guest whose hub is busy sees its transmit buffer full, and what a guest doesn't read stays with the
+hub, which keeps and counts it as it does for all its clients. So one thread serves all guests.
 
 A guest that leaves says goodbye behind its last packet and is told when all before it has reached
 the hub; one whose liveliness token goes has left. The bus's end goes to every guest with its
@@ -36,12 +36,12 @@ from typing import NamedTuple, Self
 
 import zenoh
 
-from bridge import keys
 from bridge.can_bus import packet as wire
-from bridge.can_bus import places
+from bridge.can_bus import sockets
 from bridge.can_bus.guest import READ, Guest
-from bridge.link import Publisher
-from bridge.zenoh_link import ZenohLink
+from bridge.network import keys
+from bridge.network.link import Publisher
+from bridge.network.zenoh_link import ZenohLink
 
 ALL_BUSES = "*"
 GOODBYE_S = 3.0
@@ -254,7 +254,7 @@ class Relay:
             try:
                 sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
                 sock.setblocking(False)
-                sock.connect(str(places.socket_path(self._folder, bus)))
+                sock.connect(str(sockets.socket_path(self._folder, bus)))
                 sock.send(hello)
                 self._epoll.register(sock, READ)
             except OSError as error:

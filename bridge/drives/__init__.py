@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from bridge.drives.feeling import Feeling
-from bridge.drives.odrive.client import Motion, OdriveClient
-from bridge.drives.odrive.node import OdriveNode
+from bridge.drives.odrive.local_axis import OdriveNode
+from bridge.drives.odrive.remote_axis import Motion, OdriveClient
 from bridge.frame import Frame
 from configs.brief import DriveLink, DriveModel
 

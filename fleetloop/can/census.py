@@ -9,9 +9,9 @@ Bus time is the scenario's: in lockstep it passes faster or slower than the wall
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from bridge.can_bus.bits import frame_bits
 from bridge.drives.odrive.frames import BITS, Command, decode_heartbeat, error_names
 from bridge.frame import EFF, ERR, RTR, Frame
+from bridge.wire.bits import frame_bits
 from fleetloop.can.cansimple import LAYOUTS, decode
 
 ERROR_FRAME_BITS = 20

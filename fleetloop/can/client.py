@@ -10,8 +10,8 @@ from typing import NamedTuple, Self
 
 import can
 
-from bridge.can_bus.convert import to_frame
 from bridge.can_bus.interface import BusClosedError, FleetloopBus
+from bridge.can_bus.pythoncan import to_frame
 from bridge.frame import Frame
 from configs.errors import FleetloopError, InfrastructureError
 

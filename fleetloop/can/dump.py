@@ -17,14 +17,14 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TextIO
 
-from bridge.can_bus import places
+from bridge.can_bus import sockets
 from bridge.frame import EFF, Frame
 from configs.errors import ScenarioError
 from fleetloop.can import error_frames, filters, text
 from fleetloop.can.cansimple import words
 from fleetloop.can.client import Heard, Listener, open_bus
 from fleetloop.can.filters import Filter
-from fleetloop.signals import interruptible
+from fleetloop.launch.signals import interruptible
 from fleetloop.streams import forget_output
 from fleetloop.terminal import note
 
@@ -158,11 +158,11 @@ def _wanted(targets: Sequence[str]) -> dict[str, tuple[str, Filter]]:
     channels: list[tuple[str, Filter]] = []
     for channel, filtered in parsed:
         if channel == ANY:
-            channels += [(places.name_of(path), filtered) for path in places.live_buses()]
+            channels += [(sockets.name_of(path), filtered) for path in sockets.live_buses()]
         else:
             channels.append((channel, filtered))
     if not channels:
-        raise places.NoSuchBusError("no bus is up: none is running here")
+        raise sockets.NoSuchBusError("no bus is up: none is running here")
     counts = Counter(_short(channel) for channel, _ in channels)
     wanted: dict[str, tuple[str, Filter]] = {}
     for channel, filtered in channels:
@@ -174,7 +174,7 @@ def _wanted(targets: Sequence[str]) -> dict[str, tuple[str, Filter]]:
 
 
 def _short(channel: str) -> str:
-    return channel.rpartition("/")[2].removesuffix(places.SUFFIX)
+    return channel.rpartition("/")[2].removesuffix(sockets.SUFFIX)
 
 
 def _print_all(listener: Listener, wanted: dict[str, Filter], options: Options) -> None:

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import can
 
-from bridge.can_bus.convert import to_frame, to_message
 from bridge.can_bus.interface import FleetloopBus
+from bridge.can_bus.pythoncan import to_frame, to_message
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.endpoints import flat_endpoints
 from bridge.drives.odrive.frames import Command

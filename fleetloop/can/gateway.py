@@ -19,13 +19,13 @@ from dataclasses import dataclass, field
 
 import can
 
-from bridge.can_bus.convert import to_frame, to_message
 from bridge.can_bus.interface import BusClosedError
+from bridge.can_bus.pythoncan import to_frame, to_message
 from configs.errors import InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.echo import EchoGuard
 from fleetloop.can.far_bus import FarBus
-from fleetloop.signals import interruptible
+from fleetloop.launch.signals import interruptible
 from fleetloop.terminal import note, say
 
 SEND_S = 0.01

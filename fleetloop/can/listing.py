@@ -11,11 +11,11 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from bridge.can_bus import places
+from bridge.can_bus import sockets
 from configs.errors import InfrastructureError
 from fleetloop.can.census import Census, Node
 from fleetloop.can.client import Listener, open_bus
-from fleetloop.signals import interruptible
+from fleetloop.launch.signals import interruptible
 from fleetloop.terminal import note, say
 
 _CONNECTED = "03"
@@ -54,14 +54,14 @@ def list_buses(*, seconds: float, bit_rate: int, as_json: bool) -> int:
             if report.problem:
                 note(f"fleetloop: {report.run}/{report.bus}: {report.problem}")
     else:
-        note(f"no bus is up in {places.base_folder()}")
+        note(f"no bus is up in {sockets.base_folder()}")
     return 0
 
 
 def survey(seconds: float, bit_rate: int) -> list[BusReport]:
     """Listen to all buses at once; one that doesn't answer costs a little more time."""
     clients = connections(Path("/proc/net/unix"))  # before we are one, or look who answers
-    paths = places.live_buses()
+    paths = sockets.live_buses()
     problems: dict[str, str] = {}
     with contextlib.ExitStack() as opened:
         buses = {}
@@ -109,7 +109,7 @@ def _report(
     # A bus that isn't in the table lives where another kernel table counts (a container's).
     return BusReport(
         run=path.parent.name,
-        bus=path.name.removesuffix(places.SUFFIX),
+        bus=path.name.removesuffix(sockets.SUFFIX),
         clients=clients.get(str(path)) if clients is not None else None,
         frames_per_s=seen.rate,
         load=seen.load,

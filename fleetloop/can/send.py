@@ -9,11 +9,11 @@ from collections.abc import Callable, Sequence
 
 import can
 
-from bridge.can_bus.convert import to_message
+from bridge.can_bus.pythoncan import to_message
 from configs.errors import InfrastructureError
 from fleetloop.can import text
 from fleetloop.can.client import open_bus
-from fleetloop.signals import interruptible
+from fleetloop.launch.signals import interruptible
 
 FULL_S = 2.0
 """How long a full bus may take to have room again."""

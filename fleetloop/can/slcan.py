@@ -17,12 +17,12 @@ from pathlib import Path
 
 import can
 
-from bridge.can_bus.convert import to_frame, to_message
 from bridge.can_bus.interface import BusClosedError, FleetloopBus
+from bridge.can_bus.pythoncan import to_frame, to_message
 from configs.errors import InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.slcan_adapter import Adapter
-from fleetloop.signals import interruptible
+from fleetloop.launch.signals import interruptible
 from fleetloop.terminal import note, say
 
 KEPT_BYTES = 64 * 1024

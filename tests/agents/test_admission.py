@@ -6,16 +6,16 @@ from math import isfinite
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from robot_bench import NOWHERE, SCENARIO, Bench
+from support.robot_bench import NOWHERE, SCENARIO, Bench
 
 from agents.admission import MOST_LATE, Admission
 from agents.agent import Agent
-from agents.loop import give
-from bridge.link import Arrival
-from bridge.messages import LeaderSpeed, PathState, PoseFix
+from agents.lockstep import give
+from bridge.network.link import Arrival
+from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from configs.brief import LEAD_TICKS
-from configs.briefing import agent_brief
 from configs.loading import load
+from configs.resolve import agent_brief
 
 BRIEF = agent_brief(SCENARIO, "r2", network=NOWHERE, bus=())
 SCHEDULE = BRIEF.schedule

@@ -1,16 +1,16 @@
 """One controller's phases, told everything by the test."""
 
 import pytest
-from robot_bench import NOWHERE, SCENARIO, Bench
+from support.robot_bench import NOWHERE, SCENARIO, Bench
 
 from agents.agent import Agent
 from agents.guard import Phase
 from bridge.drives.odrive.frames import Command, identifier
 from bridge.frame import Frame
-from bridge.messages import LeaderSpeed, PathState, PoseFix
+from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.telemetry import AGENT_ROW, RowBuffer
-from configs.briefing import agent_brief
 from configs.errors import InfrastructureError
+from configs.resolve import agent_brief
 from configs.signals import AGENT_SIGNALS
 
 COLUMNS = [signal.name for signal in AGENT_SIGNALS]

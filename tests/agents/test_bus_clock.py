@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.bus_clock import BusClock
-from configs.briefing import schedule
 from configs.loading import load
+from configs.resolve import schedule
 
 SCHEDULE = schedule(load("two_robots"))
 

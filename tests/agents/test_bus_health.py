@@ -7,16 +7,16 @@ from types import SimpleNamespace
 
 import can
 import pytest
-from robot_bench import ZERO, Bench, set_points
+from support.robot_bench import ZERO, Bench, set_points
 
 import agents.realtime
 from agents.bus_health import TOLERATED_NS, BusHealth
 from agents.guard import Phase
 from agents.realtime import RealtimeLoop
-from bridge.barrier import Hellos
-from bridge.can_bus.convert import to_frame, to_message
+from bridge.can_bus.pythoncan import to_frame, to_message
 from bridge.frame import ERR, Frame
-from bridge.messages import PoseFix
+from bridge.network.barrier import Hellos
+from bridge.network.messages import PoseFix
 from bridge.process import Stop
 from configs.errors import InfrastructureError, PeerLostError
 

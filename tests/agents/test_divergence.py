@@ -7,14 +7,14 @@ from math import isfinite, isnan
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robot_bench import SCENARIO, ZERO, Bench, set_points
+from support.robot_bench import SCENARIO, ZERO, Bench, set_points
 
 from agents.guard import Phase
 from agents.wheel_torque import Projection
-from bridge.messages import PathState
+from bridge.network.messages import PathState
 from bridge.telemetry import AGENT_SIGNALS
 from configs.brief import NetworkLink, SplinePath, WorldOffset
-from configs.briefing import agent_brief
+from configs.resolve import agent_brief
 
 COLUMNS = [signal.name for signal in AGENT_SIGNALS]
 BRIEF = agent_brief(SCENARIO, "r2", network=NetworkLink("test", "", "", ""), bus=())

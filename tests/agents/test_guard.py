@@ -6,11 +6,11 @@ from math import inf, nan
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from robot_bench import ZERO, Bench, commands, set_points
+from support.robot_bench import ZERO, Bench, commands, set_points
 
 from agents.guard import Phase
 from bridge.drives.odrive.frames import AxisError, Command
-from bridge.messages import PoseFix
+from bridge.network.messages import PoseFix
 from configs.errors import InfrastructureError
 
 PAUSE = 260  # ticks of 2 ms: more than host.rearm_after_s

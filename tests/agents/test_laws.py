@@ -7,11 +7,11 @@ import pytest
 from agents.laws import LAWS, Sense
 from agents.paths import Reference, robot_path
 from configs.brief import NetworkLink, WorldOffset
-from configs.briefing import agent_brief, plant_brief, reference_path
 from configs.loading import load
+from configs.resolve import agent_brief, plant_brief, reference_path
 from configs.signals import LAW_SIGNALS
+from plant.body import Robot, State
 from plant.integrate import rk4
-from plant.robot import Robot, State
 
 NOWHERE = NetworkLink("test", "", "", "")
 PAPER = load("paper")

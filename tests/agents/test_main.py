@@ -4,14 +4,14 @@ from types import SimpleNamespace
 
 import can
 import pytest
-from robot_bench import ZERO, Bench, commands, set_points
+from support.robot_bench import ZERO, Bench, commands, set_points
 
 from agents.__main__ import _Wired
 from agents.guard import Phase
-from agents.loop import Counters
-from bridge.barrier import Hellos
-from bridge.can_bus.convert import to_frame
+from agents.lockstep import Counters
+from bridge.can_bus.pythoncan import to_frame
 from bridge.drives.odrive.frames import Command
+from bridge.network.barrier import Hellos
 from bridge.process import Stop
 from configs.errors import InfrastructureError, PeerSilentError
 

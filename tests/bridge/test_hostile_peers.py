@@ -16,9 +16,9 @@ from pathlib import Path
 
 import pytest
 
-from bridge import access, keys
-from bridge.messages import MOST_BYTES, PathState
-from bridge.zenoh_link import POLLED_DEPTH, ZenohLink, open_client, open_polled
+from bridge.network import access, keys
+from bridge.network.messages import MOST_BYTES, PathState
+from bridge.network.zenoh_link import POLLED_DEPTH, ZenohLink, open_client, open_polled
 from configs.brief import NetworkLink
 
 pytestmark = pytest.mark.system
@@ -27,8 +27,8 @@ HEARS = {"r1": (), "r2": ("r1",), "r3": (), "r4": ("r1", "r3")}
 ROUTER = """
 import json, select, sys
 from pathlib import Path
-from bridge import access
-from bridge.zenoh_link import open_router
+from bridge.network import access
+from bridge.network.zenoh_link import open_router
 
 run, robots, hears, realtime = json.loads(sys.argv[1])
 plan = access.plan(run, robots, hears, robots[:1], share_period_s=0.02 if realtime else None)
@@ -41,7 +41,7 @@ with open_router(None, plan, Path(sys.argv[2])) as router:
 DEAF = """
 import sys, threading
 import zenoh
-from bridge.zenoh_link import _login_config
+from bridge.network.zenoh_link import _login_config
 from configs.brief import NetworkLink
 
 run, endpoint, user, password, key = sys.argv[1:]

@@ -4,8 +4,8 @@ import time
 
 from bridge.profile import PARTS, Sampler
 from configs.brief import Body, Disturbance
+from plant.body import Robot, State
 from plant.integrate import rk4
-from plant.robot import Robot, State
 
 
 def test_time_spent_in_the_plant_is_the_plants() -> None:

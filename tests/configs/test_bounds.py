@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from configs.brief import NetworkLink
-from configs.briefing import plant_brief, schedule
 from configs.deployment import check_deployment
 from configs.errors import ScenarioError
 from configs.files import expanded
 from configs.loading import load
+from configs.resolve import plant_brief, schedule
 
 
 @pytest.mark.parametrize(

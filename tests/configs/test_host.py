@@ -5,9 +5,9 @@ from math import inf
 import pytest
 
 from configs.brief import HostLimits, Mounting, NetworkLink
-from configs.briefing import agent_brief, plant_brief
 from configs.errors import ScenarioError
 from configs.loading import load
+from configs.resolve import agent_brief, plant_brief
 
 NETWORK = NetworkLink("t", "", "", "")
 

@@ -10,7 +10,7 @@ from math import nan
 from pathlib import Path
 
 import pytest
-from scenario_text import changed
+from support.scenario_text import changed
 
 from configs.errors import ScenarioError
 from configs.loading import json_schema, load, loads, shipped, to_toml

@@ -3,12 +3,12 @@
 from dataclasses import replace
 
 import pytest
-from scenario_text import changed
+from support.scenario_text import changed
 
 from configs.brief import NetworkLink, PowertrainModel, RobotBrief
-from configs.briefing import plant_brief
 from configs.errors import ScenarioError
 from configs.loading import load, loads
+from configs.resolve import plant_brief
 
 REALISTIC = "drive.preset='realistic'"
 NETWORK = NetworkLink("t", "", "", "")

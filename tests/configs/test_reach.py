@@ -4,9 +4,9 @@ from math import inf, nan
 
 import pytest
 
-from configs.briefing import reach
 from configs.loading import load
 from configs.reach import MOST_AMPLIFIED, Reach, reach_of, within_world
+from configs.resolve import reach
 
 PAPER = reach(load("paper"))
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fleetloop.launch.run import Options, run_scenario
 from fleetloop.record.reader import Record
 from fleetloop.record.writer import RecordWriter
-from fleetloop.run import Options, run_scenario
 
 
 @pytest.fixture(scope="package")

@@ -8,12 +8,12 @@ import pytest
 from configs.deployment import Deployment, check_deployment
 from configs.errors import InfrastructureError, ScenarioError
 from configs.loading import load
-from fleetloop import placing
-from fleetloop.agent_alone import run_agent
-from fleetloop.check import check_scenario
-from fleetloop.plant_alone import Options as PlantOptions
-from fleetloop.plant_alone import run_plant
-from fleetloop.run import Options, run_scenario
+from fleetloop.check.command import check_scenario
+from fleetloop.launch import placement
+from fleetloop.launch.agent import run_agent
+from fleetloop.launch.plant import Options as PlantOptions
+from fleetloop.launch.plant import run_plant
+from fleetloop.launch.run import Options, run_scenario
 
 HERE = 'roles = ["plant", "recorder", "agent/r1"]\n[network]\nendpoint = "tcp/127.0.0.1:7447"\n'
 
@@ -77,26 +77,26 @@ def placed(**data) -> Deployment:
 
 def test_the_router_listens_where_it_is_told_and_is_reached_at_its_endpoint() -> None:
     network = {"endpoint": "tcp/base:7447", "listen": "tcp/0.0.0.0:7447"}
-    assert placing.outside(placed(network=network)).endpoint == "tcp/0.0.0.0:7447"
+    assert placement.outside(placed(network=network)).endpoint == "tcp/0.0.0.0:7447"
     assert (
-        placing.outside(placed(network={"endpoint": "tcp/base:7447"})).endpoint == "tcp/base:7447"
+        placement.outside(placed(network={"endpoint": "tcp/base:7447"})).endpoint == "tcp/base:7447"
     )
-    assert placing.outside(Deployment()) is None
+    assert placement.outside(Deployment()) is None
 
 
 def test_machines_agree_on_the_runs_name() -> None:
     scenario = load("two_robots_100hz")
     network = {"endpoint": "tcp/base:7447"}
-    assert placing.run_name(scenario, Deployment()) is None
-    assert placing.run_name(scenario, placed(network=network)) == "two_robots_100hz"
-    assert placing.run_name(scenario, placed(network={**network, "run": "lab"})) == "lab"
+    assert placement.run_name(scenario, Deployment()) is None
+    assert placement.run_name(scenario, placed(network=network)) == "two_robots_100hz"
+    assert placement.run_name(scenario, placed(network={**network, "run": "lab"})) == "lab"
 
 
 def test_a_controller_is_told_its_bus_verbatim_and_the_pace_only_on_ours() -> None:
     pcan = {"interface": "pcan", "channel": "PCAN_USBBUS1", "bitrate": 1000000}
     deployment = placed(robot={"r1": {"bus": pcan}})
-    assert dict(placing.agent_bus(deployment, "r1")) == pcan
-    assert dict(placing.agent_bus(deployment, "r2", socket="/x/r2.can")) == {
+    assert dict(placement.agent_bus(deployment, "r1")) == pcan
+    assert dict(placement.agent_bus(deployment, "r2", socket="/x/r2.can")) == {
         "interface": "fleetloop",
         "channel": "/x/r2.can",
         "gathered": True,

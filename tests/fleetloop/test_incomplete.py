@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from configs.errors import FleetloopError
-from fleetloop.diff import print_comparison
-from fleetloop.export import export
 from fleetloop.record.reader import Record
 from fleetloop.record.scan import RecordError
-from fleetloop.report import write_report
-from fleetloop.run_folder import IncompleteError, read_record
+from fleetloop.results.diff import print_comparison
+from fleetloop.results.export import export
+from fleetloop.results.report import write_report
+from fleetloop.results.run_folder import IncompleteError, read_record
 
 
 def arrays_of(path: Path) -> dict[str, np.ndarray]:

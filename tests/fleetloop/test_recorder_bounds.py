@@ -3,15 +3,15 @@
 from pathlib import Path
 
 import pytest
-from robot_bench import NOWHERE, SCENARIO
+from support.robot_bench import NOWHERE, SCENARIO
 
-from bridge.link import Arrival, Dropped
-from bridge.messages import Rows
+from bridge.network.link import Arrival, Dropped
+from bridge.network.messages import Rows
 from bridge.telemetry import AGENT_ROW, BLOCK_TICKS, FRAME_ROW
 from configs.brief import RecorderBrief
 from configs.loading import to_toml
+from fleetloop.record.recorder import AHEAD_TICKS, _Recorder
 from fleetloop.record.run_record import RunRecord
-from fleetloop.recorder import AHEAD_TICKS, _Recorder
 
 TICKS = 1 << 20
 PERIOD_NS = 1_000_000

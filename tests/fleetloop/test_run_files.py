@@ -10,10 +10,10 @@ import pytest
 from matplotlib.image import imread
 
 from configs.loading import load
-from fleetloop.diff import compare, print_comparison
+from fleetloop.launch.run import Options, run_scenario
 from fleetloop.record.reader import Record
-from fleetloop.report import write_report
-from fleetloop.run import Options, run_scenario
+from fleetloop.results.diff import compare, print_comparison
+from fleetloop.results.report import write_report
 
 
 def test_the_summary_holds_what_is_promised(finished_run: Path) -> None:

@@ -10,9 +10,9 @@ from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisError, AxisState, Command, identifier
 from bridge.frame import Frame
 from configs.brief import NetworkLink
-from configs.briefing import plant_brief
 from configs.loading import load
-from plant.unit import Unit, diverged_robots, unit_of
+from configs.resolve import plant_brief
+from plant.robot import Unit, diverged_robots, unit_of
 
 FLT_MAX = 3.4028234663852886e38
 ABSURD = (FLT_MAX, -FLT_MAX, 1e6, 1e30, inf, -inf, nan, -0.0, 1e-45, 0.1)

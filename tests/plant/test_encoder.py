@@ -7,7 +7,7 @@ from statistics import fmean, pstdev
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from powertrain_parts import encoder
+from support.powertrain_parts import encoder
 
 from plant.encoder import Encoder, EncoderFault
 

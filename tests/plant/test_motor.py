@@ -8,12 +8,12 @@ from statistics import fmean, pstdev
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from powertrain_parts import INERTIA, MODEL, motor, motor_model, supply
+from support.powertrain_parts import INERTIA, MODEL, motor, motor_model, supply
 
 from configs.brief import Body, Disturbance
+from plant.body import Robot, State
 from plant.integrate import rk4
 from plant.motor import IdealMotor, Motor, MotorFault
-from plant.robot import Robot, State
 from plant.supply import SupplyFault
 
 FREE = {"viscous_friction_N_m_s": 0.0, "coulomb_friction_N_m": 0.0}

@@ -7,9 +7,9 @@ from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import Command, identifier
 from bridge.frame import Frame
 from configs.brief import NetworkLink
-from configs.briefing import agent_brief, plant_brief
 from configs.loading import load
-from plant.unit import Unit, unit_of
+from configs.resolve import agent_brief, plant_brief
+from plant.robot import Unit, unit_of
 
 NETWORK = NetworkLink("t", "", "", "")
 CLOSE = [Frame(identifier(node, Command.SET_AXIS_STATE), f.ONE_U32.pack(8)) for node in (0, 1)]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from powertrain_parts import INERTIA, MODEL
+from support.powertrain_parts import INERTIA, MODEL
 
 from plant.powertrain import Powertrain, powertrain
 

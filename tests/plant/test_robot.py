@@ -1,130 +1,83 @@
-"""The rigid body (2)-(4) and its integration, against closed forms and conservation."""
+"""One emulated robot: bus frames in, motion and encoder frames out."""
 
-from dataclasses import replace
-from math import cos, exp, inf, nan, pi, sin
+from math import pi
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from configs.brief import Body, Disturbance
-from plant.divergence import FARTHEST, FASTEST_WHEEL_RAD_S
-from plant.integrate import rk4
-from plant.robot import Robot, State
+from bridge.drives.odrive import frames as f
+from bridge.drives.odrive.frames import Command, identifier
+from bridge.frame import Frame
+from configs.brief import NetworkLink
+from configs.loading import load
+from configs.resolve import plant_brief
+from configs.signals import PLANT_SIGNALS
+from plant.robot import Unit, unit_of
 
-ETSRO = Body(0.04, 0.1, 0.02, 2.3, 0.28, 0.01, 0.0056, 0.002, 0.02, 0.02, 1)
-CALM = Disturbance(0.0, 0.5, 0.0)
-REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-def run(robot: Robot, state: State, right: float, left: float, seconds: float, step=0.001) -> State:
-    for k in range(round(seconds / step)):
-        state = rk4(robot, state, right, left, k * step, step)
-    return state
+COLUMNS = [signal.name for signal in PLANT_SIGNALS]
 
 
-def test_derived_constants_are_those_of_the_paper_as_printed() -> None:
-    robot = Robot(ETSRO, CALM)
-    mass, inertia = 2.58, 2.3 * 0.02**2 + 2 * 0.28 * 0.01 + 0.01 + 0.004
-    m11 = 0.04**2 / 0.04 * (mass * 0.01 + inertia) + 0.0056
-    m12 = 0.04**2 / 0.04 * (mass * 0.01 - inertia)
-    assert robot.mbar_1 == pytest.approx(m11 + m12)
-    assert robot.mbar_2 == pytest.approx(m11 - m12)
-    assert robot.c == pytest.approx(0.04**2 * 2.3 * 0.02 / 0.2)
+def unit() -> Unit:
+    scenario = load("two_robots", ("robot.r1.v_m_s=0.0", "robot.r1.pose.theta_rad=0.0"))
+    return unit_of(plant_brief(scenario, network=NetworkLink("t", "", "", "")).robots[0])
 
 
-def test_the_second_wheel_may_count_in_the_mass() -> None:
-    both = Robot(replace(ETSRO, wheels_in_mass=2), CALM)
-    extra = 0.04**2 / 4 * 0.28  # r² m_w / 4 in m11 and m12 each
-    assert both.mbar_1 - Robot(ETSRO, CALM).mbar_1 == pytest.approx(2 * extra)
+def arm(robot: Unit, right: float, left: float) -> None:
+    for node, torque in ((0, right), (1, left)):
+        robot.hear(Frame(identifier(node, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(torque)), 0)
+        robot.hear(Frame(identifier(node, Command.SET_AXIS_STATE), f.ONE_U32.pack(8)), 0)
 
 
-def test_equal_torques_from_rest_give_the_closed_form_of_a_first_order_lag() -> None:
-    body = replace(ETSRO, com_offset_m=0.0)
-    robot = Robot(body, CALM)
-    end = run(robot, REST, 0.05, 0.05, 2.0)
-    rate = 0.02 / robot.mbar_1
-    final = 0.04 * 0.05 / 0.02
-    assert end.v == pytest.approx(final * (1 - exp(-rate * 2.0)), rel=1e-9)
-    assert end.x == pytest.approx(final * (2.0 - (1 - exp(-rate * 2.0)) / rate), rel=1e-9)
-    assert (end.y, end.theta, end.omega) == (0.0, 0.0, 0.0)
-    assert end.right_angle == pytest.approx(end.x / 0.04, rel=1e-12)
+def test_frames_of_an_instant_come_in_order_of_arbitration() -> None:
+    identifiers = [frame.can_id for frame in unit().frames_due(0)]
+    assert identifiers == [0x001, 0x009, 0x021, 0x029]
 
 
-def test_opposite_torques_turn_on_the_spot_with_the_centre_of_mass_on_the_axle() -> None:
-    robot = Robot(replace(ETSRO, com_offset_m=0.0), CALM)
-    end = run(robot, REST, 0.05, -0.05, 1.0)
-    assert (end.x, end.y, end.v) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
-    rate = 0.02 / robot.mbar_2
-    assert end.omega == pytest.approx(0.04 / 0.1 * 0.05 / 0.02 * (1 - exp(-rate)), rel=1e-9)
+def test_an_idle_robot_coasts() -> None:
+    robot = unit()
+    robot.state = robot.state._replace(v=0.5)
+    robot.advance(0.0, 0.01, 2)
+    assert 0.0 < robot.state.v < 0.5
+    assert robot.state.x > 3.05
 
 
-@given(st.floats(-2, 2), st.floats(-5, 5))
-def test_without_damping_and_torque_energy_stays(v: float, omega: float) -> None:
-    robot = Robot(replace(ETSRO, damping_right_N_m_s=0.0, damping_left_N_m_s=0.0), CALM)
-    end = run(robot, REST._replace(v=v, omega=omega), 0.0, 0.0, 0.5)
-
-    # Energy in body speeds: m̄_1 v² + b² m̄_2 ω², up to the factor 1/r².
-    def energy(state: State) -> float:
-        return robot.mbar_1 * state.v**2 + 0.01 * robot.mbar_2 * state.omega**2
-
-    assert energy(end) == pytest.approx(
-        energy(REST._replace(v=v, omega=omega)), rel=1e-6, abs=1e-12
-    )
-
-
-@given(st.floats(0, 0.1), st.floats(0, 0.1), st.floats(-2, 2), st.floats(-5, 5))
-def test_damping_with_unequal_sides_never_adds_energy(right, left, v, omega) -> None:
-    body = replace(ETSRO, damping_right_N_m_s=right, damping_left_N_m_s=left)
-    robot = Robot(body, CALM)
-    dv, domega = robot.accelerations(v, omega, 0.0, 0.0)
-    power = robot.mbar_1 * v * dv + 0.01 * robot.mbar_2 * omega * domega
-    assert power <= 1e-12
+def test_torques_on_the_bus_move_the_robot_and_its_encoders() -> None:
+    robot = unit()
+    arm(robot, 0.1, 0.1)
+    for k in range(100):
+        robot.advance(k * 0.001, 0.001, 1)
+    assert robot.state.v > 0.0
+    assert robot.state.theta == pytest.approx(0.0, abs=1e-12)
+    frames = {frame.can_id: frame.data for frame in robot.frames_due(100_000_000)}
+    turns, speed = f.TWO_FLOATS.unpack(frames[0x009])
+    assert turns == pytest.approx((robot.state.x - 3.05) / (2 * pi * 0.04), rel=1e-6)
+    assert speed == pytest.approx(robot.state.v / (2 * pi * 0.04), rel=1e-6)
 
 
-def test_the_step_is_of_fourth_order() -> None:
-    robot = Robot(replace(ETSRO, damping_left_N_m_s=0.01), Disturbance(0.02, 9.0, 0.3))
-    start = REST._replace(v=0.5, omega=2.0)
-    fine = run(robot, start, 0.06, 0.02, 0.512, 0.001)
-    errors = [abs(run(robot, start, 0.06, 0.02, 0.512, step).y - fine.y) for step in (0.064, 0.032)]
-    assert 10 < errors[0] / errors[1] < 26
+def test_the_right_wheel_turns_the_robot_to_the_left() -> None:
+    robot = unit()
+    arm(robot, 0.1, -0.1)
+    robot.advance(0.0, 0.01, 10)
+    assert robot.state.omega > 0.0
 
 
-def test_wheel_angles_follow_from_what_the_body_did() -> None:
-    robot = Robot(ETSRO, CALM)
-    end = run(robot, REST, 0.06, 0.01, 1.0)
-    assert 0.5 * 0.04 / 0.1 * (end.right_angle - end.left_angle) == pytest.approx(end.theta)
+def test_a_row_is_the_truth_and_the_torques_of_the_last_period() -> None:
+    robot = unit()
+    arm(robot, 0.1, 0.05)
+    robot.advance(0.0, 0.001, 1)
+    row = dict(zip(COLUMNS, robot.row(0.001), strict=True))
+    assert row["t_s"] == 0.001
+    assert row["v_m_s"] == robot.state.v
+    assert row["demand_right_N_m"] == row["motor_right_N_m"] == pytest.approx(0.1)
+    assert row["demand_left_N_m"] == pytest.approx(0.05)
 
 
-def test_the_disturbance_is_a_sine_and_a_cosine_from_t_0_on() -> None:
-    robot = Robot(ETSRO, Disturbance(0.1, 0.5, 2.0))
-    assert robot.disturbance(3.0) == pytest.approx((0.1 * sin(3.5), 0.1 * cos(3.5)))
-    assert robot.disturbance(-0.1) == (0.0, 0.0)
-
-
-def test_a_disturbance_acts_like_the_opposite_torque() -> None:
-    held = Disturbance(0.05, 0.0, pi / 4)  # constant, equal on both wheels
-    torque = 0.05 * sin(pi / 4)
-    pushed = run(Robot(ETSRO, held), REST, 0.0, 0.0, 1.0)
-    driven = run(Robot(ETSRO, CALM), REST, -torque, -torque, 1.0)
-    assert pushed.v == pytest.approx(driven.v, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("v", "omega"), [(1e308, 1e308), (4.1e4, 0.0), (0.0, 4.1e5), (inf, 0.0), (nan, 0.0)]
-)
-def test_a_step_that_leaves_the_bounds_of_a_motion_leads_nowhere(v: float, omega: float) -> None:
-    robot = Robot(replace(ETSRO, damping_right_N_m_s=0.0, damping_left_N_m_s=0.0), CALM)
-    assert rk4(robot, REST._replace(v=v, omega=omega), 0.0, 0.0, 1.5, 0.001) is None
-
-
-def test_the_fastest_motion_is_that_of_the_fastest_wheel() -> None:
-    robot = Robot(replace(ETSRO, com_offset_m=0.0, damping_right_N_m_s=0.0), CALM)
-    fastest = REST._replace(v=0.0399 * FASTEST_WHEEL_RAD_S)
-    assert rk4(robot, fastest, 0.0, 0.0, 0.0, 0.001) is not None
-    assert rk4(robot, fastest, 200.0, 200.0, 0.0, 1.0) is None
-
-
-def test_nobody_drives_further_than_numbers_reach() -> None:
-    far = REST._replace(x=FARTHEST, v=1.0)
-    assert rk4(Robot(ETSRO, CALM), far, 0.0, 0.0, 0.0, 0.001) is None
+def test_feedback_comes_once_both_drives_have_taken_a_set_point() -> None:
+    robot = unit()
+    arm(robot, 0.0, 0.0)
+    right = Frame(identifier(0, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(0.1))
+    left = Frame(identifier(1, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(0.1))
+    robot.hear(right, 5_000)
+    assert robot.feedback(6_000) == ()
+    robot.hear(left, 7_000)
+    assert [frame.can_id for frame in robot.feedback(8_000)] == [0x009, 0x029]
+    assert robot.feedback(9_000) == ()

@@ -5,7 +5,7 @@ from math import isfinite, sqrt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from powertrain_parts import supply
+from support.powertrain_parts import supply
 
 from plant.supply import SupplyFault
 

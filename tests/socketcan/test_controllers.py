@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from socketcan.deployments import on_socketcan
-from system.processes import Run
+from support.processes import Run
 
 from fleetloop.record.reader import Record
 

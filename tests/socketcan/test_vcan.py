@@ -12,7 +12,7 @@ import can
 import numpy as np
 import pytest
 from socketcan.deployments import SLOW_GUEST, on_socketcan
-from system.processes import Run
+from support.processes import Run
 
 from fleetloop.record.reader import Record
 from fleetloop.testing import EmulatedPlant

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import can
 import pytest
-from system.processes import Run, running
+from support.processes import Run, running
 
 pytestmark = pytest.mark.system
 

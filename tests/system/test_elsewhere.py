@@ -10,9 +10,9 @@ from pathlib import Path
 
 import psutil
 import pytest
-from addresses import free_port, multicast_bus, multicast_goes_nowhere
-from certificates import certificates
-from system.processes import Run
+from support.addresses import free_port, multicast_bus, multicast_goes_nowhere
+from support.certificates import certificates
+from support.processes import Run
 
 from fleetloop.record.reader import Record
 
@@ -211,8 +211,8 @@ def test_a_wrong_password_is_refused_within_the_start_deadline(tmp_path, agents)
 
 INTRUDER = """
 import sys
-from bridge import keys
-from bridge.zenoh_link import open_client
+from bridge.network import keys
+from bridge.network.zenoh_link import open_client
 from configs.brief import NetworkLink
 with open_client(NetworkLink("", sys.argv[1], "bench", "word"), 10.0) as link:
     for _ in range(5):

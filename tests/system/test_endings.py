@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
-from system.processes import Run, completed, running
+from support.processes import Run, completed, running
 
 from fleetloop.record.reader import Record
 

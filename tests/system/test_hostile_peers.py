@@ -10,12 +10,12 @@ from pathlib import Path
 import msgpack
 import psutil
 import pytest
-from addresses import free_port
-from system.processes import Run
+from support.addresses import free_port
+from support.processes import Run
 
-from bridge import access, keys
-from bridge.messages import PathState, Rows
-from bridge.zenoh_link import ZenohLink, open_client
+from bridge.network import access, keys
+from bridge.network.messages import PathState, Rows
+from bridge.network.zenoh_link import ZenohLink, open_client
 from configs.brief import NetworkLink
 from fleetloop.record.reader import Record
 
@@ -26,7 +26,7 @@ SCENARIO = ("two_robots", "--set", "expect=[]")
 class TellingRun(Run):
     """A run whose logins the test knows."""
 
-    program = (str(Path(__file__).with_name("telling_launcher.py")),)
+    program = (str(Path(__file__).parents[1] / "support/telling_launcher.py"),)
 
 
 class Attacked:
@@ -159,7 +159,7 @@ def test_ten_megabytes_and_floods_on_ones_own_keys_end_no_run_or_name_their_send
 def test_a_hearer_with_rights_that_does_not_read_stops_nobody(tmp_path, monkeypatch) -> None:
     import zenoh
 
-    from bridge.zenoh_link import _login_config
+    from bridge.network.zenoh_link import _login_config
 
     with attacked(tmp_path, monkeypatch, "--duration", "20") as attack:
         login = NetworkLink(

@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 
 import pytest
-from system.processes import completed, running
+from support.processes import completed, running
 
-from fleetloop.diff import print_comparison
+from fleetloop.results.diff import print_comparison
 
 pytestmark = pytest.mark.system
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fleetloop.launch.run import Options, run_scenario
 from fleetloop.record.reader import Record
-from fleetloop.run import Options, run_scenario
 
 
 def run(name: str, folder: Path, *overrides: str) -> dict:

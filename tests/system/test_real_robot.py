@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from addresses import free_port, multicast_bus, multicast_goes_nowhere
-from snippets import snippets
-from system.processes import Run
+from support.addresses import free_port, multicast_bus, multicast_goes_nowhere
+from support.processes import Run
+from support.snippets import snippets
 
 from fleetloop.record.reader import Record
 from fleetloop.testing import EmulatedPlant

@@ -7,10 +7,10 @@ from pathlib import Path
 import can
 import cantools
 import pytest
-from system.processes import completed, running
+from support.processes import completed, running
 
-from bridge.can_bus import places
-from fleetloop.diff import print_comparison
+from bridge.can_bus import sockets
+from fleetloop.results.diff import print_comparison
 
 pytestmark = pytest.mark.system
 
@@ -44,7 +44,7 @@ def test_who_only_listens_changes_nothing_and_who_says_paced_is_not_waited_for(
     args = ("realistic", "--duration", "4", "--set", "expect=[]")
     heard = 0
     with running(a, *args, "--speed", "2", bus_time_s=0.1) as run, ExitStack() as listeners:
-        path = next(places.base_folder().glob("*/r1.can"))
+        path = next(sockets.base_folder().glob("*/r1.can"))
         for options in ({}, {"gathered": True}, {"receive_own_messages": True}):
             listener = can.Bus(interface="fleetloop", channel=str(path), **options)
             listeners.enter_context(listener)

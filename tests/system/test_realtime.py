@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from system.processes import completed, running
+from support.processes import completed, running
 
 from fleetloop.record.reader import Record
 

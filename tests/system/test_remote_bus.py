@@ -7,10 +7,10 @@ from pathlib import Path
 
 import can
 import pytest
-from addresses import free_port
-from certificates import certificates
 from odrive_can import ODriveCAN
-from system.processes import Run, running
+from support.addresses import free_port
+from support.certificates import certificates
+from support.processes import Run, running
 
 pytestmark = pytest.mark.system
 

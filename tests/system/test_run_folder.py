@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 import pytest
-from system.processes import Run, completed
+from support.processes import Run, completed
 
 from fleetloop.record.reader import Record
 

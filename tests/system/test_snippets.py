@@ -11,10 +11,10 @@ from pathlib import Path
 
 import can
 import pytest
-from addresses import free_port
-from certificates import certificates
-from snippets import Snippet, snippets
-from system.processes import completed, running
+from support.addresses import free_port
+from support.certificates import certificates
+from support.processes import completed, running
+from support.snippets import Snippet, snippets
 
 pytestmark = pytest.mark.system
 TIMEOUT_S = 60.0

@@ -5,9 +5,9 @@ import re
 from pathlib import Path
 
 import pytest
-from system.processes import Run, completed, running
+from support.processes import Run, completed, running
 
-from fleetloop.diff import print_comparison
+from fleetloop.results.diff import print_comparison
 
 pytestmark = pytest.mark.system
 

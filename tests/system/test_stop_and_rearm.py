@@ -4,7 +4,7 @@ from pathlib import Path
 
 import can
 import pytest
-from system.processes import running
+from support.processes import running
 
 from bridge.drives.odrive.frames import AxisState, Command, decode_heartbeat, identifier
 

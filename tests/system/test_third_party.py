@@ -8,7 +8,7 @@ from pathlib import Path
 import can
 import cantools
 import pytest
-from system.processes import running
+from support.processes import running
 
 pytestmark = pytest.mark.system
 
@@ -45,9 +45,9 @@ def test_a_python_can_program_sees_well_formed_cansimple_traffic_and_gets_answer
 
 
 def test_requests_of_a_stranger_do_not_change_the_run(tmp_path: Path) -> None:
-    from system.processes import completed
+    from support.processes import completed
 
-    from fleetloop.diff import print_comparison
+    from fleetloop.results.diff import print_comparison
 
     with running(tmp_path / "a", *SHORT, bus_time_s=0.3) as run:
         with can.Bus(interface="fleetloop", channel="r1") as bus:

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 from can.util import load_config
-from certificates import certificates
 from hypothesis import given
 from hypothesis import strategies as st
+from support.certificates import certificates
 
 from bridge.can_bus.credentials import as_option, network_of
 from configs.brief import TlsFiles

@@ -14,7 +14,7 @@ import pytest
 
 from bridge.can_bus import hub as hub_module
 from bridge.can_bus import packet as wire
-from bridge.can_bus import places
+from bridge.can_bus import sockets
 from bridge.can_bus.hub import Hub
 from bridge.can_bus.traffic import TURN, Passed
 from bridge.frame import ERR, RTR, Frame
@@ -28,7 +28,7 @@ class Stranger:
 
     def __init__(self, name: str = "", flags: int = 0, version: int = wire.VERSION) -> None:
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self.socket.connect(str(places.socket_path(places.base_folder() / "hub", "r1")))
+        self.socket.connect(str(sockets.socket_path(sockets.base_folder() / "hub", "r1")))
         self.socket.settimeout(5.0)
         self.say(wire.encode_text(wire.HELLO, name, flags=flags, count=version))
 
@@ -58,8 +58,8 @@ class Serving:
     """A hub that the test serves."""
 
     def __init__(self, queue: int = 0) -> None:
-        folder = places.create_run_folder("hub")
-        self.hub = Hub(places.listen(folder, ("r1",)), queue=queue, controllers=CONTROLLERS)
+        folder = sockets.create_run_folder("hub")
+        self.hub = Hub(sockets.listen(folder, ("r1",)), queue=queue, controllers=CONTROLLERS)
         self.strangers: list[Stranger] = []
 
     def join(self, name: str = "", flags: int = 0, version: int = wire.VERSION) -> Stranger:
@@ -77,7 +77,7 @@ class Serving:
         self.hub.close("the test is over")
         for stranger in self.strangers:
             stranger.socket.close()
-        places.remove_run_folder(places.base_folder() / "hub")
+        sockets.remove_run_folder(sockets.base_folder() / "hub")
 
 
 @pytest.fixture
@@ -111,14 +111,14 @@ def test_nobody_but_a_robots_own_controller_is_waited_for(serving, name: str, wh
 
 
 def test_a_bus_in_real_time_waits_for_nobody(runtime_folder) -> None:
-    hub = Hub(places.listen(places.create_run_folder("hub"), ("r1",)))
+    hub = Hub(sockets.listen(sockets.create_run_folder("hub"), ("r1",)))
     refused = Stranger("r1\0" + SECRET, wire.PACED)
     for _ in range(3):
         hub.serve(0.0)
     assert "waits for nobody" in refused.hear().text
     refused.socket.close()
     hub.close("")
-    places.remove_run_folder(places.base_folder() / "hub")
+    sockets.remove_run_folder(sockets.base_folder() / "hub")
 
 
 def test_a_second_controller_of_a_robot_is_refused_while_the_first_is_there(serving) -> None:
@@ -171,7 +171,7 @@ def test_any_number_of_connections_that_say_nothing_keep_nobody_out(serving) -> 
     silent = []
     for _ in range(3 * hub_module.MAX_STRANGERS):
         silent.append(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET))
-        silent[-1].connect(str(places.socket_path(places.base_folder() / "hub", "r1")))
+        silent[-1].connect(str(sockets.socket_path(sockets.base_folder() / "hub", "r1")))
         serving.serve()
     assert serving.join().hear().kind == wire.WELCOME
     assert serving.join(f"r1\0{SECRET}", wire.PACED).hear().kind == wire.WELCOME
@@ -184,12 +184,12 @@ def test_any_number_of_connections_that_say_nothing_keep_nobody_out(serving) -> 
 def test_who_finds_the_way_in_crowded_waits_for_its_turn(
     runtime_folder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(places, "_BACKLOG", 0)
+    monkeypatch.setattr(sockets, "_BACKLOG", 0)
     serving = Serving()
     crowd = [socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(4)]
     for one in crowd:
         one.setblocking(False)
-    path = str(places.socket_path(places.base_folder() / "hub", "r1"))
+    path = str(sockets.socket_path(sockets.base_folder() / "hub", "r1"))
     assert errno.EAGAIN in [one.connect_ex(path) for one in crowd]
     with pytest.raises(can.CanInitializationError, match="no answer in time"):
         can.Bus(interface="fleetloop", channel="r1", connect_timeout=0.05)
@@ -362,11 +362,11 @@ def test_with_bit_timing_what_drives_sent_is_counted_and_error_frames_are_not(
 
 FULL = """
 import os, resource, sys
-from bridge.can_bus import places
+from bridge.can_bus import sockets
 from bridge.can_bus.hub import Hub
 
-with places.run_folder("full") as folder:
-    hub = Hub(places.listen(folder, ("r1",)))
+with sockets.run_folder("full") as folder:
+    hub = Hub(sockets.listen(folder, ("r1",)))
     last = os.dup(0)
     os.close(last)
     hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]

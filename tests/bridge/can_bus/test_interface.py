@@ -8,11 +8,11 @@ from typing import Any
 
 import can
 import pytest
-from hub_running import Remote, Running
 from hypothesis import given
 from hypothesis import strategies as st
+from support.hub_running import Remote, Running
 
-from bridge.can_bus import connection, places, remote
+from bridge.can_bus import connection, sockets, zenoh_transport
 from bridge.can_bus.hub import Hub
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.traffic import Passed
@@ -250,7 +250,7 @@ def test_a_bus_that_is_not_there_is_named_with_those_that_are(running, join) -> 
 
 @LOCAL_ONLY
 def test_channels_go_by_bus_by_run_and_by_path(running, join) -> None:
-    for channel in ("r1", "test/r1", str(places.base_folder() / "test" / "r1.can")):
+    for channel in ("r1", "test/r1", str(sockets.base_folder() / "test" / "r1.can")):
         join(channel).send(can.Message(arbitration_id=1, is_extended_id=False))
     assert len(running.taken(3)) == 3
 
@@ -380,7 +380,7 @@ def test_who_is_behind_by_more_than_is_kept_is_told_how_much_it_lost(
     running, join, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(connection, "BACKLOG", 500)
-    monkeypatch.setattr(remote, "BACKLOG", 100)
+    monkeypatch.setattr(zenoh_transport, "BACKLOG", 100)
     bus = join()
     for k in range(5000):
         running.deliver(Frame(1, k.to_bytes(4, "big")))
@@ -441,8 +441,8 @@ def answered(hub: Hub) -> bool:
 @pytest.fixture
 def paced(where: str, runtime_folder, tmp_path: Path) -> Iterator[Hub]:
     """A hub driven by the test, and a paced client in a thread that answers like a controller."""
-    folder = places.create_run_folder("test")
-    hub = Hub(places.listen(folder, ("r1",)), controllers=CONTROLLERS)
+    folder = sockets.create_run_folder("test")
+    hub = Hub(sockets.listen(folder, ("r1",)), controllers=CONTROLLERS)
     remote = Remote(tmp_path) if where == "remote" else None
     settings = remote.settings() if remote is not None else {}
 
@@ -468,7 +468,7 @@ def paced(where: str, runtime_folder, tmp_path: Path) -> Iterator[Hub]:
     thread.join()
     if remote is not None:
         remote.close()
-    places.remove_run_folder(folder)
+    sockets.remove_run_folder(folder)
 
 
 def test_collect_returns_with_all_that_a_paced_client_had_to_say(paced) -> None:
@@ -527,10 +527,10 @@ def test_garbage_from_a_client_is_counted_and_harms_nobody(garbage: list[bytes])
 
     with tempfile.TemporaryDirectory(prefix="fl-", dir="/tmp") as folder:
         os.environ["FLEETLOOP_RUNTIME"] = folder
-        run = places.create_run_folder("garbage")
-        hub = Hub(places.listen(run, ("r1",)))
+        run = sockets.create_run_folder("garbage")
+        hub = Hub(sockets.listen(run, ("r1",)))
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as stranger:
-            stranger.connect(str(places.socket_path(run, "r1")))
+            stranger.connect(str(sockets.socket_path(run, "r1")))
             for data in garbage:
                 stranger.send(data)
             for _ in range(len(garbage) + 2):
@@ -544,8 +544,8 @@ class Timed:
     """A bus with bit timing: what its emulation would say is said by the test."""
 
     def __init__(self, queue: int = 10) -> None:
-        folder = places.create_run_folder("timed")
-        self.hub = Hub(places.listen(folder, ("r1",)), queue=queue, controllers=CONTROLLERS)
+        folder = sockets.create_run_folder("timed")
+        self.hub = Hub(sockets.listen(folder, ("r1",)), queue=queue, controllers=CONTROLLERS)
 
     def join(self, **options) -> can.BusABC:
         buses: list[can.BusABC] = []
@@ -561,7 +561,7 @@ class Timed:
 
     def close(self) -> None:
         self.hub.close("the test is over")
-        places.remove_run_folder(places.base_folder() / "timed")
+        sockets.remove_run_folder(sockets.base_folder() / "timed")
 
 
 @pytest.fixture

@@ -4,12 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.can_bus.bits import frame_bits
-from bridge.can_bus.confinement import NodeState
-from bridge.can_bus.node import Delivered, ErrorFrame, ErrorKind, Event, Node
-from bridge.can_bus.queues import Fifo
-from bridge.can_bus.wire import Wire
 from bridge.frame import EFF, ERR, RTR, Frame
+from bridge.wire.bits import frame_bits
+from bridge.wire.confinement import NodeState
+from bridge.wire.node import Delivered, ErrorFrame, ErrorKind, Event, Node
+from bridge.wire.queues import Fifo
+from bridge.wire.wire import Wire
 
 US = 1000
 MS = 1_000_000

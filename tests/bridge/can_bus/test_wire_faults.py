@@ -5,13 +5,13 @@ import random
 
 import pytest
 
-from bridge.can_bus.bits import frame_bits, least_bits
-from bridge.can_bus.confinement import NodeState
-from bridge.can_bus.disturbances import Disturbance, Kind
-from bridge.can_bus.node import Delivered, ErrorFrame, ErrorKind, Event, Node, StateChanged
-from bridge.can_bus.queues import Endless, Fifo, Mailboxes, ReceiveFifo
-from bridge.can_bus.wire import Wire
 from bridge.frame import EFF, Frame
+from bridge.wire.bits import frame_bits, least_bits
+from bridge.wire.confinement import NodeState
+from bridge.wire.faults import Disturbance, Kind
+from bridge.wire.node import Delivered, ErrorFrame, ErrorKind, Event, Node, StateChanged
+from bridge.wire.queues import Endless, Fifo, Mailboxes, ReceiveFifo
+from bridge.wire.wire import Wire
 
 US = 1000
 MS = 1_000_000

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from bridge.can_bus import places
+from bridge.can_bus import sockets
 from bridge.can_bus.hub import Hub
 from bridge.frame import Frame
 
@@ -14,8 +14,8 @@ class Buses:
     """Buses r1 and r2 of a run; a thread keeps them going."""
 
     def __init__(self) -> None:
-        self.folder = places.create_run_folder("run")
-        self.hub = Hub(places.listen(self.folder, ("r1", "r2")))
+        self.folder = sockets.create_run_folder("run")
+        self.hub = Hub(sockets.listen(self.folder, ("r1", "r2")))
         self._lock = threading.Lock()
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._serve)
@@ -59,7 +59,7 @@ class Buses:
 
     def close(self) -> None:
         self.end()
-        places.remove_run_folder(self.folder)
+        sockets.remove_run_folder(self.folder)
 
 
 @pytest.fixture

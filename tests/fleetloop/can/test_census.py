@@ -2,9 +2,9 @@
 
 import pytest
 
-from bridge.can_bus.bits import frame_bits
 from bridge.drives.odrive.frames import AxisError, AxisState
 from bridge.frame import EFF, ERR, Frame
+from bridge.wire.bits import frame_bits
 from fleetloop.can.census import ERROR_FRAME_BITS, Census, Node
 
 ENCODER = Frame(0x009, bytes(range(8)))

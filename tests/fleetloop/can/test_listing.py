@@ -7,7 +7,7 @@ from pathlib import Path
 
 import can
 
-from bridge.can_bus import places
+from bridge.can_bus import sockets
 from bridge.frame import Frame
 from fleetloop.can.listing import connections, list_buses, survey
 
@@ -52,13 +52,13 @@ def test_the_table_names_runs_and_buses(buses, capsys) -> None:
 
 
 def test_a_bus_that_does_not_answer_is_reported_in_bounded_time(runtime_folder, capsys) -> None:
-    folder = places.create_run_folder("stuck")
-    sockets = places.listen(folder, ("r1",))
+    folder = sockets.create_run_folder("stuck")
+    listening = sockets.listen(folder, ("r1",))
     try:
         assert list_buses(seconds=0.01, bit_rate=1_000_000, as_json=False) == 0
     finally:
-        sockets["r1"].close()
-        places.remove_run_folder(folder)
+        listening["r1"].close()
+        sockets.remove_run_folder(folder)
     told = capsys.readouterr()
     assert "stuck" in told.out
     assert "no answer in time" in told.err

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.can_bus.convert import to_message
+from bridge.can_bus.pythoncan import to_message
 from bridge.frame import EFF, ERR, RTR, Frame
 from configs.errors import ScenarioError
 from fleetloop.can.text import compact, long, long_columns, parse

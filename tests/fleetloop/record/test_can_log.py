@@ -12,7 +12,7 @@ from can.io.blf import FILE_HEADER_STRUCT
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.can_bus.convert import to_message
+from bridge.can_bus.pythoncan import to_message
 from bridge.frame import EFF, ERR, RTR, Frame
 from configs.errors import InfrastructureError
 from fleetloop.can.text import compact

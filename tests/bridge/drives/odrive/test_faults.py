@@ -3,7 +3,7 @@
 from math import inf, nan
 
 import pytest
-from odrive_axis import MS, NODE, arm, ask_state, axis, beat, floats, tell, torque
+from support.odrive_axis import MS, NODE, arm, ask_state, axis, beat, floats, tell, torque
 
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisError, AxisState, Command, ProcedureResult

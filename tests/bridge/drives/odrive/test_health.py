@@ -3,10 +3,22 @@
 from math import inf, nan
 
 import pytest
-from odrive_axis import HEALTHY, MS, arm, ask_state, asked, axis, beat, floats, modes, tell, torque
+from support.odrive_axis import (
+    HEALTHY,
+    MS,
+    arm,
+    ask_state,
+    asked,
+    axis,
+    beat,
+    floats,
+    modes,
+    tell,
+    torque,
+)
 
 from bridge.drives.odrive.frames import AxisError, AxisState, Command, ControlMode, ProcedureResult
-from bridge.drives.odrive.node import OdriveNode
+from bridge.drives.odrive.local_axis import OdriveNode
 
 
 def driven(**changes) -> OdriveNode:

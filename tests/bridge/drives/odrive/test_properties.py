@@ -9,12 +9,12 @@ import cantools
 from cantools.database import Database
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from odrive_axis import MODEL, MS, NODE, arm, axis, torque
+from support.odrive_axis import MODEL, MS, NODE, arm, axis, torque
 
 from bridge.drives.feeling import Feeling
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisState, Command
-from bridge.drives.odrive.node import OdriveNode
+from bridge.drives.odrive.local_axis import OdriveNode
 from bridge.frame import RTR, Frame
 
 SET_POINTS = {Command.SET_INPUT_TORQUE, Command.SET_INPUT_VEL, Command.SET_INPUT_POS}

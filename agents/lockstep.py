@@ -1,0 +1,202 @@
+"""One controller in lockstep: the bus is the clock.
+
+Both encoder frames of a tick are the tick; then come the pose and the in-neighbours' path states
+that the schedule says are due. The torque frames are the answer. A path state is said as
+soon as it is known, at the end of the tick before the one that it is due at: so it travels while
+others still compute, and a graph with cycles can't deadlock.
+"""
+
+import errno
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import can
+
+from agents.admission import LEADER, LOCALISATION
+from agents.agent import Agent
+from agents.bus_clock import BusClock
+from agents.guard import Phase
+from bridge.awake import LOOK_S, AwakeClock
+from bridge.can_bus.interface import FleetloopBus
+from bridge.can_bus.pythoncan import can_id_of, to_message
+from bridge.frame import Frame
+from bridge.network.barrier import Hellos
+from bridge.network.link import Arrival, Link, Publisher
+from bridge.network.messages import LeaderSpeed, PathState, PoseFix
+from bridge.process import Stop, launcher_stopped
+from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
+
+LISTEN_SHARE = 0.75
+"""Part of the tick deadline that a controller waits for messages: it names who is silent before the
+plant names the controller itself."""
+BUS_SHARE = 2.0
+"""Multiple of the tick deadline that a controller waits for its bus: the plant has its own word
+first."""
+
+_SAID = {"pose": ("pose", LOCALISATION), "leader": ("speed", LEADER)}
+
+
+@dataclass(slots=True)
+class Counters:
+    """Where a controller's time went [ns of wall time], and what arrived that nobody understood."""
+
+    ticks: int = 0
+    bus_ns: int = 0
+    listen_ns: int = 0
+    compute_ns: int = 0
+    unsent: int = 0  # frames that found the transmit queue full
+    undecodable: int = 0
+
+
+class LockstepLoop:
+    """Runs one agent on its bus and its link."""
+
+    def __init__(
+        self, agent: Agent, bus: FleetloopBus, link: Link, path: Publisher, hellos: Hellos
+    ) -> None:
+        self._agent = agent
+        self._schedule = agent.brief.schedule
+        self._robot = agent.brief.robot
+        self._bus = bus
+        self._link = link
+        self._path = path
+        self._hellos = hellos
+        self.counters = Counters()
+
+    def take(self, arrival: Arrival) -> None:
+        """Give one message to the agent; what nobody understands is counted."""
+        self.counters.undecodable += not give(self._agent, arrival)
+
+    def await_first_frame(self, stop: Stop) -> can.Message | None:
+        """Say hello until the plant's first frame comes; None when told to stop."""
+        clock = AwakeClock(held=launcher_stopped)
+        deadline = clock.now() + self._schedule.start_deadline_s
+        while not stop.requested:
+            self._hellos.say()
+            message = self._receive(0.02)
+            if message is not None:
+                return message
+            if clock.now() > deadline:
+                raise did_not_start(self._agent)
+        return None
+
+    def run(self, first: can.Message, stop: Stop) -> None:
+        """Run from the first frame to the closing tick, or until told to stop.
+
+        Raises:
+            InfrastructureError: the bus was silent beyond the tick deadline.
+            PeerSilentError: a pose or a neighbour's path state did not come.
+            PeerLostError: the bus closed.
+        """
+        agent = self._agent
+        counters = self.counters
+        message: can.Message | None = first
+        asked_ns = time.monotonic_ns()
+        hear, clock, schedule = (
+            agent.hear,
+            BusClock(self._schedule, agent.heard_since),
+            self._schedule,
+        )
+        timeout_s = BUS_SHARE * schedule.tick_deadline_s
+        while True:
+            if message is None:
+                tick: int | None = clock.passed()
+            else:
+                now_ns = round(message.timestamp * 1e9)
+                hear(can_id_of(message), message.data, now_ns)
+                tick = clock.due(now_ns)
+            if tick is not None:
+                came_ns = time.monotonic_ns()
+                if schedule.owes(tick):
+                    self._listen(tick, stop)
+                heard_ns = time.monotonic_ns()
+                self._send(agent.step(tick) if not stop.requested else agent.leave())
+                if schedule.shares(tick + 1):
+                    self._path.put(agent.share(tick + 1).encode())
+                counters.bus_ns += came_ns - asked_ns
+                counters.listen_ns += heard_ns - came_ns
+                asked_ns = time.monotonic_ns()
+                counters.compute_ns += asked_ns - heard_ns
+                counters.ticks += 1
+                if agent.phase is Phase.DONE:
+                    return
+            message = self._await_frame(timeout_s)
+
+    def _send(self, frames: Sequence[Frame]) -> None:
+        send = self._bus.send
+        for can_id, data in frames:
+            try:
+                send(to_message(can_id, data))
+            except can.CanOperationError as error:
+                if error.error_code != errno.ENOBUFS:
+                    raise PeerLostError(f"{self._robot}: lost its bus: {error}") from error
+                # As on hardware: the next one is newer.
+                self.counters.unsent += 1
+
+    def _listen(self, tick: int, stop: Stop) -> None:
+        """Wait for what the schedule owes this tick, or for a stop."""
+        agent = self._agent
+        clock: AwakeClock | None = None
+        left_s = within_s = LISTEN_SHARE * self._schedule.tick_deadline_s
+        while (missing := agent.missing(tick)) and not stop.requested:
+            # Who is asked too late may find it waiting; who is flooded finds that there is no end.
+            arrival = self._link.receive(LOOK_S if left_s > 0.0 else 0.0)
+            if clock is None:
+                clock = AwakeClock(held=launcher_stopped)
+                deadline = clock.now() + within_s
+            left_s = deadline - clock.now()
+            if arrival is not None and left_s > -within_s:
+                self.take(arrival)
+            elif left_s <= 0.0:
+                said = "; ".join((f"no {', no '.join(missing)}", *agent.refusals()))
+                raise PeerSilentError(f"{self._robot}: tick {tick}: within {within_s:g} s {said}")
+
+    def _await_frame(self, within_s: float) -> can.Message | None:
+        """The next frame of the bus; None when a bus without any has passed a tick."""
+        message = self._receive(LOOK_S)
+        if message is not None or self._bus.asked:
+            return message
+        clock = AwakeClock(held=launcher_stopped)
+        deadline = clock.now() + within_s - LOOK_S
+        while (message := self._receive(LOOK_S)) is None and not self._bus.asked:
+            if clock.now() > deadline:
+                raise InfrastructureError(
+                    f"{self._robot}: no encoder frames within {within_s:g} s after"
+                    f" {self.counters.ticks} ticks"
+                )
+        return message
+
+    def _receive(self, timeout_s: float) -> can.Message | None:
+        try:
+            return self._bus.recv(timeout_s)
+        except can.CanOperationError as error:
+            raise PeerLostError(
+                f"{self._robot}: lost its bus after {self.counters.ticks} ticks: {error}"
+            ) from error
+
+
+def did_not_start(agent: Agent) -> InfrastructureError:
+    """The error of a controller that waited in vain for the run, with what it did not believe."""
+    waited_s = agent.brief.schedule.start_deadline_s
+    said = (f"{agent.brief.robot}: the run did not start within {waited_s:g} s", *agent.refusals())
+    return InfrastructureError("; ".join(said))
+
+
+def give(agent: Agent, arrival: Arrival) -> bool:
+    """Give one message to the agent, by its tag; return whether it was understood."""
+    kind, _, robot = arrival.tag.partition("/")
+    match kind:
+        case "path" if (state := PathState.decode(arrival.payload)) is not None:
+            agent.take_path(robot, state)
+        case "pose" if (fix := PoseFix.decode(arrival.payload)) is not None:
+            agent.take_pose(fix)
+        case "leader" if (speed := LeaderSpeed.decode(arrival.payload)) is not None:
+            agent.take_leader(speed)
+        case "go":
+            pass  # lockstep begins with the first frame
+        case _:
+            what, sender = _SAID.get(kind, ("path state", robot))
+            agent.admission.malformed(what, sender)
+            return False
+    return True

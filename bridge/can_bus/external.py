@@ -1,0 +1,276 @@
+"""The drives' end of buses that aren't ours: any python-can interface, a `can.Bus` per bus.
+
+The emulated drives are one more node on a SocketCAN interface, behind a USB adapter, in a multicast
+group. The bus's own clock counts: frames go out when they are delivered and are heard when they
+came; bus time in `deliver` is not carried. What can't be sent is dropped and counted: the next one
+is newer. Error frames and FD frames are counted and not heard; the drives' own frames, where the
+interface hands them back, are neither.
+
+    bus state   on                                                  to
+    up          a failed send or receive (link down, adapter gone)  failing, an outage
+    failing     a send or receive that works                        up
+    failing     for `REOPEN_S`, then every `REOPEN_S`               closed and opened again
+
+A network interface that was taken down works again once it is up; an adapter that was unplugged has
+to be opened again. Neither ends the plant. Interfaces without a file descriptor are polled.
+"""
+
+import contextlib
+import select
+import time
+from collections.abc import Mapping, Sequence
+
+import can
+
+from bridge.can_bus.echo import Echoes, hands_back
+from bridge.can_bus.opening import open_bus
+from bridge.can_bus.pythoncan import to_frame, to_message
+from bridge.frame import Frame
+from bridge.waiting import readable
+from configs.brief import Settings
+from configs.errors import InfrastructureError
+
+REOPEN_S = 1.0
+POLL_S = 0.001
+"""How often an interface without file descriptor is looked at."""
+AT_ONCE = 256
+"""Frames taken from one bus before others have their turn."""
+BACKLOG = 10_000
+"""Frames kept until they are taken; the rest is dropped and counted."""
+_FAILURES = (can.CanError, OSError, ValueError)  # ValueError: a descriptor that was closed
+
+
+class Counters:
+    """What went over one bus, and what did not."""
+
+    __slots__ = ("dropped", "error_frames", "from_clients", "from_drives", "garbage", "outages")
+
+    def __init__(self) -> None:
+        self.from_drives = 0
+        self.from_clients = 0
+        self.dropped = 0  # could not be sent, or were not taken in time
+        self.garbage = 0  # FD frames, and what is no frame of classic CAN
+        self.error_frames = 0
+        self.outages = 0
+
+
+class _Attachment:
+    """One bus."""
+
+    __slots__ = (
+        "bus",
+        "counters",
+        "deaf",
+        "echoes",
+        "failing_since_s",
+        "fd",
+        "name",
+        "out_s",
+        "reason",
+        "retry_s",
+        "settings",
+        "taken",
+    )
+
+    def __init__(self, name: str, settings: Settings) -> None:
+        self.name = name
+        self.settings = settings
+        self.echoes = Echoes() if hands_back(settings) else None
+        self.bus: can.BusABC | None = None
+        self.fd: int | None = None
+        self.taken: list[Frame] = []
+        self.counters = Counters()
+        self.failing_since_s: float | None = None
+        self.deaf = 0  # failed receives since it last worked
+        self.retry_s = 0.0
+        self.out_s = 0.0  # of all outages that are over
+        self.reason = ""
+
+
+class AttachedBuses:
+    """The drives' end of the buses in `settings`, by name.
+
+    Raises:
+        InfrastructureError: one of them can't be opened.
+    """
+
+    def __init__(self, settings: Mapping[str, Settings]) -> None:
+        self._all = {name: _Attachment(name, bus) for name, bus in settings.items()}
+        self._by_fd: dict[int, _Attachment] = {}
+        self._epoll = select.epoll()
+        self._polled = 0
+        self._failing = 0
+        try:
+            for attachment in self._all.values():
+                self._open(attachment)
+        except InfrastructureError:
+            self.close("")
+            raise
+
+    # --- the drives' end -------------------------------------------------------------------------
+
+    def deliver(self, name: str, stamp_ns: int, frames: Sequence[Frame]) -> None:  # noqa: ARG002
+        """Send frames of the drives, in order; what can't be sent is dropped and counted."""
+        attachment = self._all[name]
+        bus, echoes = attachment.bus, attachment.echoes
+        for n, (can_id, data) in enumerate(frames):
+            try:
+                if bus is not None:
+                    bus.send(to_message(can_id, data))
+                    if echoes is not None:
+                        echoes.sent(Frame(can_id, data), time.monotonic())
+            except _FAILURES as error:
+                self._note_failure(attachment, error)
+                bus = None
+            if bus is None:
+                attachment.counters.dropped += len(frames) - n
+                return
+        attachment.counters.from_drives += len(frames)
+        if attachment.failing_since_s is not None and frames:
+            self._note_recovery(attachment)
+
+    def serve(self, timeout_s: float) -> None:
+        """Take what came on the buses; waits at most `timeout_s`, to the microsecond."""
+        if readable([self._epoll], self.patience(timeout_s)):
+            for fd, _ in self._epoll.poll(0.0):
+                self._receive(self._by_fd[fd])
+        if self._polled:
+            for attachment in self._all.values():
+                if attachment.fd is None and attachment.bus is not None:
+                    self._receive(attachment)
+        if self._failing:
+            self._reopen()
+
+    def patience(self, timeout_s: float) -> float:
+        """How long one may wait for `fileno`, if `timeout_s` at most."""
+        return max(min(timeout_s, POLL_S) if self._polled else timeout_s, 0.0)
+
+    def heard(self) -> list[str]:
+        """Buses with something to take."""
+        return [name for name, attachment in self._all.items() if attachment.taken]
+
+    def take(self, name: str) -> list[Frame]:
+        """What others sent on a bus since the last take, in order."""
+        attachment = self._all[name]
+        taken, attachment.taken = attachment.taken, []
+        return taken
+
+    def clients(self) -> int:
+        """How many buses are open: nobody knows who listens on them."""
+        return sum(attachment.bus is not None for attachment in self._all.values())
+
+    def counters(self, name: str) -> Counters:
+        """What went over a bus so far."""
+        return self._all[name].counters
+
+    def troubles(self) -> dict[str, str]:
+        """Buses that failed at times: how often, how long, what it said, what was lost."""
+        now_s = time.monotonic()
+        found = {}
+        for name, attachment in self._all.items():
+            counters, since_s = attachment.counters, attachment.failing_since_s
+            if counters.outages:
+                out_s = attachment.out_s + (now_s - since_s if since_s is not None else 0.0)
+                found[name] = (
+                    f"{counters.outages} × failed for {out_s:.1f} s in all, {counters.dropped}"
+                    f" frames not sent; last: {attachment.reason}"
+                )
+            elif counters.dropped:
+                found[name] = f"{counters.dropped} frames not sent"
+        return found
+
+    def fileno(self) -> int:
+        """A descriptor that is readable when there is something to handle."""
+        return self._epoll.fileno()
+
+    def close(self, reason: str) -> None:  # noqa: ARG002 - nobody there understands it
+        """Leave all buses. Idempotent."""
+        for attachment in self._all.values():
+            self._shut(attachment)
+        self._epoll.close()
+
+    # --- one bus ---------------------------------------------------------------------------------
+
+    def _open(self, attachment: _Attachment) -> None:
+        bus = attachment.bus = open_bus(f"drives of {attachment.name}", attachment.settings)
+        try:
+            fd = bus.fileno()
+            self._epoll.register(fd, select.EPOLLIN)
+        except (NotImplementedError, OSError, ValueError):
+            self._polled += 1
+            return
+        attachment.fd = fd
+        self._by_fd[fd] = attachment
+
+    def _shut(self, attachment: _Attachment) -> None:
+        bus, attachment.bus = attachment.bus, None
+        if bus is None:
+            return
+        if attachment.fd is None:
+            self._polled -= 1
+        else:
+            del self._by_fd[attachment.fd]
+            with contextlib.suppress(OSError):
+                self._epoll.unregister(attachment.fd)
+            attachment.fd = None
+        with contextlib.suppress(*_FAILURES):
+            bus.shutdown()
+
+    def _receive(self, attachment: _Attachment) -> None:
+        bus, counters, taken = attachment.bus, attachment.counters, attachment.taken
+        for _ in range(AT_ONCE):
+            try:
+                message = bus.recv(0.0) if bus is not None else None
+            except _FAILURES as error:
+                self._note_failure(attachment, error)
+                attachment.deaf += 1
+                if attachment.deaf > 1:  # in a row: a dead descriptor stays readable for ever
+                    self._shut(attachment)
+                return
+            if message is None:
+                return
+            if message.is_error_frame:
+                counters.error_frames += 1
+                continue
+            try:
+                frame = to_frame(message)
+            except ValueError:
+                counters.garbage += 1
+                continue
+            frame = to_frame(message)
+            if attachment.echoes is not None and attachment.echoes.is_echo(frame, time.monotonic()):
+                continue
+            counters.from_clients += 1
+            if attachment.failing_since_s is not None:
+                self._note_recovery(attachment)
+            if len(taken) < BACKLOG:
+                taken.append(frame)
+            else:
+                counters.dropped += 1
+
+    def _note_failure(self, attachment: _Attachment, error: Exception) -> None:
+        attachment.reason = str(error)
+        if attachment.failing_since_s is None:
+            attachment.failing_since_s = time.monotonic()
+            attachment.retry_s = attachment.failing_since_s + REOPEN_S
+            attachment.counters.outages += 1
+            self._failing += 1
+
+    def _note_recovery(self, attachment: _Attachment) -> None:
+        if attachment.failing_since_s is not None:
+            attachment.out_s += time.monotonic() - attachment.failing_since_s
+            attachment.failing_since_s = None
+            attachment.deaf = 0
+            self._failing -= 1
+
+    def _reopen(self) -> None:
+        now_s = time.monotonic()
+        for attachment in self._all.values():
+            if attachment.failing_since_s is None or now_s < attachment.retry_s:
+                continue
+            attachment.retry_s = now_s + REOPEN_S
+            self._shut(attachment)
+            try:
+                self._open(attachment)
+            except InfrastructureError as error:
+                attachment.reason = str(error)

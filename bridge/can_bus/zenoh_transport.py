@@ -1,0 +1,202 @@
+"""A line from another machine: packets over Zenoh to the relay beside the hub (`relay`).
+
+    guest ── <bus>/up ──► router, relay ── Unix socket ──► hub
+          ◄─ <bus>/down ─
+
+Packets are the same as on the Unix socket, so are the promises: lossless, in order, no echo, room
+that is bounded both ways (`window`). What the guest doesn't read waits here, up to `BACKLOG`
+packets, and then at the hub, which drops and counts what is too much. Leaving waits, at most
+`CLOSE_S`, until the hub has all that was sent. The guest holds a liveliness token for as long as it
+lives and watches the relay's: when that goes, or the network to it (noticed within Zenoh's lease),
+the line is broken and says so, for good.
+"""
+
+import atexit
+import contextlib
+import os
+import queue
+import secrets
+import threading
+import time
+from collections import deque
+
+import zenoh
+
+from bridge.can_bus import packet as wire
+from bridge.can_bus.flow_control import Receiver, Sender
+from bridge.network import keys
+from bridge.network.zenoh_link import open_client
+from configs.brief import NetworkLink
+from configs.errors import InfrastructureError
+
+BACKLOG = 100_000
+CLOSE_S = 1.0
+_FIRST_HELLO_S, _LAST_HELLO_S = 0.01, 0.2
+_ENDS = frozenset({wire.BYE, wire.REFUSED})
+
+
+class RemoteLine:
+    """One guest's line to a bus behind a router."""
+
+    def __init__(self, network: NetworkLink, channel: str, hello: bytes, timeout_s: float) -> None:
+        """Connect, and say hello until the relay answers.
+
+        Raises:
+            OSError: no router there, the login was refused, or nobody relays that bus.
+            ScenarioError: user or channel can't be names.
+        """
+        deadline = time.monotonic() + timeout_s
+        place = keys.guest_line(network.user, secrets.token_hex(8), channel)
+        self._packets: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._lock = threading.Lock()  # packets and descriptor change together
+        self._news = threading.Condition(self._lock)
+        self._room, self._taken = Sender(), Receiver()
+        self._held: deque[bytes] = deque()  # past the backlog: no room is given back for them yet
+        self._broken = ""
+        self._ended = threading.Event()
+        try:
+            self._link = open_client(network, timeout_s)
+        except InfrastructureError as error:
+            raise OSError(str(error)) from error
+        try:
+            self._readable = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC | os.EFD_SEMAPHORE)
+            self._link.each(f"{place}/down", self._take)
+            self._link.on_gone(keys.guest_relay(network.user), self._lose)
+            self._up = self._link.publisher(f"{place}/up")
+            self._link.declare_live(f"{place}/alive")
+        except (zenoh.ZError, OSError) as error:
+            self._link.close()
+            raise OSError(str(error)) from error
+        # Later, when the interpreter ends, a session can't be closed and keeps the process.
+        atexit.register(self.close)
+        again_s = _FIRST_HELLO_S
+        while True:
+            self._up.put(hello)
+            with self._news:
+                if self._news.wait_for(self._has_packets, again_s):
+                    return
+            again_s = min(2.0 * again_s, _LAST_HELLO_S)
+            if time.monotonic() > deadline:
+                self._ended.set()  # nobody to wait for
+                self.close()
+                raise TimeoutError(
+                    f"nobody at {network.endpoint} answers to {network.user!r} within"
+                    f" {timeout_s:g} s: the run there has no such guest, or this isn't its"
+                    " certificate"
+                )
+
+    # --- on Zenoh's thread -----------------------------------------------------------------------
+
+    def _take(self, packet: bytes) -> None:
+        kind = packet[0] if packet else 0
+        answer = self._keep_or_answer(packet, kind)
+        if answer is not None:
+            with contextlib.suppress(OSError):
+                self._say(answer)
+        if kind in _ENDS:
+            # Not before it was answered: who waits for it then closes the session.
+            self._ended.set()
+
+    def _keep_or_answer(self, packet: bytes, kind: int) -> bytes | None:
+        with self._news:
+            if self._readable < 0 or self._broken:
+                return None
+            answer = None
+            if not self._room.hear(packet):
+                self._keep(packet)
+                if kind == wire.BYE:
+                    answer = packet  # heard
+                elif self._packets.qsize() < BACKLOG:
+                    answer = self._taken.take(packet)
+                else:
+                    self._held.append(packet)
+            if kind in _ENDS:
+                self._break("the bus has gone")
+            self._news.notify_all()
+        return answer
+
+    def _lose(self) -> None:
+        with self._news:
+            if self._readable >= 0 and not self._broken:
+                self._break("the run's router has gone, or the network to it")
+            self._ended.set()
+            self._news.notify_all()
+
+    def _keep(self, packet: bytes) -> None:
+        os.eventfd_write(self._readable, 1)
+        self._packets.put(packet)
+
+    def _break(self, reason: str) -> None:
+        """No more comes: the descriptor stays readable, as at the end of a socket."""
+        self._broken = reason
+        self._keep(b"")
+
+    def _has_packets(self) -> bool:
+        return not self._packets.empty()
+
+    # --- a line ----------------------------------------------------------------------------------
+
+    def send(self, packet: bytes) -> None:
+        """Send at once."""
+        with self._lock:
+            if self._broken or self._readable < 0:
+                raise OSError(self._broken or "the line is closed")
+            if not self._room.has_room():
+                raise BlockingIOError
+            self._room.send(packet)
+        self._say(packet)
+
+    def await_room(self, timeout_s: float) -> bool:
+        """Wait until there is room to send, or the line is broken."""
+        with self._news:
+            return self._news.wait_for(
+                lambda: self._room.has_room() or bool(self._broken) or self._readable < 0, timeout_s
+            )
+
+    def receive(self, wait_s: float | None) -> bytes | None:
+        """The next packet."""
+        try:
+            if wait_s is None or wait_s > 0.0:
+                packet = self._packets.get(timeout=wait_s)
+            else:
+                with self._lock:
+                    packet = self._packets.get_nowait()
+        except queue.Empty:
+            return None
+        with self._lock:
+            if self._readable < 0 or not packet:
+                self._packets.put(b"")  # the end stays the end
+                raise OSError(self._broken or "the line is closed")
+            with contextlib.suppress(BlockingIOError):
+                os.eventfd_read(self._readable)
+            room = self._taken.take(self._held.popleft()) if self._held else None
+        if room is not None:
+            with contextlib.suppress(OSError):  # the line's end is still to be read
+                self._say(room)
+        return packet
+
+    def _say(self, packet: bytes) -> None:
+        try:
+            self._up.put(packet)
+        except zenoh.ZError as error:
+            raise OSError("the line is closed") from error
+
+    def fileno(self) -> int:
+        """Readable when a packet waits."""
+        return self._readable
+
+    def close(self) -> None:
+        """Say goodbye, wait until the hub has what was sent before it, and leave."""
+        with self._news:
+            readable, self._readable = self._readable, -1
+            self._packets.put(b"")  # whoever waits in another thread
+            self._news.notify_all()
+        if readable < 0:
+            return
+        atexit.unregister(self.close)
+        os.close(readable)
+        if not self._broken:
+            with contextlib.suppress(OSError):
+                self._say(wire.encode_text(wire.BYE))
+        self._ended.wait(CLOSE_S)
+        self._link.close()

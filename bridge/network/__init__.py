@@ -1,0 +1,1 @@
+"""Zenoh: sessions, keys, messages, access control."""

@@ -1,0 +1,73 @@
+"""The start barrier: everybody proves every link that it will use, with a message, before the run.
+
+A process says hello on each of its publishers until everybody is ready, and is ready itself when
+it has heard a hello from everyone that it will depend on. So no message of the run can be the first
+one on its way, which a declaration still travelling could swallow. Nothing here sleeps: the wait
+for the next hello is the pause between two of one's own.
+"""
+
+import time
+from collections.abc import Callable, Iterable
+
+from bridge.awake import LOOK_S, AwakeClock
+from bridge.network.link import Arrival, Link, Publisher, waiting
+from bridge.process import Stop, launcher_stopped
+from configs.errors import InfrastructureError
+
+
+class Hellos:
+    """What a process says on its publishers before the run: the same as in it, marked as early.
+
+    Args:
+        every_s: from one round to the next, however often one is asked for.
+    """
+
+    def __init__(self, every_s: float) -> None:
+        self._hellos: list[tuple[Publisher, bytes]] = []
+        self._every_s = every_s
+        self._next_s = 0.0
+
+    def add(self, publisher: Publisher, payload: bytes) -> None:
+        """Say `payload` on `publisher` at every round, the first of which is at once."""
+        self._hellos.append((publisher, payload))
+        self._next_s = 0.0
+
+    def say(self) -> float:
+        """Say all of them once, if it is time; return how long it is until the next round."""
+        now = time.monotonic()
+        if now >= self._next_s:
+            # Never sooner: a hello that answers a hello would be a storm on a ring.
+            self._next_s = now + self._every_s
+            for publisher, payload in self._hellos:
+                publisher.put(payload)
+        return max(self._next_s - time.monotonic(), 0.0)
+
+
+def await_hellos(
+    link: Link,
+    hellos: Hellos,
+    take: Callable[[Arrival], object],
+    missing: Callable[[], Iterable[str]],
+    *,
+    who: str,
+    within_s: float,
+    stop: Stop,
+) -> None:
+    """Say hello and take arrivals until nothing is missing.
+
+    Raises:
+        InfrastructureError: something was still missing after `within_s`; the text names it.
+    """
+    clock = AwakeClock(held=launcher_stopped)
+    deadline = clock.now() + within_s
+    while absent := tuple(missing()):
+        if stop.requested:
+            return
+        if clock.now() > deadline:
+            raise InfrastructureError(
+                f"{who}: not ready after {within_s:g} s: heard nothing of {', '.join(absent)}"
+            )
+        if (arrival := link.receive(min(hellos.say(), LOOK_S))) is not None:
+            take(arrival)
+        for more in waiting(link):
+            take(more)

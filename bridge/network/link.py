@@ -1,0 +1,174 @@
+"""A link: how a process talks to the others, whatever carries it.
+
+Promises of every link: a message put on a key reaches every link that subscribes to it once, in the
+order of its publisher, and never the link that put it; nothing is lost while both live; `receive`
+waits a bounded time and wakes at once. `bridge.network.zenoh_link` carries it over Zenoh.
+
+Memory is bounded: of what waits for a reader each subscription has its own room, so that who floods
+his own key crowds out nobody else. What finds no room is dropped and counted.
+"""
+
+import threading
+from collections.abc import Callable, Iterator
+from queue import Empty, SimpleQueue
+from types import TracebackType
+from typing import NamedTuple, Protocol, Self
+
+MOST_AT_ONCE = 10_000
+"""Messages that one look takes: whoever drains comes to an end, however fast others say more."""
+ROOM_BYTES = 1 << 18
+"""Of one subscription, if the subscriber asks for no other."""
+MOST_WAITING = 1 << 14
+"""Messages of one subscription, however small: who floods with little ones takes time to read."""
+_OVERHEAD_BYTES = 256
+"""What a message takes besides its payload."""
+
+
+class Arrival(NamedTuple):
+    """One message: the subscriber's own tag, the key it was put on, its bytes."""
+
+    tag: str
+    key: str
+    payload: bytes
+
+
+class Dropped(NamedTuple):
+    """How many messages of a subscription found no room."""
+
+    tag: str
+    key: str
+    messages: int
+
+
+class Publisher(Protocol):
+    """The right to put messages on one key."""
+
+    def put(self, payload: bytes) -> None:
+        """Put one message."""
+
+
+class Link(Protocol):
+    """One process's connection to the others."""
+
+    def publisher(self, key: str, *, express: bool = True) -> Publisher:
+        """A publisher on `key`; not express, its messages may travel with others a little later."""
+
+    def subscribe(self, key: str, tag: str, *, room_bytes: int = ROOM_BYTES) -> None:
+        """Queue what is put on `key`, marked with `tag`, as long as there is room."""
+
+    def receive(self, timeout_s: float) -> Arrival | None:
+        """The next message, waiting at most `timeout_s`; 0 polls."""
+
+    def declare_live(self, key: str) -> None:
+        """Hold a liveliness token: seen by who watches, gone with this link."""
+
+    def watch_live(self, key_expr: str, tag: str) -> None:
+        """Queue b"1" for every token that is there or comes, b"0" for every one that goes."""
+
+    def close(self) -> None:
+        """End the link; its tokens go. Idempotent."""
+
+    def __enter__(self) -> Self:
+        """The link itself."""
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close."""
+
+
+def waiting(link: Link, most: int = MOST_AT_ONCE) -> Iterator[Arrival]:
+    """What has arrived, without waiting; of a flood no more than `most`: the rest stays."""
+    for _ in range(most):
+        arrival = link.receive(0.0)
+        if arrival is None:
+            return
+        yield arrival
+
+
+class Mailbox:
+    """The room of one subscription. Filled from whatever thread, emptied by one."""
+
+    __slots__ = ("_admitted", "_given", "_lock", "_removed", "_room", "_taken", "dropped")
+
+    def __init__(self, room_bytes: int) -> None:
+        self.dropped = 0
+        self._room = room_bytes
+        self._given = self._taken = 0
+        self._admitted = self._removed = 0
+        self._lock = threading.Lock()
+
+    def admit(self, payload_bytes: int) -> bool:
+        """Whether there is room for a message; a single one always finds some."""
+        size = payload_bytes + _OVERHEAD_BYTES
+        with self._lock:
+            held = self._given - self._taken
+            full = self._admitted - self._removed >= MOST_WAITING
+            if full or (held and held + size > self._room):
+                self.dropped += 1
+                return False
+            self._given += size
+            self._admitted += 1
+        return True
+
+    def take(self, payload_bytes: int) -> None:
+        """A message has been taken out."""
+        self._taken += payload_bytes + _OVERHEAD_BYTES
+        self._removed += 1
+
+
+class Inbox:
+    """Arrivals in order, from whatever thread, with a bounded wait."""
+
+    __slots__ = ("_boxes", "_latest", "_lock", "_queue")
+
+    def __init__(self) -> None:
+        self._queue: SimpleQueue[tuple[Arrival, Mailbox | None]] = SimpleQueue()
+        self._boxes: list[tuple[str, str, Mailbox]] = []  # tag and key of each
+        self._latest: dict[tuple[str, str], bytes] = {}  # by tag and key, of what is queued
+        self._lock = threading.Lock()
+
+    def mailbox(
+        self, key: str, tag: str, room_bytes: int
+    ) -> Callable[[str, Callable[[], bytes], int], None]:
+        """How a subscriber puts messages: key, how to get the payload, its length."""
+        box = Mailbox(room_bytes)
+        self._boxes.append((tag, key, box))
+        put = self._queue.put
+
+        def take(key: str, payload: Callable[[], bytes], size: int) -> None:
+            if box.admit(size):
+                put((Arrival(tag, key, payload()), box))
+
+        return take
+
+    def put_latest(self, arrival: Arrival) -> None:
+        """Queue a message that replaces one of the same tag and key, if that still waits."""
+        tag, key, payload = arrival
+        with self._lock:
+            waits = (tag, key) in self._latest
+            self._latest[tag, key] = payload
+        if not waits:
+            self._queue.put((arrival, None))
+
+    def dropped(self) -> list[Dropped]:
+        """The subscriptions that had no room for all, and how many messages they lost."""
+        return [Dropped(tag, key, box.dropped) for tag, key, box in self._boxes if box.dropped]
+
+    def receive(self, timeout_s: float) -> Arrival | None:
+        """The next arrival, waiting at most `timeout_s`; 0 polls."""
+        try:
+            if timeout_s <= 0.0:
+                arrival, box = self._queue.get_nowait()
+            else:
+                arrival, box = self._queue.get(timeout=timeout_s)
+        except Empty:
+            return None
+        if box is not None:
+            box.take(len(arrival.payload))
+            return arrival
+        with self._lock:
+            return arrival._replace(payload=self._latest.pop((arrival.tag, arrival.key)))

@@ -1,0 +1,279 @@
+"""Every message over Zenoh and its bytes.
+
+A message is a msgpack array that begins with the version of its layout. Decoding is bounded: too
+long, the wrong types, a wrong length, an unknown version or a number that isn't finite give None,
+never an exception; the caller counts it. Text is for people: what doesn't print, such as a
+terminal's escapes, is replaced. Times are scenario time in ns. A message may be well formed and
+still be impossible: that is for those to say who know the run.
+
+    message        layout                                        key
+    PathState      [1, tick, t_ns, s, v_hat]                     robot/<name>/path
+    PoseFix        [1, tick, t_ns, x_m, y_m, theta_rad]          robot/<name>/pose
+    LeaderSpeed    [1, [[from_t_ns, speed_m_s], ...]]            leader/speed
+    Rows           [1, first_tick, length, rows, final]          robot/<name>/truth, telemetry
+    Progress       [1, tick, t_ns, wall_ns]                      @progress/<process>
+    Notice         [1, text]                                     @notice/<process>
+    Report         [1, {name: number or text, ...}]              @report/<process>
+    Go             [1, epoch_ns]                                 @clock/go
+"""
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any, NamedTuple
+
+import msgpack
+
+VERSION = 1
+MAX_BYTES = 1 << 18
+"""Of any message."""
+MOST_BYTES = {
+    "path": 128,
+    "pose": 128,
+    "progress": 128,
+    "notice": 1 << 12,
+    "truth": 1 << 16,
+    "telemetry": 1 << 16,
+    "traffic": 1 << 16,
+    "report": MAX_BYTES,
+    "up": 1 << 16,
+}
+"""Of what others than the launcher say, by `bridge.network.keys.kind`: several times what they
+need."""
+MAX_TEXT = 1 << 15
+"""Characters of a text in a report."""
+MAX_NOTICE = 500
+"""Characters of a notice."""
+_MAX_VALUES, _MAX_NAME = 4096, 128
+_MAX_STEPS = 10_000
+_MAX_INT = 1 << 63
+
+Value = int | float | str
+
+
+class PathState(NamedTuple):
+    """What a robot says to its out-neighbours."""
+
+    tick: int
+    t_ns: int
+    s: float  # [m]
+    v_hat: float  # [m/s]
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, *self))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "PathState | None":
+        """The message in the bytes, None if there is none."""
+        fields = _unpack(payload, 5)
+        if fields is None or not (_ints(fields[1:3]) and _finite(fields[3:])):
+            return None
+        return cls(fields[1], fields[2], fields[3], fields[4])
+
+
+class PoseFix(NamedTuple):
+    """What the localisation system says to a robot."""
+
+    tick: int
+    t_ns: int
+    x_m: float
+    y_m: float
+    theta_rad: float
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, *self))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "PoseFix | None":
+        """The message in the bytes, None if there is none."""
+        fields = _unpack(payload, 6)
+        if fields is None or not (_ints(fields[1:3]) and _finite(fields[3:])):
+            return None
+        return cls(*fields[1:])
+
+
+class LeaderSpeed(NamedTuple):
+    """The virtual leader's speed v_r as steps (from scenario time [ns], speed [m/s]), in order."""
+
+    steps: tuple[tuple[int, float], ...]
+
+    def at(self, t_ns: int) -> float:
+        """Speed at a time [m/s]; the first step holds before it too."""
+        steps = self.steps
+        if len(steps) == 1:
+            return steps[0][1]
+        speed = steps[0][1]
+        for from_ns, value in steps:
+            if from_ns > t_ns:
+                break
+            speed = value
+        return speed
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, self.steps))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "LeaderSpeed | None":
+        """The message in the bytes, None if there is none."""
+        fields = _unpack(payload, 2)
+        if fields is None or not isinstance(fields[1], list):
+            return None
+        if not 1 <= len(fields[1]) <= _MAX_STEPS:
+            return None
+        for step in fields[1]:
+            if not (isinstance(step, list) and len(step) == 2):
+                return None
+            if not (_ints(step[:1]) and _finite(step[1:])):
+                return None
+        times = [step[0] for step in fields[1]]
+        return cls(tuple((t, v) for t, v in fields[1])) if times == sorted(times) else None
+
+
+class Rows(NamedTuple):
+    """A block of rows of consecutive ticks, as `bridge.telemetry` packs them."""
+
+    first_tick: int
+    length: int  # rows in the block
+    rows: bytes
+    final: bool  # nothing follows
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, *self))
+
+    @classmethod
+    def decode(cls, payload: bytes, row_bytes: int) -> "Rows | None":
+        """The message in the bytes, None if there is none or its rows aren't `row_bytes` long."""
+        fields = _unpack(payload, 5)
+        if fields is None or not _ints(fields[1:3]):
+            return None
+        _, _, length, rows, final = fields
+        if not isinstance(rows, bytes) or not isinstance(final, bool):
+            return None
+        return cls(*fields[1:]) if len(rows) == length * row_bytes else None
+
+
+class Progress(NamedTuple):
+    """How far a process is."""
+
+    tick: int
+    t_ns: int
+    wall_ns: int  # since control began
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, *self))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "Progress | None":
+        """The message in the bytes, None if there is none."""
+        fields = _unpack(payload, 4)
+        return cls(*fields[1:]) if fields is not None and _ints(fields[1:]) else None
+
+
+class Notice(NamedTuple):
+    """What has just happened, in one line for people."""
+
+    text: str
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, self.text[:MAX_NOTICE]))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "Notice | None":
+        """The message in the bytes, None if there is none."""
+        fields = _unpack(payload, 2)
+        if fields is None or type(fields[1]) is not str or len(fields[1]) > MAX_NOTICE:
+            return None
+        return cls(printable(fields[1].replace("\n", " ")))
+
+
+class Report(NamedTuple):
+    """The last word of a process: counters by name."""
+
+    values: Mapping[str, Value]
+
+    def number(self, name: str) -> float:
+        """A counter, 0 if the process didn't count it."""
+        value = self.values.get(name, 0)
+        return value if isinstance(value, int | float) else 0
+
+    def encode(self) -> bytes:
+        """Bytes for the wire; a text that is too long loses its end."""
+        values = {
+            name: value[:MAX_TEXT] if isinstance(value, str) else value
+            for name, value in self.values.items()
+        }
+        return _pack((VERSION, values))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "Report | None":
+        """The message in the bytes, None if there is none."""
+        fields = _unpack(payload, 2)
+        if fields is None or not isinstance(fields[1], dict):
+            return None
+        if len(fields[1]) > _MAX_VALUES:
+            return None
+        values: dict[str, Value] = {}
+        for name, value in fields[1].items():
+            if type(name) is not str or len(name) > _MAX_NAME:
+                return None
+            if type(value) is str and len(value) <= MAX_TEXT:
+                values[printable(name)] = printable(value)
+            elif _ints([value]) or _finite([value]):
+                values[printable(name)] = value
+            else:
+                return None
+        return cls(values)
+
+
+class Go(NamedTuple):
+    """Everybody is ready; in real time, tick 0 is at this reading of the wall clock."""
+
+    epoch_ns: int
+    ticks: int  # of the run
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return _pack((VERSION, *self))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "Go | None":
+        """The message in the bytes, None if there is none."""
+        fields = _unpack(payload, 3)
+        return cls(*fields[1:]) if fields is not None and _ints(fields[1:]) else None
+
+
+def printable(text: str) -> str:
+    """Text as it may be shown: lines, but nothing that a terminal would obey or hide."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def _pack(fields: tuple[object, ...]) -> bytes:
+    packed: bytes = msgpack.packb(fields)
+    return packed
+
+
+def _unpack(payload: bytes, length: int) -> list[Any] | None:
+    if len(payload) > MAX_BYTES:
+        return None
+    try:
+        fields = msgpack.unpackb(payload)
+    except (ValueError, TypeError, RecursionError, msgpack.UnpackException):
+        return None
+    if type(fields) is not list or len(fields) != length or fields[0] != VERSION:
+        return None
+    return fields
+
+
+def _ints(values: list[Any]) -> bool:
+    return all(type(value) is int and -_MAX_INT <= value < _MAX_INT for value in values)
+
+
+def _finite(values: list[Any]) -> bool:
+    return all(type(value) is float and isfinite(value) for value in values)

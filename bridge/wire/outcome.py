@@ -1,0 +1,174 @@
+"""What becomes of a frame on the wire: passes, or is destroyed, where and by what.
+
+In order, the first that applies:
+
+    an error flag on order                        see below
+    a sender at the wrong bit rate                bit error after the arbitration field; all fail
+    an active listener at the wrong bit rate      the same as a stuff error, and it was the first
+    senders of one identifier, different bits     at the first bit that differs, who sends recessive
+                                                  sees a bit error: an active one destroys the frame
+                                                  for all, passive ones drop out and the rest go on
+    a disturbance that corrupts it                form error at the delimiter of the CRC
+    nobody else to hear it                        acknowledge error after the acknowledge slot
+    else                                          it passes
+
+An error flag on order is six dominant bits in a row, at once whatever is on the wire. In a frame
+that is under way it destroys it from the next bit on. At its start it destroys it at the first
+recessive bit, of whoever starts with it. On an idle wire all others see it as a stuff error after
+the sixth bit. Who was told to signal it counts nothing.
+
+An error frame is the error flag, 6 bits, longer when others notice only by it (they see six
+dominant bits in a row and then send their own: 12 at most), and a delimiter of 8 bits.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from bridge.frame import EFF
+from bridge.wire.bits import (
+    END_BITS,
+    ERROR_DELIMITER_BITS,
+    ERROR_FLAG_BITS,
+    ERROR_FRAME_BITS,
+    INTERMISSION_BITS,
+    LONGEST_ERROR_FLAG_BITS,
+    stuffed_bits,
+)
+from bridge.wire.confinement import NodeState
+from bridge.wire.faults import Disturbance, Disturbances
+from bridge.wire.node import ErrorKind, Node
+from bridge.wire.queues import Entry
+
+_SECOND_NS = 1_000_000_000
+_ARBITRATION_BITS, _ARBITRATION_BITS_EXTENDED = 13, 33
+_AFTER_ACKNOWLEDGE = 1 + END_BITS + INTERMISSION_BITS
+
+
+class Sending(NamedTuple):
+    """A node and the frame that it is sending."""
+
+    node: Node
+    entry: Entry
+
+
+class Outcome(NamedTuple):
+    """What becomes of a frame; bits count from its start."""
+
+    senders: Sequence[Sending]  # who are sending to the end, or until it is destroyed
+    bits: int  # until the wire is free again
+    error: ErrorKind | None = None
+    error_bit: int = 0  # where the error flag begins
+    fallen: Sequence[Sending] = ()  # passive senders that saw a bit error and dropped out
+    first: Node | None = None  # a listener that destroyed it
+    disturbance: Disturbance | None = None
+    orders: Sequence[Sending] = ()  # error flags on order that destroyed it
+
+
+class Plan:
+    """A transmission: who sends what from when to when; `what` becomes of it, None: it passes."""
+
+    __slots__ = ("done_ns", "entry", "free_ns", "heard_by", "sender", "start_ns", "what")
+
+    def __init__(
+        self, sender: Node, entry: Entry, start_ns: int, what: Outcome | None, bit_rate: int
+    ) -> None:
+        self.sender = sender
+        self.entry = entry
+        self.start_ns = start_ns
+        self.what = what
+        bits = entry.bits if what is None else what.bits
+        done = bits - INTERMISSION_BITS
+        if what is not None and what.error is not None:
+            done = what.error_bit
+        self.done_ns = start_ns + done * _SECOND_NS // bit_rate
+        self.free_ns = start_ns + bits * _SECOND_NS // bit_rate
+        self.heard_by: tuple[Node, ...] = ()
+
+    def involves(self, node: Node) -> bool:
+        """Whether a node is sending in it."""
+        if self.what is None:
+            return node is self.sender
+        what = self.what
+        return any(s.node is node for s in (*what.senders, *what.fallen, *what.orders))
+
+
+def ordered(orders: Sequence[Sending], starting: Sequence[Sending]) -> Outcome:
+    """What becomes of error flags on order, and of the frame that starts with them."""
+    at = ERROR_FLAG_BITS
+    if starting:
+        at = stuffed_bits(starting[0].entry.frame).index("1") + 1
+    return Outcome(starting, ERROR_FRAME_BITS, ErrorKind.STUFF, at, orders=orders)
+
+
+def cut_short(plan: Plan, order: Sending, bit: int) -> Outcome:
+    """What becomes of a transmission under way whose bits from `bit` on an error flag covers."""
+    before = plan.what
+    senders: Sequence[Sending] = (Sending(plan.sender, plan.entry),)
+    if before is None:
+        before = Outcome(senders, plan.entry.bits)
+    return before._replace(
+        bits=bit + ERROR_FRAME_BITS,
+        error=ErrorKind.STUFF,
+        error_bit=bit,
+        first=None,
+        disturbance=None,
+        orders=(*before.orders, order),
+    )
+
+
+def outcome(
+    senders: Sequence[Sending], nodes: Sequence[Node], disturbances: Disturbances
+) -> Outcome:
+    """What becomes of the frame of `senders`, who have won the arbitration, among all `nodes`."""
+    frame = senders[0].entry.frame
+    listeners = [node for node in nodes if node.state is not NodeState.BUS_OFF]
+    sending = [sender.node for sender in senders]
+    after = _ARBITRATION_BITS_EXTENDED if frame.can_id & EFF else _ARBITRATION_BITS
+    if any(node.wrong_bit_rate for node in sending):
+        return _destroyed(senders, ErrorKind.BIT, after, LONGEST_ERROR_FLAG_BITS)
+    for node in listeners:
+        if node.wrong_bit_rate and node.state is not NodeState.ERROR_PASSIVE:
+            found = _destroyed(senders, ErrorKind.STUFF, after, LONGEST_ERROR_FLAG_BITS)
+            return found._replace(first=node)
+    fallen: list[Sending] = []
+    if len(senders) > 1:
+        clash = _clash(senders, fallen)
+        if clash is not None:
+            return clash
+        senders = [sender for sender in senders if sender not in fallen]
+    entry = senders[0].entry
+    disturbance = None
+    if disturbances:
+        disturbance = disturbances.match(senders[0].node.name, entry.frame, on_wire=True)
+    if disturbance is not None:
+        at = entry.bits - _AFTER_ACKNOWLEDGE - 1
+        found = _destroyed(senders, ErrorKind.FORM, at, ERROR_FLAG_BITS)
+        return found._replace(fallen=fallen, disturbance=disturbance)
+    if not any(node not in sending and not node.wrong_bit_rate for node in listeners):
+        at = entry.bits - _AFTER_ACKNOWLEDGE
+        found = _destroyed(senders, ErrorKind.ACK, at, ERROR_FLAG_BITS)
+        return found._replace(fallen=fallen)
+    return Outcome(senders, entry.bits, fallen=fallen)
+
+
+def _clash(senders: Sequence[Sending], fallen: list[Sending]) -> Outcome | None:
+    """The error of senders whose bits differ; passive ones that can't destroy it are `fallen`."""
+    streams = {sender.node: stuffed_bits(sender.entry.frame) for sender in senders}
+    going = list(senders)
+    while len({streams[sender.node] for sender in going}) > 1:
+        texts = [streams[sender.node] for sender in going]
+        at = next(n for n, bits in enumerate(zip(*texts, strict=False)) if len(set(bits)) > 1)
+        seeing = [sender for sender, text in zip(going, texts, strict=True) if text[at] == "1"]
+        if any(sender.node.state is not NodeState.ERROR_PASSIVE for sender in seeing):
+            wire = next(text for text in texts if text[at] == "0")[: at + 1]
+            dominant = len(wire) - len(wire.rstrip("0"))
+            flag = LONGEST_ERROR_FLAG_BITS - dominant
+            found = _destroyed(going, ErrorKind.BIT, at + 1, flag)
+            return found._replace(fallen=fallen)
+        fallen += seeing
+        going = [sender for sender in going if sender not in seeing]
+    return None
+
+
+def _destroyed(senders: Sequence[Sending], kind: ErrorKind, at: int, flag: int) -> Outcome:
+    return Outcome(senders, at + flag + ERROR_DELIMITER_BITS + INTERMISSION_BITS, kind, at)

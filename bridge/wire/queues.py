@@ -1,0 +1,147 @@
+"""What waits at a node to be sent, and what waits there to be read.
+
+    queue       of                   next on the bus        when full
+    Fifo        a host: SocketCAN's  the oldest             refused: the caller gets ENOBUFS
+                `txqueuelen` of 10
+    Mailboxes   a drive: bxCAN's     the lowest             refused: firmware tries again a
+                three                identifier             millisecond later with newer data
+    Endless     a babbling idiot     always the same frame  never
+
+Nothing pending is ever replaced by something newer: ODrive's firmware 0.5.6 looks for a free
+mailbox and else reports that it didn't send (`ODriveCAN::send_message`), and its mailboxes compete
+by identifier (`TransmitFifoPriority = DISABLE`). Of equal identifiers the older one goes first. The
+frame that is on the wire keeps its place until it was sent, for it may have to be sent again.
+"""
+
+from bisect import insort
+from typing import NamedTuple
+
+from bridge.frame import Frame
+from bridge.wire.bits import arbitration_key, frame_bits
+
+HOST_QUEUE = 10
+DRIVE_MAILBOXES = 3
+RECEIVE_DEPTH = 3
+ERROR_KEY = -1
+"""Of an error flag on order: it takes part in no arbitration, it ends one."""
+
+
+class Entry(NamedTuple):
+    """A pending frame; entries compare as the bus and then the queue would choose."""
+
+    key: int  # of arbitration, see `bits.arbitration_key`
+    number: int  # in order of submission, unique on the wire
+    frame: Frame
+    bits: int  # on the wire, see `bits.frame_bits`
+
+
+class Queue:
+    """A transmit queue; `entries` are in the order in which they go to arbitration."""
+
+    __slots__ = ("capacity", "entries")
+
+    def __init__(self, capacity: int) -> None:
+        if capacity < 1:
+            raise ValueError(f"a transmit queue for {capacity} frames: it takes 1 or more")
+        self.capacity = capacity
+        self.entries: list[Entry] = []
+
+    def push(self, entry: Entry) -> bool:
+        """Take a frame, or return False: no room."""
+        raise NotImplementedError
+
+    def sent(self, entry: Entry) -> None:
+        """Forget a frame that was sent."""
+        self.entries.remove(entry)
+
+    def clear(self) -> int:
+        """Forget all; return how many frames that were submitted are lost."""
+        count = len(self.entries)
+        self.entries.clear()
+        return count
+
+
+class Fifo(Queue):
+    """First in, first out: an urgent frame waits behind the others of its own node."""
+
+    __slots__ = ()
+
+    def __init__(self, capacity: int = HOST_QUEUE) -> None:
+        super().__init__(capacity)
+
+    def push(self, entry: Entry) -> bool:
+        """Take a frame, or return False: no room."""
+        entries = self.entries
+        if len(entries) >= self.capacity:
+            return False
+        entries.append(entry)
+        return True
+
+
+class Mailboxes(Queue):
+    """A controller's transmit mailboxes: the lowest identifier goes first."""
+
+    __slots__ = ()
+
+    def __init__(self, capacity: int = DRIVE_MAILBOXES) -> None:
+        super().__init__(capacity)
+
+    def push(self, entry: Entry) -> bool:
+        """Take a frame into a free mailbox, or return False: there is none."""
+        entries = self.entries
+        if len(entries) >= self.capacity:
+            return False
+        insort(entries, entry)
+        return True
+
+
+class Endless(Queue):
+    """A babbling idiot: sends one frame again and again, as fast as the bus lets it."""
+
+    __slots__ = ()
+
+    def __init__(self, frame: Frame) -> None:
+        super().__init__(1)
+        self.entries.append(Entry(arbitration_key(frame.can_id), -1, frame, frame_bits(frame)))
+
+    def push(self, entry: Entry) -> bool:
+        """No: it says one thing only."""
+        del entry
+        return False
+
+    def sent(self, entry: Entry) -> None:
+        """It goes on."""
+
+    def clear(self) -> int:
+        """Stop for good; nothing that was submitted is lost."""
+        self.entries.clear()
+        return 0
+
+
+class ReceiveFifo:
+    """What a controller has received and nobody has read: bxCAN's three, `ReceiveFifoLocked` off.
+
+    When full, the newest frame overwrites the one before it and `overruns` counts the loss.
+    """
+
+    __slots__ = ("_depth", "_frames", "overruns")
+
+    def __init__(self, depth: int = RECEIVE_DEPTH) -> None:
+        if depth < 1:
+            raise ValueError(f"a receive FIFO of {depth} frames: it needs 1 or more")
+        self._depth = depth
+        self._frames: list[Frame] = []
+        self.overruns = 0
+
+    def put(self, frame: Frame) -> None:
+        """Take a frame off the bus."""
+        if len(self._frames) == self._depth:
+            self._frames[-1] = frame
+            self.overruns += 1
+        else:
+            self._frames.append(frame)
+
+    def take(self) -> list[Frame]:
+        """Read all, oldest first."""
+        frames, self._frames = self._frames, []
+        return frames

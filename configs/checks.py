@@ -1,0 +1,302 @@
+"""What relates the sections of a scenario to each other; all problems at once, none raised."""
+
+import difflib
+import itertools
+from collections.abc import Iterator
+from math import ceil, floor, inf
+from typing import NamedTuple
+
+from configs.graph import parse_edge
+from configs.scenario import ETSRO, Scenario
+from configs.sections import Expect
+from configs.signals import expectable
+
+MAX_NODE = 62
+"""63 is the address of drives that have none."""
+
+
+class Problem(NamedTuple):
+    """One thing wrong with a scenario."""
+
+    key: str  # as in the file, robots by name
+    value: object
+    right: str  # what would be right
+
+
+def cross_problems(scenario: Scenario) -> list[Problem]:
+    """All problems that no section can see alone."""
+    problems = [*_names(scenario), *_periods(scenario), *_drives(scenario)]
+    problems += [*_host(scenario), *_expects(scenario)]
+    edges = list(_edges(scenario))
+    if not problems and not edges:
+        edges = list(_graph(scenario))
+    return problems + edges
+
+
+def _names(scenario: Scenario) -> Iterator[Problem]:
+    seen: set[str] = set()
+    for robot in scenario.robot:
+        if robot.name in seen:
+            yield Problem("robot.name", robot.name, "two robots have this name; make it unique")
+        seen.add(robot.name)
+        known = {ETSRO, *scenario.robot_types}
+        if robot.type not in known:
+            right = f"no such robot type; known: {', '.join(sorted(known))}"
+            yield Problem(f"robot.{robot.name}.type", robot.type, right)
+        if robot.offset.kind == "varying":
+            places = [knot.s_m for knot in robot.offset.knots]
+            if any(b <= a for a, b in itertools.pairwise(places)):
+                yield Problem(f"robot.{robot.name}.offset.knots", places, "s_m must increase")
+    if scenario.path.kind == "spline":
+        points = scenario.path.points_m
+        if any(a == b for a, b in itertools.pairwise(points)):
+            yield Problem("path.points_m", points, "two neighbouring points are the same")
+        if scenario.path.closed and points[0] == points[-1]:
+            right = "a closed spline goes back to its first point by itself: leave the last one out"
+            yield Problem("path.points_m", points, right)
+        if scenario.path.closed and len(points) < 3:
+            yield Problem("path.points_m", points, "a closed spline needs three points or more")
+    steps = [step.t_s for step in scenario.leader.steps]
+    if any(b <= a for a, b in itertools.pairwise(steps)):
+        yield Problem("leader.steps", steps, "t_s must increase")
+
+
+def _periods(scenario: Scenario) -> Iterator[Problem]:
+    clock = scenario.clock
+    period_ns = clock.control_period_s * 1e9
+    if abs(period_ns - round(period_ns)) > 1e-3 or round(period_ns) < 1000:
+        yield Problem(
+            "clock.control_period_s",
+            clock.control_period_s,
+            "must be a whole number of nanoseconds, 1 µs or more",
+        )
+        return
+    multiples = {
+        "clock.share_period_s": clock.share_period_s,
+        "clock.localisation_period_s": clock.localisation_period_s,
+        "clock.countdown_s": clock.countdown_s,
+        "duration_s": scenario.duration_s,
+    }
+    if scenario.until_s is not None:
+        multiples["until_s"] = scenario.until_s
+    if scenario.localisation.delay_s is not None:
+        multiples["localisation.delay_s"] = scenario.localisation.delay_s
+    for key, value in multiples.items():
+        ratio = value / clock.control_period_s
+        least = 0 if key in ("clock.countdown_s", "localisation.delay_s") else 1
+        if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < least:
+            below = max(int(ratio), 1) * clock.control_period_s
+            yield Problem(
+                key,
+                value,
+                f"must be a whole multiple of clock.control_period_s = {clock.control_period_s:g}"
+                f", for example {below:g}",
+            )
+    silence_s = scenario.coordination.silence_limit_s
+    if clock.share_period_s > silence_s:
+        yield Problem(
+            "clock.share_period_s",
+            clock.share_period_s,
+            f"must not be above coordination.silence_limit_s = {silence_s:g}, or every neighbour"
+            " counts as silent between two shares",
+        )
+    shortest = 3 * clock.control_period_s + 2 * scenario.drive.heartbeat_period_s
+    if clock.countdown_s < shortest:
+        yield Problem(
+            "clock.countdown_s",
+            clock.countdown_s,
+            f"too short to arm the drives: three control periods and two heartbeats need"
+            f" {shortest:g} s or more",
+        )
+
+
+_WHOLE_MILLISECONDS = (
+    "heartbeat_period_s",
+    "encoder_period_s",
+    "torques_period_s",
+    "error_period_s",
+    "iq_period_s",
+    "temperature_period_s",
+    "bus_voltage_period_s",
+    "powers_period_s",
+)
+
+
+def _drives(scenario: Scenario) -> Iterator[Problem]:
+    drive = scenario.drive
+    if drive.right_node == drive.left_node:
+        yield Problem("drive.left_node", drive.left_node, "must differ from drive.right_node")
+    else:
+        yield from _nodes(scenario)
+    least_s, most_s = drive.command_latency_s
+    if least_s > most_s:
+        yield Problem("drive.command_latency_s", [least_s, most_s], "least before most")
+    for key in _WHOLE_MILLISECONDS:
+        period_s = getattr(drive, key) or 0.0
+        if abs(period_s * 1e3 - round(period_s * 1e3)) > 1e-6:
+            yield Problem(f"drive.{key}", period_s, "whole milliseconds, as drives have them")
+    yield from _encoder_period(scenario)
+    if drive.under_voltage_V >= drive.over_voltage_V:
+        above = f"must be below drive.over_voltage_V = {drive.over_voltage_V:g}"
+        yield Problem("drive.under_voltage_V", drive.under_voltage_V, above)
+    if drive.derate_from_C >= drive.derate_to_C:
+        above = f"must be below drive.derate_to_C = {drive.derate_to_C:g}"
+        yield Problem("drive.derate_from_C", drive.derate_from_C, above)
+    if drive.watchdog_s and drive.watchdog_s < 2 * scenario.clock.control_period_s:
+        yield Problem(
+            "drive.watchdog_s",
+            drive.watchdog_s,
+            "0 (off) or at least two control periods, or every torque comes too late",
+        )
+    encoder = scenario.encoder
+    if 2.0 * encoder.pll_bandwidth_rad_s >= encoder.pll_rate_Hz:
+        yield Problem(
+            "encoder.pll_bandwidth_rad_s",
+            encoder.pll_bandwidth_rad_s,
+            f"must be below half of encoder.pll_rate_Hz = {encoder.pll_rate_Hz:g}, as drives want"
+            " it: twice the bandwidth times the loop period is a gain below 1",
+        )
+
+
+def _encoder_period(scenario: Scenario) -> Iterator[Problem]:
+    period_s, control_s = scenario.drive.encoder_period_s, scenario.clock.control_period_s
+    if period_s is None:
+        return
+    ratio = control_s / period_s
+    if ratio < 1.0 - 1e-6:
+        right = f"at most clock.control_period_s = {control_s:g}: a tick needs news of both wheels"
+        yield Problem("drive.encoder_period_s", period_s, right)
+    elif scenario.clock.mode == "lockstep" and abs(ratio - round(ratio)) > 1e-6:
+        right = f"must divide clock.control_period_s = {control_s:g}, the tick of lockstep"
+        yield Problem("drive.encoder_period_s", period_s, right)
+
+
+def _nodes(scenario: Scenario) -> Iterator[Problem]:
+    taken: dict[tuple[str, int], str] = {}
+    for name in scenario.names:
+        bus = scenario.bus_of(name)
+        for side, node in zip(("right", "left"), scenario.nodes_of(name), strict=True):
+            key = f"robot.{name}.{side}_node"
+            if node > MAX_NODE:
+                right = f"bus {bus} has no node left for it: 0 to {MAX_NODE}"
+                yield Problem(key, node, right)
+            elif (owner := taken.setdefault((bus, node), f"{name}'s {side} drive")) and (
+                owner != f"{name}'s {side} drive"
+            ):
+                yield Problem(key, node, f"on bus {bus} it is {owner} already; choose another")
+
+
+def _host(scenario: Scenario) -> Iterator[Problem]:
+    host, clock, heartbeat_s = scenario.host, scenario.clock, scenario.drive.heartbeat_period_s
+    delay_s = scenario.localisation.delay_s or clock.control_period_s
+    least = {
+        "heartbeat_age_limit_s": (2 * heartbeat_s, "two of drive.heartbeat_period_s"),
+        "encoder_age_limit_s": (2 * clock.control_period_s, "two of clock.control_period_s"),
+        "pose_age_limit_s": (
+            delay_s + 2 * clock.localisation_period_s,
+            "the delay and two of clock.localisation_period_s",
+        ),
+    }
+    if host.rearm:
+        least["rearm_after_s"] = 2 * heartbeat_s, "two of drive.heartbeat_period_s"
+        least["rearm_limit_s"] = 3 * heartbeat_s, "three of drive.heartbeat_period_s"
+        if scenario.localisation.source == "odometry":
+            right = "odometry alone doesn't know where a robot is after a fault: false, or fixes"
+            yield Problem("host.rearm", True, right)
+    for key, (limit, what) in least.items():
+        value = getattr(host, key)
+        if value is not None and value < limit:
+            right = f"{what}, {limit:g} s, or more, or a healthy robot stops or never arms"
+            yield Problem(f"host.{key}", value, right)
+
+
+def _expects(scenario: Scenario) -> Iterator[Problem]:
+    known = expectable()
+    for n, expect in enumerate(scenario.expect):
+        where = f"expect.{n}"
+        if expect.signal not in known:
+            close = difflib.get_close_matches(expect.signal, known, 1, cutoff=0.5)
+            hint = f"; did you mean {close[0]}?" if close else ""
+            right = f"no such signal{hint} (known: {', '.join(known)})"
+            yield Problem(f"{where}.signal", expect.signal, right)
+        for robot in expect.robots or ():
+            if robot not in scenario.names:
+                yield Problem(f"{where}.robots", robot, _known(scenario))
+        yield from _bounds(where, expect)
+        yield from _window(where, expect, scenario)
+
+
+def _bounds(where: str, expect: Expect) -> Iterator[Problem]:
+    if expect.max_abs is None and expect.min is None and expect.max is None:
+        yield Problem(where, expect.signal, "give max_abs, min or max")
+    most = inf if expect.max is None else expect.max
+    least = -inf if expect.min is None else expect.min
+    widest = inf if expect.max_abs is None else expect.max_abs
+    if least > most:
+        yield Problem(f"{where}.min", least, f"must be at most max = {most:g}: nothing is both")
+    elif least > widest:
+        yield Problem(f"{where}.min", least, f"must be at most max_abs = {widest:g}")
+    elif most < -widest:
+        yield Problem(f"{where}.max", most, f"must be at least -max_abs = {-widest:g}")
+
+
+def _window(where: str, expect: Expect, scenario: Scenario) -> Iterator[Problem]:
+    """A window has a tick in it, and the scenario reaches it; a run may end before, on demand."""
+    end_s, period_s = max(scenario.duration_s, scenario.ends_at_s), scenario.clock.control_period_s
+    last_s = end_s - period_s if expect.to_s is None else expect.to_s
+    if expect.to_s is not None and expect.from_s >= expect.to_s:
+        yield Problem(f"{where}.from_s", expect.from_s, f"must be below to_s = {expect.to_s:g}")
+    elif expect.from_s >= end_s:
+        right = f"the run ends before: must be below duration_s = {end_s:g}"
+        yield Problem(f"{where}.from_s", expect.from_s, right)
+    elif ceil(expect.from_s / period_s - 1e-6) > floor(last_s / period_s + 1e-6):
+        right = f"no tick from there to {last_s:g} s: they are {period_s:g} s apart"
+        yield Problem(f"{where}.from_s", expect.from_s, right)
+    if expect.to_s is not None and expect.to_s > end_s:
+        right = f"the run ends before: at most duration_s = {end_s:g}, or leave it out: to the end"
+        yield Problem(f"{where}.to_s", expect.to_s, right)
+
+
+def _edges(scenario: Scenario) -> Iterator[Problem]:
+    graph = scenario.graph
+    if graph.edges is not None and graph.generator is not None:
+        yield Problem("graph.generator", graph.generator, "give either edges or a generator")
+    for text in graph.edges or ():
+        edge = parse_edge(text)
+        if edge is None:
+            yield Problem("graph.edges", text, 'must read "r1 -> r2": r2 hears r1')
+            continue
+        for robot in edge:
+            if robot not in scenario.names:
+                yield Problem("graph.edges", text, f"{robot}: {_known(scenario)}")
+        if edge[0] == edge[1]:
+            yield Problem("graph.edges", text, "a robot doesn't hear itself")
+    for robot in graph.leader or ():
+        if robot not in scenario.names:
+            yield Problem("graph.leader", robot, _known(scenario))
+    if graph.leader is not None and not graph.leader:
+        yield Problem("graph.leader", [], "at least one robot must hear the leader")
+
+
+def _graph(scenario: Scenario) -> Iterator[Problem]:
+    graph = scenario.topology
+    edges = [f"{a} -> {b}" for a, b in graph.edges]
+    unreached = graph.unreached_from(graph.leader)
+    if unreached:
+        yield Problem(
+            "graph.leader",
+            list(graph.leader),
+            f"the leader does not reach {', '.join(unreached)}: add an edge to them from a robot"
+            " that it reaches, or a leader link",
+        )
+    if not graph.roots():
+        yield Problem(
+            "graph.edges",
+            edges,
+            "no robot reaches all others (the graph has no root), so s_i − s_j would never vanish:"
+            " join the parts by an edge",
+        )
+
+
+def _known(scenario: Scenario) -> str:
+    return f"no such robot; known: {', '.join(dict.fromkeys(scenario.names))}"

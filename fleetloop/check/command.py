@@ -1,0 +1,156 @@
+"""`fleetloop check`: what can be said of a scenario before it runs."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.table import Table
+
+from configs.deployment import Deployment, agent_role, load_deployment
+from configs.errors import Complaint, ScenarioError
+from configs.loading import json_schema, load, shipped
+from configs.overrides import Overrides
+from configs.scenario import Scenario
+from fleetloop.check.examine import examine
+from fleetloop.check.finding import Finding, named, worst
+from fleetloop.check.rehearsal import rehearse
+from fleetloop.terminal import ResultConsole, say, say_json
+
+FINE, UNSOUND, WRONG = 0, 1, 2
+_VERDICTS = {
+    "ok": "sound",
+    "warning": "no error; mind the warnings",
+    "error": "would not work as it is",
+}
+_MARKS = {"ok": "[green]ok[/]", "warning": "[yellow]warning[/]", "error": "[red]error[/]"}
+
+
+def check_scenario(
+    source: str, overrides: Overrides, *, deployment: Path | None = None, as_json: bool
+) -> int:
+    """Check a scenario, print the findings; exit status 1 if one of them is an error.
+
+    With `as_json` what is wrong with the file itself is JSON as well; the exit status is then 2.
+
+    Raises:
+        ScenarioError: the file itself is wrong, or its deployment.
+    """
+    try:
+        scenario, found = _find(source, overrides, deployment)
+    except ScenarioError as error:
+        if not as_json:
+            raise
+        _say_json(problems=_problems(error))
+        return WRONG
+    unsound = any(finding.level == "error" for finding in found)
+    if as_json:
+        _say_json(findings=found)
+        return UNSOUND if unsound else FINE
+    ResultConsole().print(_table(scenario, found))
+    say(_VERDICTS[worst(found)])
+    return UNSOUND if unsound else FINE
+
+
+def _table(scenario: Scenario, findings: Sequence[Finding]) -> Table:
+    """A row for each; what is well differs in numbers only, so there one robot stands for all."""
+    graph = scenario.topology
+    table = Table(
+        title=f"{scenario.name}: robots {len(graph.robots)}, edges {len(graph.edges)}",
+        show_header=False,
+        box=None,
+        padding=(0, 1),
+    )
+    by_title: dict[str, list[Finding]] = {}
+    for finding in findings:
+        by_title.setdefault(finding.title, []).append(finding)
+    for title, group in by_title.items():
+        shown = [finding for finding in group if finding.level != "ok"]
+        well = [finding for finding in group if finding.level == "ok"]
+        if well:
+            first = named(well[0].robots, graph.robots)
+            others = [robot for finding in well[1:] for robot in finding.robots]
+            text = (
+                f"{well[0].text}; likewise {named(others, graph.robots)}"
+                if others
+                else well[0].text
+            )
+            table.add_row(_MARKS["ok"], title, first, text)
+        for finding in shown:
+            robots = named(finding.robots, graph.robots)
+            table.add_row(_MARKS[finding.level], title, robots, finding.text)
+    return table
+
+
+def _find(
+    source: str, overrides: Overrides, deployment: Path | None
+) -> tuple[Scenario, list[Finding]]:
+    scenario = load(source, overrides)
+    found = examine(source, scenario, overrides)
+    if worst(found) != "error":
+        found += rehearse(scenario)
+    if deployment is not None:
+        found += place_findings(scenario, load_deployment(deployment, scenario))
+    return scenario, found
+
+
+def _problems(error: ScenarioError) -> list[dict[str, object]]:
+    """What is wrong with a file or an option, for machines."""
+    if error.complaints:
+        return [
+            {**complaint._asdict(), "value": _json_value(complaint.value)}
+            for complaint in error.complaints
+        ]
+    return [Complaint("", "", None, text)._asdict() for text in str(error).splitlines()]
+
+
+def _json_value(value: object) -> object:
+    """As it is, if JSON has it; nan and infinity it has not."""
+    try:
+        return json.loads(json.dumps(value, allow_nan=False))
+    except (TypeError, ValueError):
+        return str(value)
+
+
+def _say_json(
+    *, findings: Sequence[Finding] = (), problems: Sequence[dict[str, object]] = ()
+) -> None:
+    sound = not problems and all(finding.level != "error" for finding in findings)
+    listed = [asdict(finding) for finding in findings]
+    whole = {
+        "sound": sound,
+        "worst": "error" if problems else worst(findings),
+        "problems": list(problems),
+        "findings": listed,
+    }
+    say_json(whole)
+
+
+def place_findings(scenario: Scenario, deployment: Deployment) -> list[Finding]:
+    """Where each robot's controller, bus and drives are."""
+    found = []
+    for robot in scenario.names:
+        bus = dict(deployment.bus_of(robot))
+        drives = "emulated" if deployment.emulates(robot) else "REAL"
+        where = "here" if deployment.runs_here(agent_role(robot)) else "elsewhere"
+        text = f"controller {where}, {drives} drives on {bus['interface']} {bus['channel']}"
+        found.append(Finding("ok", "place", text, (robot,)))
+    return found
+
+
+def list_scenarios(*, as_json: bool) -> None:
+    """Print the shipped scenarios."""
+    if as_json:
+        each = [{"name": name, "description": load(name).description} for name in shipped()]
+        say_json({"shipped": each})
+        return
+    table = Table(box=None, show_header=False, padding=(0, 1))
+    for name in shipped():
+        table.add_row(name, load(name).description)
+    say("Shipped scenarios, for `fleetloop run NAME` and `fleetloop check NAME`:")
+    ResultConsole().print(table)
+
+
+def print_schema() -> None:
+    """Print the JSON Schema of scenario files."""
+    say_json(json_schema())

@@ -1,0 +1,156 @@
+"""A robot's course: where its path wants it at the instants of a forecast, and how fast.
+
+    v = v̄_d ṡ,  ω = ω̄_d ṡ                                     forward speed, turn rate  (10), (11)
+
+A path is regular (Assumption 2.4) if v̄_d has a positive lower bound. It is looked for by halving:
+between two places Γ' may come near 0 only where the chord of its hodograph does.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, hypot, inf, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.paths import RobotPath, robot_path
+from configs.brief import WorldOffset
+from configs.checks import Problem
+from configs.complaints import refusal
+from configs.loading import blamed
+from configs.overrides import Overrides
+from configs.resolve import formation_offset, reference_path
+from configs.scenario import Scenario
+from configs.sections import Robot
+from fleetloop.check.coordination import Forecast
+
+Series = NDArray[np.float64]
+PLACES = 40_000
+"""Path points evaluated for a scenario, all robots together, about."""
+STANDS_STILL = 1e-3
+"""v̄_d below this is no path: a millimetre per metre of s."""
+_HALVINGS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """One robot's reference motion in time."""
+
+    robot: Robot
+    t_s: Series
+    v: Series  # [m/s]
+    omega: Series  # [rad/s]
+    v_bar: Series  # (10), [m per unit of s]
+    omega_bar: Series  # (11), [rad per unit of s]
+
+
+def courses(scenario: Scenario, ahead: Forecast) -> list[Course]:
+    """All robots' courses; their paths are regular."""
+    every = max(1, len(ahead.t_s) * len(scenario.robot) // PLACES)
+    found = []
+    for n, robot in enumerate(scenario.robot):
+        path = path_of(scenario, robot)
+        references = [path(float(s)) for s in ahead.s[::every, n]]
+        v_bar = np.array([reference.v_bar for reference in references])
+        omega_bar = np.array([reference.omega_bar for reference in references])
+        s_dot = ahead.s_dot[::every, n]
+        t_s = ahead.t_s[::every]
+        found.append(Course(robot, t_s, v_bar * s_dot, omega_bar * s_dot, v_bar, omega_bar))
+    return found
+
+
+def path_of(scenario: Scenario, robot: Robot) -> RobotPath:
+    """The path Γ_i of a robot."""
+    return robot_path(reference_path(scenario.path), formation_offset(robot.offset))
+
+
+def refuse_irregular(
+    source: str, scenario: Scenario, ahead: Forecast, overrides: Overrides = ()
+) -> None:
+    """Refuse a scenario in which a robot's path stands still somewhere on its way.
+
+    Whoever set the key is blamed: the file `source`, or one of the options `overrides`.
+
+    Raises:
+        ScenarioError: naming robots, keys and places.
+    """
+    problems = []
+    for n, robot in enumerate(scenario.robot):
+        first, last = float(ahead.s[:, n].min()), float(ahead.s[:, n].max())
+        count = max(200, PLACES // len(scenario.robot) // 10)
+        places = np.linspace(first, last, count).tolist()
+        at, slowest = slowest_place(path_of(scenario, robot), places)
+        if slowest < STANDS_STILL:
+            problems.append(blamed(source, _irregular(scenario, robot, at), overrides))
+    if problems:
+        raise refusal(problems)
+
+
+def slowest_place(path: RobotPath, places: Sequence[float]) -> tuple[float, float]:
+    """(s, v̄_d) where v̄_d is least on [first, last] of increasing places."""
+    best = (places[0], inf)
+
+    def hodograph(s: float) -> tuple[float, float]:
+        nonlocal best
+        speed, heading = _speed_and_heading(path, s)
+        if speed < best[1]:
+            best = s, speed
+        return speed * cos(heading), speed * sin(heading)
+
+    def look(
+        a: float, at_a: tuple[float, float], b: float, at_b: tuple[float, float], n: int
+    ) -> None:
+        near, far = sorted((hypot(*at_a), hypot(*at_b)))
+        apart = _chord_from_origin(at_a, at_b)
+        if n == 0 or best[1] < STANDS_STILL or apart > 0.5 * near or far == 0.0:
+            return
+        middle = 0.5 * (a + b)
+        at_middle = hodograph(middle)
+        look(a, at_a, middle, at_middle, n - 1)
+        look(middle, at_middle, b, at_b, n - 1)
+
+    before, at_before = places[0], hodograph(places[0])
+    for place in places[1:]:
+        at_place = hodograph(place)
+        look(before, at_before, place, at_place, _HALVINGS)
+        before, at_before = place, at_place
+    return best
+
+
+def _irregular(scenario: Scenario, robot: Robot, at: float) -> Problem:
+    """What to change: the offset, unless the centre's own path stands still there."""
+    law = "the law wants v̄_d > 0 everywhere (Assumption 2.4)"
+    centre = robot_path(reference_path(scenario.path), WorldOffset(0.0, 0.0))
+    speed, _ = _speed_and_heading(centre, at)
+    if speed < STANDS_STILL:
+        right = f"the path stands still at s = {at:.4g} m; {law}"
+        if scenario.path.kind == "spline":
+            value: object = scenario.path.points_m
+            return Problem("path.points_m", value, f"{right}: don't turn back on a point")
+        return Problem("path", scenario.path.model_dump(), right)
+    turn = abs(centre(at).omega_bar)
+    right = f"{robot.name}'s path stands still at s = {at:.4g} m; {law}"
+    if turn > 0.0:
+        right += f": keep the offset off the path's centre of curvature, {speed / turn:.4g} m away"
+    offset = robot.offset.model_dump()
+    kind = offset.pop("kind")
+    if kind == "structure":
+        key = f"robot.{robot.name}.offset.left_m"
+        return Problem(key, offset["left_m"], right)
+    return Problem(f"robot.{robot.name}.offset", offset, right)
+
+
+def _speed_and_heading(path: RobotPath, s: float) -> tuple[float, float]:
+    try:
+        reference = path(s)
+    except ZeroDivisionError:  # exactly there
+        return 0.0, 0.0
+    return reference.v_bar, reference.theta
+
+
+def _chord_from_origin(a: tuple[float, float], b: tuple[float, float]) -> float:
+    """Distance of the origin from the segment between two points."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    square = dx * dx + dy * dy
+    along = 0.0 if square == 0.0 else min(max(-(a[0] * dx + a[1] * dy) / square, 0.0), 1.0)
+    return hypot(a[0] + along * dx, a[1] + along * dy)

@@ -1,0 +1,144 @@
+"""A rehearsal: the beginning of the run in this process, as far as a second or two of work goes.
+
+What closed forms leave out is in it: saturation, starts far off, arming, limits of host and drives.
+It is the run itself, with the run's own controllers, drives and bodies, but nothing is recorded, so
+short scenarios are rehearsed to their end.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bridge.network.messages import Progress
+from bridge.process import Stop
+from configs.brief import NetworkLink
+from configs.errors import FleetloopError
+from configs.resolve import agent_brief, leader_brief, plant_brief, schedule
+from configs.scenario import Scenario
+from configs.signals import AGENT_SIGNALS
+from fleetloop.check.finding import Finding
+from fleetloop.launch.in_process import InProcessRun
+from fleetloop.record.writer import Source
+
+WORK_S = 1.5
+"""Processor time that is meant to be enough, on an ordinary machine."""
+_TICK_S, _SUBSTEP_S, _WIRE_S = 40e-6, 20e-6, 250e-6
+"""Of a robot: a tick, a step of its motors and encoders, a tick on a bus with bit timing."""
+FINAL_S = 4.0
+SETTLED_M, LOST_M = 0.05, 0.5
+"""Errors at the end that are said, and that are an error."""
+_TITLE = "rehearsal"
+_ROW = np.dtype([(signal.name, "<f8") for signal in AGENT_SIGNALS])
+
+
+@dataclass(slots=True)
+class _Notebook:
+    """Keeps the controllers' rows."""
+
+    blocks: dict[str, list[bytes]] = field(default_factory=dict)
+
+    def add(self, robot: str, source: Source, first_tick: int, rows: bytes) -> None:  # noqa: ARG002
+        if source == "controller":
+            self.blocks.setdefault(robot, []).append(rows)
+
+    def end(self, robot: str, source: Source) -> None:
+        pass
+
+    def traffic(self, bus: str, frames: bytes) -> None:
+        pass
+
+    def rows(self, robot: str) -> np.ndarray:
+        return np.frombuffer(b"".join(self.blocks.get(robot, [])), _ROW)
+
+
+def rehearse(scenario: Scenario) -> list[Finding]:
+    """Run the beginning of a scenario; what came of it."""
+    if scenario.host.dry_run:
+        return [Finding("ok", _TITLE, "none: host.dry_run")]
+    until_s = _affordable_s(scenario)
+    part = _part(scenario, until_s)
+    notebook = _Notebook()
+    network = NetworkLink("in-process", "", "", "")
+    stop = Stop()
+
+    def watch(_: Progress) -> None:
+        if len(run.stopped_robots) == len(part.robot):
+            stop.request("all robots have stopped")
+
+    try:
+        run = InProcessRun(
+            plant_brief(part, network=network),
+            [agent_brief(part, name, network=network, bus=()) for name in part.names],
+            leader_brief(part),
+            notebook,
+            watch,
+        )
+        run.run(stop)
+    except FleetloopError as error:
+        return [Finding("error", _TITLE, f"the run would end: {error}")]
+    whole = until_s >= scenario.ends_at_s - 1e-9
+    said = f"all {until_s:g} s" if whole else f"first {until_s:.3g} s"
+    found = [
+        Finding("error", _TITLE, f"{said}: stops itself at {reason}", (robot,))
+        for robot, reason in run.stopped_robots.items()
+    ]
+    if not found:
+        found = _errors(scenario, notebook, said, whole=whole)
+    return found or [Finding("ok", _TITLE, f"{said}: no robot stops")]
+
+
+def _affordable_s(scenario: Scenario) -> float:
+    """How much scenario time `WORK_S` is enough for, whole ticks."""
+    h, substeps = scenario.clock.control_period_s, 1
+    tick_s = _TICK_S
+    if scenario.drive.preset == "realistic":
+        substeps = max(1, round(h / scenario.clock.plant_step_s))
+        tick_s += substeps * _SUBSTEP_S
+    if scenario.bus.timing == "wire":
+        tick_s += _WIRE_S
+    ticks = max(int(WORK_S / tick_s / len(scenario.robot)), 1)
+    return min(ticks * h, scenario.ends_at_s)
+
+
+def _part(scenario: Scenario, until_s: float) -> Scenario:
+    clock = scenario.clock.model_copy(update={"mode": "lockstep"})
+    bus = scenario.bus.model_copy(update={"record": ()})
+    return scenario.model_copy(update={"clock": clock, "bus": bus, "until_s": until_s})
+
+
+def _errors(scenario: Scenario, notebook: _Notebook, said: str, *, whole: bool) -> list[Finding]:
+    """Robots that are off their paths, or apart, at the end of what was rehearsed."""
+    rows = {robot.name: notebook.rows(robot.name) for robot in scenario.robot}
+    period_s = schedule(scenario).period_s
+    found = []
+    last = {robot: part[_final(part, period_s) :] for robot, part in rows.items() if len(part)}
+    for robot, part in last.items():
+        error, before = _off(part), _off(rows[robot][:1])
+        settled = error <= SETTLED_M if whole else error <= max(before, LOST_M)
+        if settled:
+            continue
+        text = f"{said}: {error:.2g} m off its path at the end, {before:.2g} m at the start"
+        found.append(
+            Finding("error" if whole and error > LOST_M else "warning", _TITLE, text, (robot,))
+        )
+    if whole and (apart := _apart(last)) > SETTLED_M:
+        text = f"{said}: path variables {apart:.2g} m apart at the end"
+        found.append(Finding("warning", _TITLE, text))
+    return found
+
+
+def _final(rows: np.ndarray, period_s: float) -> int:
+    return max(len(rows) - round(min(FINAL_S / period_s, 0.25 * len(rows))) - 1, 0)
+
+
+def _off(rows: np.ndarray) -> float:
+    """Largest |x_e| or |y_e| [m]; infinite if it isn't a number."""
+    values = np.abs(np.stack([rows["x_e_m"], rows["y_e_m"]]))
+    return float(values.max()) if np.isfinite(values).all() else np.inf
+
+
+def _apart(last: Mapping[str, np.ndarray]) -> float:
+    count = min(len(part) for part in last.values())
+    s = np.stack([part["s"][-count:] for part in last.values()])
+    return float((s.max(axis=0) - s.min(axis=0)).max())

@@ -1,0 +1,228 @@
+"""Whether gains suit the rate: the speed loop and the whole channel of every robot.
+
+A torque comes late by the time of its frames on the wire, the firmware's latency, the motor's
+current loop and the drive's velocity estimator. With a known delay, half of the speed loop's limit
+is a good gain: k_4 = 0.25 min(m̄)/h where torques come one period late.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+
+from bridge.frame import Frame
+from bridge.wire.bits import frame_bits
+from configs.brief import Gains, Wheels
+from configs.resolve import schedule
+from configs.scenario import Scenario
+from configs.sections import Robot
+from fleetloop.check.body import inertias, robot_body
+from fleetloop.check.course import Course
+from fleetloop.check.finding import Finding, Level
+from fleetloop.check.loop import (
+    Loop,
+    bisect,
+    channel_radius,
+    delay_margin_s,
+    largest_gain,
+    pole_time_s,
+    speed_loop_radius,
+    true_theta,
+)
+from fleetloop.check.torque import limits
+
+HELD_M = 0.05
+"""A reference that moves on by more than this while a pose is held is said."""
+HELD_PERIODS = 20
+"""Of a pose held for longer the hold is to blame: neither margin nor gains are looked for."""
+_POSES = "clock.localisation_period_s"
+_FRAMES = 4
+"""On a wire before both torques are there: two encoder frames, two torques."""
+_CYCLES = 3.0
+"""Errors that take longer than a third of the run to decay are said."""
+
+
+def sampling_findings(scenario: Scenario, courses: list[Course]) -> Iterator[Finding]:
+    """Speed loop, channel and held poses of every robot; alike robots are computed once."""
+    known: dict[tuple[object, ...], list[Finding]] = {}
+    for course in courses:
+        robot = course.robot
+        loop = loop_of(scenario, robot)
+        arcs = _arcs(course)
+        alike = (
+            loop.law,
+            loop.gains,
+            loop.wheels,
+            scenario.body_of(robot),
+            loop.torque_delay_s,
+            bool(limits(scenario, robot)),
+            tuple(np.round(arcs, 2).ravel().tolist()),
+        )
+        if alike not in known:
+            known[alike] = [
+                _speed_loop(
+                    loop,
+                    min(inertias(scenario.body_of(robot))),
+                    bounded=bool(limits(scenario, robot)),
+                ),
+                *_channel(scenario, loop, arcs),
+            ]
+        yield from (replace(finding, robots=(robot.name,)) for finding in known[alike])
+        yield from _held_pose(scenario, course)
+
+
+def loop_of(scenario: Scenario, robot: Robot) -> Loop:
+    """The loops of one robot; Θ̂ as it starts."""
+    control, body = scenario.control_of(robot), scenario.body_of(robot)
+    ticks = schedule(scenario)
+    external = scenario.localisation.source == "external"
+    # Limits aside: the channel is what happens close to the path.
+    gains = Gains(**control.model_dump(exclude={"law"}) | {"torque_limit_N_m": inf})
+    return Loop(
+        control.law,
+        gains,
+        Wheels(body.wheel_radius_m, body.half_track_m),
+        robot_body(body),
+        ticks.period_s,
+        torque_delay_s(scenario),
+        ticks.localise_every if external else 1,
+        ticks.pose_delay_ticks if external else 0,
+        gains.theta_hat_0,
+    )
+
+
+def torque_delay_s(scenario: Scenario) -> float:
+    """From a tick to its torque at the wheel, about, and what else lags in the speed loop."""
+    drive, motor, encoder = scenario.drive, scenario.motor, scenario.encoder
+    delay_s = 0.0
+    if scenario.bus.timing == "wire":
+        delay_s += _FRAMES * frame_bits(Frame(0x29, bytes(range(8)))) / scenario.bus.bitrate_bit_s
+    if drive.preset == "realistic":
+        if scenario.bus.timing == "wire":
+            delay_s += 0.5 * sum(drive.command_latency_s)
+        delay_s += motor.compute_delay_s + motor.current_loop_s
+        delay_s += 2.0 / encoder.pll_bandwidth_rad_s
+    return delay_s
+
+
+def _arcs(course: Course) -> list[tuple[float, float, float]]:
+    """(v̄_d, ω̄_d, ṡ) of the straightest and of the most curved place, at the final speed."""
+    turn = np.abs(course.omega_bar)
+    places = dict.fromkeys((int(turn.argmin()), int(turn.argmax())))
+    s_dot = float(course.v[-1] / course.v_bar[-1]) if course.v_bar[-1] > 0 else 0.0
+    return [(float(course.v_bar[n]), float(course.omega_bar[n]), s_dot) for n in places]
+
+
+def _speed_loop(loop: Loop, inertia: float, *, bounded: bool) -> Finding:
+    """k_4 against rate and delay; `bounded` torques swing, others grow without end."""
+    h = loop.period_s
+    gain, delay = loop.gains.k4 * h / inertia, loop.torque_delay_s / h
+    most = bisect(lambda k: speed_loop_radius(k, delay) < 1.0, 0.0, 4.0, 24)
+    title = "sampled speed loop k4 h / min(m̄)"
+    late = f" with torques {1e3 * loop.torque_delay_s:.2g} ms late" if delay else ""
+    said = f"{gain:.3g}, stable below {most:.3g}{late}"
+    suits = 0.25 * min(most, 1.0) * inertia / h
+    remedy = f"control.k4 = {suits:.3g} suits this rate"
+    if all(speed_loop_radius(gain, part * delay) >= 1.0 for part in (0.5, 1.0, 1.5)):
+        level: Level = "warning" if bounded else "error"
+        swings = "diverges" if level == "error" else "torques swing between their limits"
+        return Finding(level, title, f"{said}: {swings}; {remedy}", key="control.k4")
+    if gain > 0.5 * most:
+        return Finding(
+            "warning", title, f"{said}, good below half of it; {remedy}", key="control.k4"
+        )
+    return Finding("ok", title, said)
+
+
+def _channel(
+    scenario: Scenario, loop: Loop, arcs: list[tuple[float, float, float]]
+) -> Iterator[Finding]:
+    """k_1, k_2, k_3 against the filters, the speed loop and the period."""
+    if min(s_dot for _, _, s_dot in arcs) <= 0.0:
+        return
+    title = "channel radius of x_e, y_e, θ_e, filters and speeds"
+    at_start = [channel_radius(loop, *arc) for arc in arcs]
+    worst = int(np.argmax(at_start))
+    radius, arc = at_start[worst], arcs[worst]
+    learnt = replace(loop, theta=_learnt(scenario, loop))
+    later = max(channel_radius(learnt, *arc) for arc in arcs)
+    if radius < 1.0 and later >= 1.0:
+        radius, loop = later, learnt
+    if radius >= 1.0 + 1e-9:
+        if loop.pose_every > HELD_PERIODS:
+            yield Finding("warning", title, _unstable(loop, radius, {}), key=_POSES)
+            return
+        remedies = _remedies(loop, arc)
+        text = _unstable(loop, radius, remedies)
+        yield Finding("warning", title, text, key=f"control.{next(iter(remedies), 'k1')}")
+        return
+    slowest_s = pole_time_s(radius, loop.period_s)
+    said = f"{radius:.6g} per period, slowest error decays in {slowest_s:.3g} s"
+    margin_s = inf
+    if loop.pose_every <= HELD_PERIODS:
+        margin_s = delay_margin_s(loop, *arc)
+        said += f"; stands torques later by {1e3 * margin_s:.3g} ms"
+    if _CYCLES * slowest_s > scenario.duration_s:
+        text = f"{said}: too slow for {scenario.duration_s:g} s; raise the lowest of k1, k2 v_r, k3"
+        yield Finding("warning", title, text, key="control.k2")
+    elif margin_s < loop.period_s:
+        yield Finding("warning", title, f"{said}: less than a period", key="control.k4")
+    else:
+        yield Finding("ok", title, said)
+
+
+def _learnt(scenario: Scenario, loop: Loop) -> tuple[float, ...]:
+    for robot in scenario.robot:
+        body = scenario.body_of(robot)
+        if robot_body(body).mbar_1 == loop.body.mbar_1:
+            return true_theta(loop.body, (body.damping_right_N_m_s, body.damping_left_N_m_s))
+    return loop.theta
+
+
+def _remedies(loop: Loop, arc: tuple[float, float, float]) -> dict[str, float]:
+    """Gains of which lowering one alone is enough, and how far."""
+    found = {name: largest_gain(loop, name, *arc) for name in ("k1", "k3", "k2", "k4")}
+    return {
+        name: value
+        for name, value in found.items()
+        if 0.1 * getattr(loop.gains, name) < value < getattr(loop.gains, name)
+    }
+
+
+def _unstable(loop: Loop, radius: float, remedies: dict[str, float]) -> str:
+    gains = loop.gains
+    lags = f"filters of {gains.gamma_1_s:g}, {gains.gamma_2_s:g}, {gains.gamma_3_s:g} s"
+    if loop.pose_every > 1:
+        lags += f", poses held {loop.pose_every * loop.period_s:g} s"
+    each = [
+        f"{name} = {0.5 * value:.3g} (it is {getattr(gains, name):g})"
+        for name, value in remedies.items()
+    ]
+    what = f"control.{' or '.join(each)} suits" if each else "lower the gains together"
+    if loop.pose_every > HELD_PERIODS:
+        what = 'localisation.source = "fused", or more fixes'
+    return (
+        f"{radius:.4g} per period of {loop.period_s:g} s with {lags}: not below 1, the errors swing"
+        f" and don't vanish; {what}, or a higher rate with shorter filters"
+    )
+
+
+def _held_pose(scenario: Scenario, course: Course) -> Iterator[Finding]:
+    """How far the reference moves on while a pose is held."""
+    if scenario.localisation.source != "external":
+        return
+    clock = scenario.clock
+    delay_s = scenario.localisation.delay_s
+    late_s = clock.control_period_s if delay_s is None else delay_s
+    speed = float(np.abs(course.v).max())
+    held_s = clock.localisation_period_s
+    moved = speed * (held_s + late_s)
+    title = "poses held between fixes"
+    said = f"held {held_s:g} s, {late_s:g} s late, at {speed:.3g} m/s: the reference moves on"
+    said += f" {moved:.2g} m"
+    if moved > HELD_M:
+        text = f'{said}; localisation.source = "fused" carries poses on by odometry, or more fixes'
+        yield Finding("warning", title, text, (course.robot.name,), _POSES)
+    else:
+        yield Finding("ok", title, said, (course.robot.name,))

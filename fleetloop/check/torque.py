@@ -1,0 +1,276 @@
+"""What a robot's wheels have to give along its course, against what drives and limits let through.
+
+    B̄ τ = M̄ ξ' + C̄ ξ + D̄ ξ + Δ̄                                       inverse of (4), ξ = (v, ω)  (1)
+    + friction at the wheel: gear × Coulomb + gear² × viscous × ν      realistic motors          (2)
+
+On a steady curve (1) is d (v̄_d + b |ω̄_d|) v_r / r at the outer wheel. Let through is the least of
+
+    the law's limit (robust)      control.torque_limit_N_m
+    the host's                    host.torque_limit_N_m
+    gear × k_t × i_max            drive.torque_constant_N_m_A, current_limit_A, and [motor]'s
+    gear × k_v (v_max − gear ν)   drive.velocity_limit_rev_s: torque mode's limiter              (3)
+    gear × k_t × (U − k_t ω_s)/R  supply.voltage_V at the shaft's speed ω_s                      (4)
+
+Where need exceeds it, only a part f < 1 of the speed is kept up; the robot falls behind by
+∫ (1 − f) v dt, and catches up at most as fast as k_1 wants or as it has speed to spare.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import inf, log1p, pi, sqrt
+
+import numpy as np
+
+from configs.scenario import Scenario
+from configs.sections import Body, Robot
+from fleetloop.check.body import inertias
+from fleetloop.check.course import Course, Series
+from fleetloop.check.finding import Finding, Level
+
+START_S = 0.5
+"""Accelerations from rest aren't looked at: how fast a robot gets going is its law's business."""
+BEHIND_M = 0.3
+"""Falling behind by more than this is an error if it lasts to the end, else a warning."""
+MARGIN = 2.0
+_MODULATION = sqrt(3.0) / 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """One thing that bounds a wheel's torque: level at standstill, less so much per wheel speed."""
+
+    key: str
+    words: str
+    torque_N_m: float
+    slope_N_m_s: float = 0.0
+    speed_m_s: float = inf
+    """Robot's speed straight on at which nothing is left."""
+
+
+@dataclass(frozen=True, slots=True)
+class Need:
+    """Both wheels of one robot along its course; columns right, left; all at the wheel."""
+
+    torque_N_m: Series  # all of (1) and (2), disturbance at its largest
+    motion_N_m: Series  # the part that goes with the speed
+    rest_N_m: Series  # friction and disturbance
+    nu_rad_s: Series
+
+
+def torque_findings(scenario: Scenario, courses: list[Course]) -> Iterator[Finding]:
+    """Steady torque of every robot, and heat where motors have any."""
+    for course in courses:
+        need = needed(scenario, course)
+        yield _torque(scenario, course, need, limits(scenario, course.robot))
+        yield from _heat(scenario, course, need)
+        yield from _slew(scenario, course, need)
+
+
+def needed(scenario: Scenario, course: Course) -> Need:
+    """(1) and (2) along a course."""
+    body = scenario.body_of(course.robot)
+    r, b = body.wheel_radius_m, body.half_track_m
+    v, omega = course.v, course.omega
+    right, left = body.damping_right_N_m_s, body.damping_left_N_m_s
+    nu = np.column_stack([v + b * omega, v - b * omega]) / r
+    motion = nu * np.array([right, left])
+    rest = np.zeros_like(nu)
+    if scenario.drive.preset == "realistic":
+        gear, motor = scenario.mounting_of(course.robot).gear_ratio, scenario.motor
+        motion = motion + gear**2 * motor.viscous_friction_N_m_s * nu
+        rest = gear * motor.coulomb_friction_N_m * np.sign(nu)
+    push = (course.robot.disturbance or scenario.disturbance).amplitude_N_m
+    inertial = _inertial(body, course)
+    return Need(np.abs(motion + rest + inertial) + push, motion, rest, nu)
+
+
+def limits(scenario: Scenario, robot: Robot) -> list[Limit]:
+    """All that bounds a wheel's torque."""
+    control, host, drive = scenario.control_of(robot), scenario.host, scenario.drive
+    found = []
+    if control.law == "adaptive_dsc_robust":
+        found.append(Limit("control.torque_limit_N_m", "the law's limit", control.torque_limit_N_m))
+    if host.torque_limit_N_m is not None:
+        found.append(Limit("host.torque_limit_N_m", "the host's limit", host.torque_limit_N_m))
+    if drive.preset != "ideal":
+        found += _drive_limits(scenario, robot)
+    return found
+
+
+def _drive_limits(scenario: Scenario, robot: Robot) -> list[Limit]:
+    drive, motor = scenario.drive, scenario.motor
+    gear = scenario.mounting_of(robot).gear_ratio
+    radius_m = scenario.body_of(robot).wheel_radius_m
+    constant, current = drive.torque_constant_N_m_A, drive.current_limit_A
+    key, limit_A = "drive.current_limit_A", current
+    if drive.preset == "realistic":
+        constant = motor.torque_constant_N_m_A or constant
+        if motor.current_limit_A is not None and motor.current_limit_A < current:
+            key, limit_A = "motor.current_limit_A", motor.current_limit_A
+    words = f"gear {gear:g} × {constant:g} N·m/A × {limit_A:g} A"
+    per_rad = 1.0 / (2.0 * pi)
+    gain, fastest = drive.velocity_gain_N_m_s_rev, drive.velocity_limit_rev_s
+    found = [
+        Limit(key, words, gear * constant * limit_A),
+        Limit(
+            "drive.velocity_limit_rev_s",
+            f"what the drive's velocity limit of {fastest:g} rev/s leaves",
+            gear * gain * fastest,
+            gear**2 * gain * per_rad,
+            fastest * 2.0 * pi / gear * radius_m,
+        ),
+    ]
+    if drive.preset == "realistic":
+        resistance = motor.winding_resistance_ohm + motor.fet_resistance_ohm
+        most = _MODULATION * scenario.supply.voltage_V
+        found.append(
+            Limit(
+                "supply.voltage_V",
+                f"what {scenario.supply.voltage_V:g} V leave beside the motor's own voltage",
+                gear * constant * most / resistance,
+                gear**2 * constant**2 / resistance,
+                most / constant / gear * radius_m,
+            )
+        )
+    return found
+
+
+def _inertial(body: Body, course: Course) -> Series:
+    """M̄ ξ' + C̄ ξ of (4) at both wheels."""
+    r, b, m_1, m_2 = body.wheel_radius_m, body.half_track_m, *inertias(body)
+    if len(course.t_s) < 3:
+        return np.zeros((len(course.t_s), 2))
+    c = r * r * body.body_mass_kg * body.com_offset_m / (2.0 * b)
+    v, omega = course.v, course.omega
+    rate_v, rate_omega = (np.gradient(x, course.t_s) for x in (v, omega))
+    rate_v[course.t_s < START_S] = rate_omega[course.t_s < START_S] = 0.0
+    along = m_1 * rate_v - c * b * omega**2
+    turning = m_2 * rate_omega + c / b * v * omega
+    return np.column_stack([along + b * turning, along - b * turning]) / r
+
+
+def _torque(scenario: Scenario, course: Course, need: Need, bounds: list[Limit]) -> Finding:
+    robot = course.robot
+    title = "wheel torque along the path"
+    most = np.abs(need.torque_N_m)
+    place = np.unravel_index(int(most.argmax()), most.shape)
+    peak, speed = float(most[place]), float(course.v[place[0]])
+    said = f"up to {peak:.3g} N·m at {speed:.3g} m/s"
+    if not bounds:
+        return Finding("ok", title, f"{said}; nothing limits it", (robot.name,))
+    left = np.array([b.torque_N_m - b.slope_N_m_s * np.abs(need.nu_rad_s) for b in bounds])
+    ratios = left / np.maximum(most, 1e-12)
+    tightest = np.unravel_index(int(ratios.argmin()), ratios.shape)
+    limit, (_, instant, wheel) = bounds[tightest[0]], tightest
+    asked, given = float(most[instant, wheel]), max(float(left[tightest]), 0.0)
+    asked_m_s = float(course.v[instant])
+    said = f"needs {asked:.3g} N·m at {asked_m_s:.3g} m/s"
+    behind = _behind(scenario, course, need, bounds)
+    level: Level = "ok"
+    words = f"{said} of {given:.3g} N·m, {limit.words}"
+    if ratios[tightest] < MARGIN:
+        level, words = "warning", f"{words}; keep twice the need: change {limit.key}"
+    if ratios[tightest] < 1.0:
+        words = f"{said}, gets {given:.3g} N·m, {limit.words}: change {limit.key}, or go slower"
+        if limit.speed_m_s < asked_m_s:
+            words += f" (it allows {limit.speed_m_s:.3g} m/s of {asked_m_s:.3g})"
+        if behind[-1] > BEHIND_M:
+            level = "error"
+            words += f"; falls {float(behind[-1]):.2g} m behind"
+    return Finding(level, title, words, (robot.name,), limit.key if level != "ok" else "")
+
+
+def _behind(scenario: Scenario, course: Course, need: Need, bounds: list[Limit]) -> Series:
+    """How far the robot is behind at each instant [m]."""
+    motion, rest, nu = (np.abs(x) for x in (need.motion_N_m, need.rest_N_m, need.nu_rad_s))
+    parts = [
+        ((b.torque_N_m - rest) / np.maximum(motion + b.slope_N_m_s * nu, 1e-12)).min(axis=1)
+        for b in bounds
+    ]
+    part = np.clip(np.min(parts, axis=0), 0.0, 10.0)
+    k1 = scenario.control_of(course.robot).k1
+    steps = np.diff(course.t_s, append=2 * course.t_s[-1] - course.t_s[-2] if len(part) > 1 else 0)
+    lag, lags = 0.0, []
+    for f, v, dt in zip(part.tolist(), np.abs(course.v).tolist(), steps.tolist(), strict=True):
+        gained = (1.0 - f) * v if f < 1.0 else -min(k1 * lag, (f - 1.0) * v)
+        lag = max(lag + gained * dt, 0.0)
+        lags.append(lag)
+    return np.array(lags)
+
+
+def _heat(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:
+    """When windings or FETs, R i² R_th above ambient, are where drives begin to derate.
+
+    Derating then holds them where (5) meets the heat that is left of the current.
+
+        i = i_max (T_to − T) / (T_to − T_from),  T = T_ambient + R R_th i²              (5)
+    """
+    drive, motor = scenario.drive, scenario.motor
+    if drive.preset != "realistic":
+        return
+    gear = scenario.mounting_of(course.robot).gear_ratio
+    constant = motor.torque_constant_N_m_A or drive.torque_constant_N_m_A
+    # What limits don't let through makes no heat.
+    most_A = min(limit.torque_N_m for limit in limits(scenario, course.robot)) / gear / constant
+    amps = np.minimum(np.abs(need.torque_N_m) / gear / constant, most_A)
+    square = float((amps**2).mean(axis=0).max())
+    allowed_K = drive.derate_from_C - motor.ambient_C
+    parts = [
+        (*_warm_up_s(per_A2 * square, allowed_K, time_s), per_A2, part)
+        for part, per_A2, time_s in (
+            (
+                "windings",
+                motor.motor_thermal_resistance_K_W * motor.winding_resistance_ohm,
+                motor.motor_thermal_time_s,
+            ),
+            (
+                "FETs",
+                motor.fet_thermal_resistance_K_W * motor.fet_resistance_ohm,
+                motor.fet_thermal_time_s,
+            ),
+        )
+    ]
+    after_s, rise_K, per_A2, part = min(parts)
+    if after_s == inf:
+        return
+    span_K = drive.derate_to_C - drive.derate_from_C
+    slope = span_K / drive.current_limit_A
+    above_K = drive.derate_to_C - motor.ambient_C
+    left_A = (sqrt(slope**2 + 4.0 * per_A2 * max(above_K, 0.0)) - slope) / (2.0 * per_A2)
+    text = (
+        f"{sqrt(square):.3g} A rms take the {part} to {drive.derate_from_C:g} °C, where derating"
+        f" begins, after {after_s:.2g} s, and would to {motor.ambient_C + rise_K:.0f} °C; it leaves"
+        f" {gear * constant * left_A:.3g} N·m in the long run"
+    )
+    title, robots = "motor temperature", (course.robot.name,)
+    if after_s > scenario.ends_at_s:
+        yield Finding("ok", title, f"{text}, not in these {scenario.ends_at_s:g} s", robots)
+    else:
+        remedy = "a larger mounting.gear_ratio or cooler motors, or a shorter run"
+        yield Finding("warning", title, f"{text}: {remedy}", robots, "mounting.gear_ratio")
+
+
+def _warm_up_s(rise_K: float, allowed_K: float, time_s: float) -> tuple[float, float]:
+    """(time to `allowed_K` on the way to `rise_K`, infinite if never; `rise_K`)."""
+    if rise_K <= allowed_K:
+        return inf, rise_K
+    return -time_s * log1p(-max(allowed_K, 0.0) / rise_K), rise_K
+
+
+def _slew(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:
+    """The host's slew limit against the time in which the law wants to reach the steady torque."""
+    slew = scenario.host.torque_slew_limit_N_m_s
+    if slew is None:
+        return
+    control, body = scenario.control_of(course.robot), scenario.body_of(course.robot)
+    lag_s = min(inertias(body)) / control.k4
+    takes_s = float(np.abs(need.torque_N_m).max()) / slew
+    if takes_s > lag_s:
+        yield Finding(
+            "warning",
+            "host.torque_slew_limit_N_m_s",
+            f"{slew:g} N·m/s take {takes_s:.2g} s to the needed torque; the speed loop's time"
+            f" constant m̄/k4 is {lag_s:.2g} s: the limit is felt as lag, and may swing",
+            (course.robot.name,),
+            "host.torque_slew_limit_N_m_s",
+        )

@@ -1,0 +1,1 @@
+"""Runs from start to end: roles as processes, or all in one."""

@@ -1,0 +1,142 @@
+"""Scenario and deployment → what each role is told of its place: buses, network, credentials."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from bridge.network import access
+from configs.brief import NetworkLink, Outside, PlantBrief, Settings, TlsFiles
+from configs.deployment import Deployment, NetworkSection, passwords, tls_files
+from configs.errors import ScenarioError
+from configs.scenario import Scenario
+
+
+def robots_of_plant(brief: PlantBrief, deployment: Deployment) -> PlantBrief:
+    """The plant's brief with the robots that it emulates, and the others as it sees them."""
+    emulated = tuple(r for r in brief.robots if deployment.emulates(r.robot))
+    attached = tuple(
+        (r.bus, deployment.plant_bus_of(r.robot))
+        for r in emulated
+        if not deployment.is_ours(r.robot)
+    )
+    witnessed = tuple((r.robot, r.pose) for r in brief.robots if r not in emulated)
+    return replace(brief, robots=emulated, attached=attached, witnessed=witnessed)
+
+
+def agent_bus(
+    deployment: Deployment, robot: str, *, secret: str = "", socket: str = ""
+) -> Settings:
+    """Keyword arguments of `can.Bus` for a controller.
+
+    Args:
+        deployment: where the robot's bus is.
+        robot: whose controller.
+        secret: by which its bus knows whom to wait for; "" in real time, where it waits for nobody.
+        socket: where its bus of ours is.
+    """
+    settings = deployment.bus_of(robot)
+    if not deployment.is_ours(robot):
+        return settings
+    pace: dict[str, str | bool] = {"paced": robot, "secret": secret} if secret else {}
+    ours = dict(settings) | (pace or {"gathered": True})
+    if socket:
+        ours["channel"] = socket
+    return tuple(sorted(ours.items()))
+
+
+def run_name(scenario: Scenario, deployment: Deployment) -> str | None:
+    """The run's name in every key if machines had to agree on one."""
+    network = deployment.network
+    return None if network is None else network.run or scenario.name
+
+
+def check_credentials(scenario: Scenario, deployment: Deployment) -> None:
+    """Refuse a run whose router could not know who comes, before anything is started.
+
+    Raises:
+        ScenarioError: a password or a file of TLS is missing or wrong; the text names key and file.
+    """
+    guests(scenario, deployment)
+    if deployment.network is not None:
+        _tls(deployment.network, None)
+
+
+def _tls(network: NetworkSection, identity: str | None) -> TlsFiles | None:
+    files = tls_files(network)
+    if files is not None:
+        from bridge.network.tls import check_tls
+
+        check_tls(files, identity, "network.tls.")
+    return files
+
+
+def outside(deployment: Deployment) -> Outside | None:
+    """Where the router listens for those on other machines."""
+    network = deployment.network
+    if network is None:
+        return None
+    return Outside(network.listen or network.endpoint, tls_files(network))
+
+
+def bus_guests(deployment: Deployment) -> Mapping[str, tuple[str, ...]]:
+    """Who may open which buses from other machines."""
+    return {} if deployment.network is None else deployment.network.guests
+
+
+def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
+    """Passwords of those who come from elsewhere, by identity.
+
+    Raises:
+        ScenarioError: the deployment's credentials lack one of them.
+    """
+    identities = [access.user_of(role) for role in deployment.elsewhere(scenario)]
+    if any(not deployment.emulates(robot) for robot in scenario.names):
+        identities.append(access.LOCALISATION)
+    known = passwords(deployment.network, (*identities, *bus_guests(deployment)))
+    return known | {user: _as_option(known[user]) for user in bus_guests(deployment)}
+
+
+def _as_option(password: str) -> str:
+    # Imports python-can, which a run without guests does without.
+    from bridge.can_bus.credentials import as_option
+
+    return as_option(password)
+
+
+def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.AccessPlan:
+    """Who may say and hear what, and everybody's credentials.
+
+    Raises:
+        ScenarioError: the deployment's credentials lack somebody.
+    """
+    graph, network, clock = scenario.topology, deployment.network, scenario.clock
+    realtime = clock.mode == "realtime"
+    return access.plan(
+        run,
+        scenario.names,
+        graph.hears,
+        graph.leader,
+        buses=scenario.buses,
+        witnessed=[robot for robot in scenario.names if not deployment.emulates(robot)],
+        guests=guests(scenario, deployment),
+        bus_guests=tuple(bus_guests(deployment)),
+        certified=network is not None and network.tls is not None,
+        share_period_s=clock.share_period_s if realtime else None,
+        localisation_period_s=clock.localisation_period_s if realtime else None,
+    )
+
+
+def network_link(scenario: Scenario, deployment: Deployment, role: str) -> NetworkLink:
+    """How a role that is started by itself reaches the router.
+
+    Raises:
+        ScenarioError: the deployment has no network, or no credentials for the role.
+    """
+    network = deployment.network
+    if network is None:
+        raise ScenarioError(
+            f"{role} on its own needs a deployment with [network] endpoint: where its router is"
+        )
+    user = access.user_of(role)
+    (password,) = passwords(network, (user,)).values()
+    run = network.run or scenario.name
+    return NetworkLink(run, network.endpoint, user, password, _tls(network, user))

@@ -1,0 +1,241 @@
+"""`fleetloop plant`: emulated drives and physics alone, in real time, for anybody's host code.
+
+No controllers, no network, no countdown: the bodies are free from the start, and whoever opens a
+bus may arm its drives and drive. It ends with a signal, after `--duration`, or with its standard
+input if that is served: then each line asks, and is answered by a line of JSON.
+
+    poses      bus time, and of each robot pose, speeds and the torques that act on its wheels
+
+With `--join` it is the plant of a run whose deployment has the role elsewhere, for example on the
+machine with the CAN adapters.
+"""
+
+import json
+import os
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from bridge.can_bus import sockets
+from bridge.can_bus.drive_port import DriveEnd
+from bridge.can_bus.hub import Hub
+from bridge.network.messages import Progress
+from bridge.process import Stop, go_realtime, keep_to_itself, name_process, settled_memory
+from bridge.telemetry import PLANT_ROW, RowBuffer
+from configs.brief import NetworkLink, PlantBrief, Settings
+from configs.deployment import PLANT, Deployment, load_deployment
+from configs.errors import ScenarioError
+from configs.loading import load
+from configs.overrides import Override, Overrides
+from configs.resolve import plant_brief
+from configs.scenario import Scenario
+from configs.signals import PLANT_SIGNALS
+from fleetloop.launch import open_files, placement
+from fleetloop.launch.signals import stop_on_signals
+from fleetloop.terminal import note, say
+from plant.__main__ import PLANT_PRIORITY, join
+from plant.__main__ import run as plant_of_a_run
+from plant.realtime import RealtimeLoop
+from plant.robot import Unit, diverged_robots, unit_of
+
+FOREVER_TICKS = 1 << 53
+GO_AHEAD_NS = 1_000_000
+INTERRUPTED = 130
+_WALL_CLOCK = Override("a plant on its own", "clock.mode", "realtime")
+_ROW_NAMES = [signal.name for signal in PLANT_SIGNALS]
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What the command line says."""
+
+    robots: tuple[str, ...] = ()
+    duration_s: float | None = None
+    deployment: Path | None = None
+    overrides: Overrides = ()
+    as_json: bool = False
+    serve_stdin: bool = False
+    join: bool = False
+
+
+class _Nowhere:
+    """Poses have no listener here."""
+
+    def put(self, payload: object) -> None:
+        """Forget it."""
+
+
+class _Watch:
+    """Says which robot's motion diverged, as soon as it is seen."""
+
+    def __init__(self, units: Sequence[Unit], period_ns: int) -> None:
+        self._units = units
+        self._period_ns = period_ns
+        self._told: set[str] = set()
+
+    def look(self, _: Progress | None = None) -> None:
+        """Say what is new."""
+        for robot, why in diverged_robots(self._units, self._period_ns).items():
+            if robot not in self._told:
+                self._told.add(robot)
+                note(f"STOPPED {robot}: {why}; its drives are disarmed for good")
+
+
+def run_plant(source: str, options: Options) -> int:
+    """Emulate drives and bodies until told to stop; return the exit status.
+
+    Raises:
+        ScenarioError: scenario, robot or deployment is wrong; nothing was opened.
+        InfrastructureError: a bus can't be opened.
+    """
+    scenario = load(source, (*options.overrides, _WALL_CLOCK))
+    deployment = Deployment()
+    if options.deployment is not None:
+        deployment = load_deployment(options.deployment, scenario)
+    if options.join:
+        return _join(scenario, deployment)
+    brief = plant_brief(scenario, network=NetworkLink("alone", "", "", ""))
+    brief = _alone(placement.robots_of_plant(brief, deployment), options)
+    name_process(f"plant {scenario.name}")
+    open_files.ensure(1)
+    attached = {bus for bus, _ in brief.attached}
+    ours = [bus for bus in dict.fromkeys(r.bus for r in brief.robots) if bus not in attached]
+    queue = brief.wire.txqueuelen if brief.wire else 0
+    with (
+        stop_on_signals() as stop,
+        sockets.run_folder(f"{scenario.name}-{os.getpid()}") as folder,
+    ):
+        hub = Hub(sockets.listen(folder, ours), stop.wake_fd, queue=queue)
+        end: DriveEnd = hub
+        try:
+            end = join(hub, brief.attached)
+            _run(brief, hub, end, _buses(brief, folder), options, stop)
+        finally:
+            end.close(stop.reason or "the plant has ended")
+    return 0
+
+
+def _join(scenario: Scenario, deployment: Deployment) -> int:
+    """Be the plant of a run whose launcher is elsewhere."""
+    keep_to_itself()
+    network = placement.network_link(scenario, deployment, PLANT)
+    brief = placement.robots_of_plant(plant_brief(scenario, network=network), deployment)
+    attached = {bus for bus, _ in brief.attached}
+    ours = [bus for bus in dict.fromkeys(r.bus for r in brief.robots) if bus not in attached]
+    with stop_on_signals() as stop, sockets.run_folder(f"{network.run}-plant") as folder:
+        note(f"plant: waiting for run {network.run!r} at {network.endpoint}")
+        listeners = sockets.listen(folder, ours)
+        brief = replace(
+            brief,
+            listeners=tuple((bus, listener.detach()) for bus, listener in listeners.items()),
+            detached=True,
+        )
+        name_process("plant")
+        word = plant_of_a_run(brief, stop)
+    note(f"plant: {word}{f'; {stop.reason}' if stop.reason else ''}")
+    return INTERRUPTED if stop.reason.startswith("interrupted") else 0
+
+
+def _alone(brief: PlantBrief, options: Options) -> PlantBrief:
+    """Only these robots, without countdown, for as long as it takes."""
+    emulated = tuple(robot.robot for robot in brief.robots)
+    for robot in options.robots:
+        if robot not in emulated:
+            known = ", ".join(emulated) or "none"
+            raise ScenarioError(f"--robots {robot}: not emulated here; known: {known}")
+    names = options.robots or emulated
+    ticks = FOREVER_TICKS
+    if options.duration_s is not None:
+        ticks = max(round(options.duration_s / brief.schedule.period_s), 1)
+    return replace(
+        brief,
+        robots=tuple(robot for robot in brief.robots if robot.robot in names),
+        attached=tuple(bus for bus in brief.attached if bus[0] in names),
+        schedule=replace(brief.schedule, countdown_ticks=0, ticks=ticks),
+    )
+
+
+def _buses(brief: PlantBrief, folder: Path) -> dict[str, Settings]:
+    """Keyword arguments of `can.Bus` for host code, by robot."""
+    attached = dict(brief.attached)
+    return {
+        robot.robot: attached.get(robot.bus)
+        or (("channel", str(sockets.socket_path(folder, robot.bus))), ("interface", "fleetloop"))
+        for robot in brief.robots
+    }
+
+
+def _run(
+    brief: PlantBrief,
+    hub: Hub,
+    end: DriveEnd,
+    buses: dict[str, Settings],
+    options: Options,
+    stop: Stop,
+) -> None:
+    units = [unit_of(robot) for robot in brief.robots]
+    nowhere = _Nowhere()
+    watch = _Watch(units, brief.schedule.period_ns)
+    rows = [RowBuffer(PLANT_ROW, lambda *_: None) for _ in units]
+    loop = RealtimeLoop(brief, units, end, hub, [nowhere] * len(units), rows, watch.look, {})
+    refused = go_realtime(PLANT_PRIORITY)
+    if options.serve_stdin:
+        threading.Thread(target=_serve_stdin, args=(units, loop, stop), daemon=True).start()
+    _say_ready(brief, buses, as_json=options.as_json)
+    with settled_memory():
+        loop.run(time.monotonic_ns() + GO_AHEAD_NS, stop)
+    watch.look()
+    for bus, trouble in end.troubles().items():
+        note(f"BUS {bus}: {trouble}")
+    frames = ", ".join(f"{bus} {count}" for bus, count in loop.counters.frames.items())
+    late = f"; late ticks: {loop.counters.overruns}" if loop.counters.overruns else ""
+    jitter = f" (refused to this user: {', '.join(refused)})" if late and refused else ""
+    if not options.as_json:
+        note(f"{loop.counters.wall_ns * 1e-9:.1f} s; frames: {frames}{late}{jitter}")
+
+
+def _say_ready(brief: PlantBrief, buses: dict[str, Settings], *, as_json: bool) -> None:
+    if as_json:
+        say(json.dumps({"buses": {robot: dict(bus) for robot, bus in buses.items()}}))
+        return
+    for robot in brief.robots:
+        bus = dict(buses[robot.robot])
+        channel = bus["channel"]
+        if bus["interface"] == "fleetloop":
+            channel = sockets.name_of(Path(str(channel)))
+        say(
+            f"{robot.robot}  interface={bus['interface']} channel={channel}"
+            f"  right node {robot.right_node}, left node {robot.left_node}"
+        )
+    note("drives and physics in real time; Ctrl-C ends")
+
+
+def _serve_stdin(units: Sequence[Unit], loop: RealtimeLoop, stop: Stop) -> None:
+    """Answer requests until standard input ends, and the plant with it."""
+    for line in sys.stdin:
+        match line.strip():
+            case "poses":
+                say(json.dumps(_poses(units, loop)))
+            case other:
+                say(json.dumps({"error": f"{other[:40]!r}: no such request; known: poses"}))
+    stop.request("standard input has ended")
+
+
+def _poses(units: Sequence[Unit], loop: RealtimeLoop) -> dict[str, Any]:
+    robots = {}
+    for unit in units:
+        state, row = unit.state, dict(zip(_ROW_NAMES, unit.row(0.0), strict=True))
+        robots[unit.brief.robot] = {
+            "x_m": state.x,
+            "y_m": state.y,
+            "theta_rad": state.theta,
+            "v_m_s": state.v,
+            "omega_rad_s": state.omega,
+            "torque_right_N_m": row["motor_right_N_m"],
+            "torque_left_N_m": row["motor_left_N_m"],
+        }
+    return {"t_s": loop.progress().t_ns * 1e-9, "robots": robots}

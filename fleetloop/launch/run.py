@@ -1,0 +1,239 @@
+"""`fleetloop run`: one scenario from file to results."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from bridge.network.messages import Progress
+from bridge.process import Stop, keep_to_itself
+from configs.brief import NetworkLink
+from configs.deployment import Deployment, load_deployment
+from configs.errors import InfrastructureError, ScenarioError
+from configs.loading import load, to_toml
+from configs.overrides import Overrides
+from configs.resolve import agent_brief, leader_brief, plant_brief, schedule
+from configs.scenario import Scenario
+from fleetloop.check.examine import examine
+from fleetloop.check.finding import likewise, titled, worst
+from fleetloop.launch import placement, wall_time
+from fleetloop.launch.accounts import stats_of
+from fleetloop.launch.in_process import InProcessRun
+from fleetloop.launch.process_run import ProcessRun
+from fleetloop.launch.signals import stop_on_signals
+from fleetloop.record.background import BackgroundWriter
+from fleetloop.record.reader import Record
+from fleetloop.record.run_record import RunRecord
+from fleetloop.record.scan import RecordError
+from fleetloop.results import run_folder
+from fleetloop.results.expectations import out_of_reach
+from fleetloop.results.summary import RunStats, Summary, summarise, to_json
+from fleetloop.results.tables import print_report, print_results
+from fleetloop.terminal import RunProgress, note, say_json
+
+EXIT_CODES = {"held": 0, "failed": 1, "not checked": 1, "aborted": 3, "interrupted": 130}
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What the command line says about a run."""
+
+    in_process: bool = False
+    speed: float = 0.0
+    overrides: Overrides = ()
+    out: Path | None = None
+    as_json: bool = False
+    figures: bool = True
+    profile: bool = False
+    deployment: Path | None = None
+    allow_unchecked: bool = False
+    force: bool = False
+    """Run what `fleetloop check` calls an error."""
+
+
+def run_scenario(source: str, options: Options) -> int:
+    """Run a scenario, save and print its results; return the exit status.
+
+    Raises:
+        ScenarioError: the scenario or an option is wrong; nothing was started.
+        InfrastructureError: the run could not start.
+    """
+    scenario = load(source, options.overrides)
+    if options.in_process and scenario.clock.mode == "realtime":
+        raise ScenarioError(
+            f'{source}: clock.mode = "realtime" needs processes; add --clock lockstep to run it'
+            " in one process"
+        )
+    if options.speed and scenario.clock.mode == "realtime":
+        raise ScenarioError(
+            f"--speed {options.speed:g}: real time has one speed; for lockstep only"
+        )
+    if options.in_process and options.deployment is not None:
+        raise ScenarioError(
+            f"--deployment {options.deployment}: --in-process has no buses and no network to place"
+        )
+    deployment = _deployment(scenario, options)
+    if not options.in_process:
+        keep_to_itself()
+    placement.check_credentials(scenario, deployment)
+    if long := wall_time.warning(scenario, speed=options.speed, in_process=options.in_process):
+        note(long)
+    for line in out_of_reach(scenario):
+        note(f"{scenario.name}: {line}")
+    _look_ahead(source, scenario, options)
+    started = datetime.now(UTC).astimezone()
+    created = run_folder.create(scenario.name, options.out, now=started)
+    folder = created.path
+    with (
+        stop_on_signals() as stop,
+        RunProgress(scenario.name, scenario.ends_at_s, quiet=options.as_json) as progress,
+    ):
+
+        def on_progress(state: Progress) -> None:
+            progress.show(state.t_ns * 1e-9, state.wall_ns * 1e-9)
+
+        def on_notice(process: str, text: str) -> None:
+            progress.notice(f"{process.removeprefix('agent/')}: {text}")
+
+        try:
+            run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
+            if options.in_process:
+                stats = _in_process(scenario, folder, on_progress, on_notice, stop)
+            else:
+                run = ProcessRun(
+                    scenario,
+                    run=f"{folder.name}-{time.monotonic_ns() % 1_000_000:06d}",
+                    record=folder / run_folder.RECORD,
+                    speed=options.speed,
+                    profile=options.profile,
+                    on_progress=on_progress,
+                    on_notice=on_notice,
+                    deployment=deployment,
+                )
+                stats = stats_of(
+                    run.run(stop),
+                    realtime=scenario.clock.mode == "realtime",
+                    period_s=scenario.clock.control_period_s,
+                )
+        except InfrastructureError:
+            run_folder.discard(created)
+            raise
+    if not stats.began:
+        run_folder.discard(created)
+        note(f"{stats.ended}: {stats.reason}; the run did not begin")
+        return EXIT_CODES[stats.ended]
+    stats.started = started.isoformat(timespec="seconds")
+    return _finish(scenario, folder, stats, options)
+
+
+def _look_ahead(source: str, scenario: Scenario, options: Options) -> None:
+    """Say what `fleetloop check` has against a scenario, but for its rehearsal: here is the run.
+
+    Raises:
+        ScenarioError: it has an error against it.
+    """
+    examined = examine(source, scenario, options.overrides)
+    found = [finding for finding in examined if finding.level != "ok"]
+    for finding in likewise(found):
+        note(f"{finding.level}: {titled(finding)}: {finding.text}")
+    if worst(found) == "error" and not options.force:
+        raise ScenarioError(f"{source}: would not work as it is; --force runs it all the same")
+
+
+def _deployment(scenario: Scenario, options: Options) -> Deployment:
+    if options.deployment is None:
+        return Deployment()
+    return load_deployment(options.deployment, scenario)
+
+
+def _in_process(
+    scenario: Scenario,
+    folder: Path,
+    on_progress: Callable[[Progress], None],
+    on_notice: Callable[[str, str], None],
+    stop: Stop,
+) -> RunStats:
+    network = NetworkLink("in-process", "", "", "")
+    began = time.monotonic()
+    record = folder / run_folder.RECORD
+    period_ns = schedule(scenario).period_ns
+    run: InProcessRun | None = None
+    ended, reason = "completed", ""
+    try:
+        with (
+            RunRecord(
+                record,
+                scenario.names,
+                to_toml(scenario),
+                period_ns,
+                buses=scenario.buses,
+                formats=scenario.bus.record,
+            ) as file,
+            BackgroundWriter(file) as writer,
+        ):
+            run = InProcessRun(
+                plant_brief(scenario, network=network),
+                [agent_brief(scenario, r, network=network, bus=()) for r in scenario.names],
+                leader_brief(scenario),
+                writer,
+                on_progress,
+                on_notice,
+            )
+            startup_s = time.monotonic() - began
+            run.run(stop)
+    except InfrastructureError as error:
+        if run is None:
+            raise
+        ended, reason = "aborted", str(error)
+    if stop.requested:
+        ended, reason = "interrupted", stop.reason
+    return RunStats(
+        mode="in-process",
+        ended=ended,
+        began=any(run.frames.values()),
+        reason=reason,
+        wall_s=run.wall_s,
+        startup_s=startup_s,
+        frames_per_bus=run.frames,
+        stopped_robots=run.stopped_robots,
+        notices=run.notices,
+    )
+
+
+def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options) -> int:
+    record = folder / run_folder.RECORD
+    if not record.exists():
+        gone = stats.reason or f"{record} is not there: the run's folder was removed or moved"
+        raise InfrastructureError(gone)
+    try:
+        recorded = Record.open(record)
+    except RecordError as error:
+        note(f"{stats.ended}: {stats.reason}; {error}")
+        return EXIT_CODES["aborted" if stats.ended == "completed" else stats.ended]
+    summary = summarise(recorded, scenario, stats)
+    unsaved: InfrastructureError | None = None
+    try:
+        run_folder.write(folder / run_folder.SUMMARY, to_json(summary))
+    except InfrastructureError as error:
+        unsaved = error  # results first
+    if options.as_json:
+        say_json(summary | {"folder": str(folder)})
+    else:
+        print_results(summary, folder)
+    if unsaved is not None:
+        raise unsaved
+    if options.figures and summary["ticks"]:
+        from fleetloop.results.report import write_report
+
+        page = write_report(folder, recorded)
+        if not options.as_json:
+            print_report(page)
+    return exit_status(summary, allow_unchecked=options.allow_unchecked)
+
+
+def exit_status(summary: Summary, *, allow_unchecked: bool) -> int:
+    """The exit status of a run; what nobody expected can't be missed."""
+    if summary["verdict"] == "not checked" and not summary["cut_short"]:
+        return 0 if allow_unchecked or not summary["expectations"] else EXIT_CODES["not checked"]
+    return EXIT_CODES[summary["verdict"]]

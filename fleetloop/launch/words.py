@@ -1,0 +1,57 @@
+"""What the launcher hears of a run's processes, as far as it can be: the rest is counted and named.
+
+A process may say whatever it likes on its own keys, and another client with its credentials too.
+"""
+
+from collections.abc import Iterable
+
+from bridge.network import keys
+from bridge.network.link import Dropped
+from bridge.network.messages import Notice, Progress, Report
+from bridge.network.refusals import Refusals
+from configs.brief import Schedule
+
+
+class Words:
+    """Reads the messages of one run."""
+
+    def __init__(self, schedule: Schedule) -> None:
+        self.refusals = Refusals()
+        self._schedule = schedule
+
+    def progress(self, process: str, payload: bytes) -> Progress | None:
+        """How far a process is, None if it can't be there."""
+        progress = Progress.decode(payload)
+        wrong = "not well formed" if progress is None else self._wrong(progress)
+        if wrong is None:
+            return progress
+        self.refusals.note("progress message", process, wrong.partition(" ")[0], wrong)
+        return None
+
+    def report(self, process: str, payload: bytes) -> Report | None:
+        """A process's last word, None if it is none."""
+        report = Report.decode(payload)
+        if report is None:
+            self.refusals.note("report", process, "not well formed")
+        return report
+
+    def notice(self, process: str, payload: bytes) -> Notice | None:
+        """What has just happened to a process, None if that is nothing to be read."""
+        notice = Notice.decode(payload)
+        if notice is None:
+            self.refusals.note("notice", process, "not well formed")
+        return notice
+
+    def note_dropped(self, dropped: Iterable[Dropped]) -> None:
+        """Count what found no room."""
+        for tag, key, count in dropped:
+            why = "more than anybody could read"
+            self.refusals.note(f"{tag} message", keys.process_of(key), "flood", why, count)
+
+    def _wrong(self, progress: Progress) -> str | None:
+        schedule, (tick, t_ns, wall_ns) = self._schedule, progress
+        if not -schedule.countdown_ticks <= tick <= schedule.ticks:
+            return f"tick {tick}, where the run has {schedule.ticks}"
+        if t_ns not in (0, tick * schedule.period_ns) or wall_ns < 0:
+            return f"time {t_ns * 1e-9:.6g} s after {wall_ns * 1e-9:.6g} s at tick {tick}"
+        return None

@@ -1,0 +1,210 @@
+"""The recorder's process: hears every robot's rows and writes `record.mcap`.
+
+It stands apart from the lockstep path, so that neither writing nor a slow disk costs a tick, and it
+outlives the launcher for as long as it takes to complete the file. Started by `fleetloop run`.
+"""
+
+import time
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+
+from bridge.can_bus import sockets
+from bridge.frame import MAX_DATA
+from bridge.network import keys
+from bridge.network.barrier import Hellos, await_hellos
+from bridge.network.link import Arrival, Dropped
+from bridge.network.messages import Progress, Report, Rows, Value
+from bridge.network.refusals import Refusals
+from bridge.network.zenoh_link import open_client
+from bridge.process import Stop, cpu_ns, serve
+from bridge.telemetry import AGENT_ROW, BLOCK_FRAMES, BLOCK_TICKS, FRAME_ROW, PLANT_ROW
+from configs.brief import RecorderBrief
+from fleetloop.record.can_log import frames_of
+from fleetloop.record.run_record import RunRecord
+from fleetloop.record.writer import Source
+
+QUIET_S = 0.3
+"""Once asked to stop, the recorder takes what still comes until nothing new came for this long."""
+PROGRESS_EVERY_S = 0.25
+AHEAD_TICKS = 1 << 17
+"""How far a source's rows may be ahead of the slowest's; they wait in memory."""
+GAPS = 8
+"""Blocks in a row that leave a gap: what is missing doesn't come any more."""
+ROOM_BYTES = 1 << 26
+"""Of what waits of one source: a slow disk may take its time."""
+_WHOSE = {"plant": "the plant for {}", "controller": "{}'s controller", "can": "bus {}"}
+_ROW_SIZES = {"plant": PLANT_ROW.size, "controller": AGENT_ROW.size, "can": FRAME_ROW.size}
+
+
+class _Recorder:
+    def __init__(self, brief: RecorderBrief, record: RunRecord) -> None:
+        self._record = record
+        self._ticks = brief.ticks
+        self._last_frame_ns = brief.last_frame_ns
+        self.refusals = Refusals()
+        self._gaps: Counter[str] = Counter()  # blocks in a row that leave one, by source
+        sources = {f"{kind}/{r}" for r in brief.robots for kind in ("plant", "controller")}
+        sources |= {f"can/{bus}" for bus in brief.buses}
+        self.unheard = set(sources)
+        self.unfinished = set(sources)
+        self.undecodable = 0
+        self.ticks = 0
+
+    def take(self, arrival: Arrival) -> bool:
+        """Take what may be taken; return whether the record has more now."""
+        kind, _, robot = arrival.tag.partition("/")
+        rows = Rows.decode(arrival.payload, _ROW_SIZES[kind])
+        wrong = "not well formed" if rows is None else self._wrong(kind, robot, rows)
+        if rows is None or wrong is not None:
+            self.undecodable += rows is None
+            self._refuse(arrival.tag, wrong or "")
+            if rows is not None:
+                self._give_up_if_gone(arrival.tag, rows)
+            return False
+        self.unheard.discard(arrival.tag)
+        self._gaps[arrival.tag] = 0
+        if rows.length and kind == "can":
+            self._record.traffic(robot, rows.rows)
+        elif kind != "can":
+            self._take_rows(robot, "plant" if kind == "plant" else "controller", rows)
+        if rows.final:
+            self.unfinished.discard(arrival.tag)
+        return rows.length > 0 or rows.final
+
+    def _give_up_if_gone(self, tag: str, rows: Rows) -> None:
+        """A source with a gap has no row any more that could follow; others don't wait for it.
+
+        One block that is ahead may be somebody else's: the source itself goes on where it was.
+        """
+        kind, _, robot = tag.partition("/")
+        if kind != "can":
+            source: Source = "plant" if kind == "plant" else "controller"
+            expected = self._record.next_tick(robot, source)
+            self._gaps[tag] += expected is not None and rows.first_tick > expected
+            if expected is not None and (rows.final or self._gaps[tag] >= GAPS):
+                self._record.end(robot, source)
+        if rows.final:
+            self.unfinished.discard(tag)
+
+    def note_dropped(self, dropped: Iterable[Dropped]) -> None:
+        """Count what found no room."""
+        for tag, _, count in dropped:
+            self._refuse(tag, "more of it waited already than there is room for", count)
+
+    def _refuse(self, tag: str, why: str, count: int = 1) -> None:
+        kind, _, name = tag.partition("/")
+        what = "frame block" if kind == "can" else "row block"
+        self.refusals.note(what, _WHOSE[kind].format(name), why.partition(" ")[0], why, count)
+
+    def _wrong(self, kind: str, robot: str, rows: Rows) -> str | None:
+        """Why a block can't be of this run, None if it can."""
+        if kind == "can":
+            return self._wrong_frames(rows)
+        if not rows.length:
+            return None  # a hello, or nothing more to say
+        source: Source = "plant" if kind == "plant" else "controller"
+        expected = self._record.next_tick(robot, source)
+        if expected is None:
+            return f"tick {rows.first_tick} after its last"
+        if rows.first_tick != expected:
+            return f"begins at tick {rows.first_tick}, expected {expected}"
+        if rows.length > BLOCK_TICKS or rows.first_tick + rows.length > self._ticks:
+            return f"{rows.length} rows from tick {rows.first_tick} on; the run has {self._ticks}"
+        if rows.first_tick - self._record.written > AHEAD_TICKS:
+            return f"ahead of others by more than {AHEAD_TICKS} ticks"
+        return None
+
+    def _wrong_frames(self, rows: Rows) -> str | None:
+        frames = frames_of(rows.rows)
+        if rows.length > BLOCK_FRAMES:
+            return f"{rows.length} frames, at most {BLOCK_FRAMES} travel together"
+        if len(frames) and frames["length"].max() > MAX_DATA:
+            return f"{frames['length'].max()} bytes of data in a frame"
+        if len(frames) and frames["stamp_ns"].max() > self._last_frame_ns:
+            return f"a frame at {frames['stamp_ns'].max() * 1e-9:.6g} s of bus time"
+        return None
+
+    def _take_rows(self, robot: str, source: Source, rows: Rows) -> None:
+        if rows.length:
+            self._record.add(robot, source, rows.first_tick, rows.rows)
+            self.ticks = max(self.ticks, rows.first_tick + rows.length)
+        if rows.final:
+            self._record.end(robot, source)
+
+
+def run(brief: RecorderBrief, stop: Stop) -> str:
+    """Record until every source said its last, or until told to stop and nothing comes any more."""
+    with (
+        open_client(brief.network, brief.start_deadline_s) as link,
+        RunRecord(
+            Path(brief.path),
+            brief.robots,
+            brief.scenario_toml,
+            brief.period_ns,
+            buses=brief.buses,
+            formats=brief.bus_formats,
+        ) as record,
+    ):
+        name = brief.network.run
+        recorder = _Recorder(brief, record)
+        for robot in brief.robots:
+            link.subscribe(keys.truth(name, robot), f"plant/{robot}", room_bytes=ROOM_BYTES)
+            telemetry = keys.telemetry(name, robot)
+            link.subscribe(telemetry, f"controller/{robot}", room_bytes=ROOM_BYTES)
+        for bus in brief.buses:
+            link.subscribe(keys.traffic(name, bus), f"can/{bus}", room_bytes=ROOM_BYTES)
+        progress = link.publisher(keys.progress(name, "recorder"))
+        report = link.publisher(keys.report(name, "recorder"))
+        await_hellos(
+            link,
+            Hellos(brief.hello_every_s),
+            recorder.take,
+            lambda: sorted(recorder.unheard),
+            who="recorder",
+            within_s=brief.start_deadline_s,
+            stop=stop,
+        )
+        link.declare_live(keys.live(name, "recorder"))
+        next_report = 0.0
+        began_ns = cpu_ns()
+        quiet_since = time.monotonic()
+        while recorder.unfinished:
+            arrival = link.receive(PROGRESS_EVERY_S)
+            now = time.monotonic()
+            if arrival is not None and recorder.take(arrival):
+                quiet_since = now
+            elif arrival is not None:
+                time.sleep(0.0)  # of a flood: let the network's thread have its turn
+            elif stop.requested and now - quiet_since > QUIET_S:
+                break
+            if now >= next_report:
+                next_report = now + PROGRESS_EVERY_S
+                record.check_place()
+                record.flush()
+                progress.put(Progress(recorder.ticks, 0, 0).encode())
+        recorder.note_dropped(link.dropped())
+        lost = refused = recorder.refusals.lines()
+        if recorder.unfinished:
+            missing = ", ".join(sorted(recorder.unfinished))
+            lost = [*refused, f"the run ended before the last of {missing} came"]
+        if lost:
+            record.note_lost("; ".join(lost))
+        values: dict[str, Value] = {
+            "undecodable": recorder.undecodable,
+            "notices": "\n".join(refused),
+            "flood": ", ".join(recorder.refusals.floods()),
+            "cpu_ns": cpu_ns() - began_ns,
+        }
+        report.put(Report(values).encode())
+        stop.await_release()
+    return f"{brief.path} has {recorder.ticks} ticks"
+
+
+def _tidy(brief: RecorderBrief) -> None:
+    """What the launcher would have done."""
+    sockets.remove_run_folder(Path(brief.runtime_folder))
+
+
+if __name__ == "__main__":
+    raise SystemExit(serve(RecorderBrief, run, name="recorder", orphaned=_tidy))

@@ -1,0 +1,256 @@
+"""What a run came to: settle times, errors, spread, cost, and whether its expectations held."""
+
+import json
+import platform
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from configs.resolve import leader_brief
+from configs.scenario import Scenario
+from fleetloop.record.reader import Record
+from fleetloop.results import expectations
+from fleetloop.results.expectations import judge, spread, why_not_checked
+
+SETTLE_BAND = 0.05
+"""An error has settled when it stays within this: [m], [rad]."""
+FINAL_S = 5.0
+"""What is called final is the greatest of this last part of a robot's rows, or of all of them."""
+ERRORS = ("x_e_m", "y_e_m", "theta_e_rad")
+_PACKAGES = ("fleetloop", "eclipse-zenoh", "python-can", "numpy", "msgpack", "mcap", "pydantic")
+
+
+@dataclass(slots=True)
+class RunStats:
+    """What the record can't know."""
+
+    mode: str  # "lockstep" over processes, or "in-process"
+    started: str = ""  # wall clock, ISO 8601
+    ended: str = "completed"  # "completed", "interrupted", "aborted"
+    began: bool = True  # anything happened that could be recorded
+    reason: str = ""
+    timed: bool = True  # the reason says when
+    wall_s: float = 0.0
+    startup_s: float = 0.0
+    teardown_s: float = 0.0
+    overruns: int = 0
+    frames_per_bus: dict[str, int] = field(default_factory=dict)
+    waits_s: dict[str, dict[str, float]] = field(default_factory=dict)
+    stopped_robots: dict[str, str] = field(default_factory=dict)
+    notices: dict[str, list[str]] = field(default_factory=dict)
+    machine: dict[str, Any] = field(default_factory=dict)  # of `fleetloop.launch.machine`
+    bus_troubles: dict[str, str] = field(default_factory=dict)
+    left_early: dict[str, str] = field(default_factory=dict)  # robots told to stop, by whom
+    cpu_s: dict[str, float] = field(default_factory=dict)
+    realtime: dict[str, dict[str, int]] = field(default_factory=dict)
+    refused: set[str] = field(default_factory=set)
+    profile_s: dict[str, dict[str, float]] = field(default_factory=dict)
+
+
+Summary = dict[str, Any]
+"""summary.json as it is written."""
+
+
+def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
+    """The summary of a run, complete or not; of every robot all its own rows."""
+    controllers = {robot: rows for robot, rows in record.controller.items() if len(rows)}
+    ticks = max((len(rows) for rows in controllers.values()), default=0)
+    expected = [judge(expect, record, scenario) for expect in scenario.expect]
+    cut_short = _cut_short(record, scenario, stats)
+    verdict = stats.ended
+    reason = stats.reason if stats.timed else f"{stats.reason}, after {ticks} ticks"
+    if verdict == "completed":
+        stopped = bool(stats.stopped_robots)
+        verdict = expectations.verdict(expected, stopped=stopped, cut_short=bool(cut_short))
+        if verdict == "not checked":
+            reason = why_not_checked(expected, cut_short)
+    speed = leader_speed(scenario)
+    robots = {robot: _robot(rows, speed) for robot, rows in controllers.items()}
+    simulated_s = round(ticks * scenario.clock.control_period_s, 9)
+    return {
+        "verdict": verdict,
+        "reason": reason,
+        "scenario": scenario.name,
+        "mode": stats.mode,
+        "started": stats.started,
+        "ticks": ticks,
+        "simulated_s": simulated_s,
+        "wall_s": round(stats.wall_s, 4),
+        "real_time_factor": round(simulated_s / stats.wall_s, 3) if stats.wall_s > 0 else None,
+        "startup_s": round(stats.startup_s, 3),
+        "teardown_s": round(stats.teardown_s, 3),
+        "robots": robots,
+        "worst": _worst(list(robots.values())),
+        "s_spread": _spread_of(record.controller),
+        "expectations": expected,
+        "cut_short": cut_short,
+        "record_lost": record.shortage(),
+        "stopped_robots": {
+            robot: stats.stopped_robots[robot]
+            for robot in scenario.names
+            if robot in stats.stopped_robots
+        },
+        "notices": stats.notices,
+        "overruns": stats.overruns,
+        "machine": stats.machine or None,
+        "frames_per_bus": stats.frames_per_bus,
+        "bus_troubles": stats.bus_troubles,
+        "waits_s": stats.waits_s,
+        "cpu_s": stats.cpu_s,
+        "profile_us_per_tick": _profile(stats, ticks),
+        "realtime": _realtime(controllers, stats) if stats.realtime and ticks else None,
+        "seed": scenario.seed,
+        "versions": {"python": platform.python_version()}
+        | {package: version(package) for package in _PACKAGES},
+    }
+
+
+def to_json(summary: Summary) -> str:
+    """summary.json's text; what is no finite number, as after a law that diverged, is null."""
+    return json.dumps(_finite(summary), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def settle_s(t: np.ndarray, values: np.ndarray, band: float = SETTLE_BAND) -> float | None:
+    """Last time outside the band [s]; 0 if never outside, None if outside at the end."""
+    outside = np.flatnonzero(~(np.abs(values) <= band))
+    if not len(outside):
+        return 0.0
+    return _seconds(t[outside[-1]]) if outside[-1] < len(values) - 1 else None
+
+
+def _seconds(t_s: float) -> float:
+    """A time of the record without what is left of its multiplication."""
+    return round(float(t_s), 9)
+
+
+def _final(t: np.ndarray) -> slice:
+    return slice(int(np.searchsorted(t, t[-1] - FINAL_S, side="right")), None)
+
+
+def leader_speed(scenario: Scenario) -> Callable[[np.ndarray], np.ndarray]:
+    """v_r over scenario time [ns] → [m/s], as the leader says it."""
+    steps = leader_brief(scenario).speed_steps
+    since, speeds = np.array([step[0] for step in steps]), np.array([step[1] for step in steps])
+
+    def at(t_ns: np.ndarray) -> np.ndarray:
+        found: np.ndarray = speeds[np.maximum(np.searchsorted(since, t_ns, side="right") - 1, 0)]
+        return found
+
+    return at
+
+
+def _cut_short(record: Record, scenario: Scenario, stats: RunStats) -> dict[str, str]:
+    """Robots that were followed up to a time before the end of a completed run, and why."""
+    if stats.ended != "completed":
+        return {}
+    ends_at_s, period_s = scenario.ends_at_s, scenario.clock.control_period_s
+    short = {}
+    for robot in scenario.names:
+        ticks = min(len(record.plant[robot]), len(record.controller[robot]))
+        if ticks < round(ends_at_s / period_s):
+            why = stats.left_early.get(robot) or "no rows after that"
+            short[robot] = f"cut short at {ticks * period_s:g} s of {ends_at_s:g} s: {why}"
+    return short
+
+
+def _robot(rows: np.ndarray, speed: Callable[[np.ndarray], np.ndarray]) -> dict[str, Any]:
+    t, last = rows["t_s"], _final(rows["t_s"])
+    torque = max(_peak(rows["tau_right_N_m"]), _peak(rows["tau_left_N_m"]))
+    return {
+        "ticks": len(rows),
+        "settle_s": {name: settle_s(t, rows[name]) for name in ERRORS},
+        "final_max": {name: _peak(rows[name][last]) for name in ERRORS},
+        "final_from_s": _seconds(t[last][0]),
+        "peak_torque_N_m": torque,
+        "settle_s_dot_s": settle_s(t, rows["s_dot"] - speed(np.rint(t * 1e9).astype(np.int64))),
+    }
+
+
+def _peak(values: np.ndarray) -> float:
+    return float(np.max(np.abs(values)))
+
+
+def _worst(robots: list[dict[str, Any]]) -> dict[str, Any] | None:
+    if not robots:
+        return None
+    settles = {name: [robot["settle_s"][name] for robot in robots] for name in ERRORS}
+    return {
+        "settle_s": {name: None if None in v else max(v) for name, v in settles.items()},
+        "final_max": {name: max(robot["final_max"][name] for robot in robots) for name in ERRORS},
+        "peak_torque_N_m": max(robot["peak_torque_N_m"] for robot in robots),
+    }
+
+
+def _spread_of(controllers: dict[str, np.ndarray]) -> dict[str, float | None] | None:
+    values = spread(controllers)
+    if not len(values):
+        return None
+    t = next(iter(controllers.values()))["t_s"][: len(values)]
+    return {
+        "peak": float(values.max()),
+        "settle_s": settle_s(t, values),
+        "final": float(values[_final(t)].max()),
+        "final_from_s": _seconds(t[_final(t)][0]),
+    }
+
+
+def _realtime(controllers: dict[str, np.ndarray], stats: RunStats) -> dict[str, Any]:
+    """How well the wall clock was kept: counts, and percentiles over all ticks."""
+    robots = {
+        robot: {
+            **counts,
+            "miss_percent": round(100.0 * counts["misses"] / len(controllers[robot]), 4),
+            "late_us": _percentiles(controllers[robot]["late_s"]),
+            "round_trip_us": _percentiles(controllers[robot]["round_trip_s"]),
+        }
+        for robot, counts in stats.realtime.items()
+        if robot in controllers
+    }
+    total = sum(stats.realtime[robot]["misses"] for robot in robots)
+    ticks = sum(len(controllers[robot]) for robot in robots)
+    cpu = sum(stats.cpu_s.values()) / stats.wall_s if stats.wall_s > 0 else 0.0
+    return {
+        "miss_percent": round(100.0 * total / max(1, ticks), 4),
+        "late_us": _percentiles(np.concatenate([r["late_s"] for r in controllers.values()])),
+        "round_trip_us": _percentiles(
+            np.concatenate([r["round_trip_s"] for r in controllers.values()])
+        ),
+        "cpu_percent_of_one_core": round(100.0 * cpu, 1),
+        "refused": sorted(stats.refused),
+        "robots": robots,
+    }
+
+
+def _profile(stats: RunStats, ticks: int) -> dict[str, dict[str, float]] | None:
+    """Processor time per tick by process and part [µs]; None if it wasn't sampled."""
+    if not stats.profile_s or not ticks:
+        return None
+    parts = dict(stats.profile_s)
+    parts["recorder"] = {"record": stats.cpu_s.get("recorder", 0.0)}
+    parts["launcher"] = {"Zenoh": stats.cpu_s.get("launcher", 0.0)}
+    return {
+        process: {part: round(seconds / ticks * 1e6, 2) for part, seconds in shares.items()}
+        for process, shares in sorted(parts.items())
+    }
+
+
+def _percentiles(seconds: np.ndarray) -> dict[str, float]:
+    values = seconds[np.isfinite(seconds)] * 1e6
+    if not len(values):
+        return {}
+    points = np.percentile(values, [50, 99, 99.9, 100])
+    return {
+        name: round(float(v), 1)
+        for name, v in zip(("p50", "p99", "p99.9", "max"), points, strict=True)
+    }

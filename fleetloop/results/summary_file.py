@@ -1,0 +1,167 @@
+"""`summary.json` read back: what of it the page shows has to be there and to be what it should.
+
+Keys that aren't named here may be there, too. What `fleetloop.results.summary` makes fits; a number
+that was none, as after a law that diverged, is null.
+"""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import AfterValidator, BaseModel, ValidationError, model_validator
+
+from configs.errors import ScenarioError
+from fleetloop.results.run_folder import SUMMARY
+from fleetloop.results.summary import ERRORS, Summary
+
+
+def _of_every_error(values: dict[str, Any]) -> dict[str, Any]:
+    if missing := [name for name in ERRORS if name not in values]:
+        raise ValueError(f"no {', '.join(missing)}")
+    return values
+
+
+class _Worst(BaseModel):
+    settle_s: Annotated[dict[str, float | None], AfterValidator(_of_every_error)]
+    final_max: Annotated[dict[str, float | None], AfterValidator(_of_every_error)]
+    peak_torque_N_m: float | None
+
+
+class _Robot(_Worst):
+    ticks: int
+    settle_s_dot_s: float | None
+
+
+class _Spread(BaseModel):
+    peak: float | None
+    settle_s: float | None
+    final: float | None
+
+
+class _Found(BaseModel):
+    max_abs: float | None
+    min: float | None
+    max: float | None
+
+
+class _Expectation(BaseModel):
+    signal: str
+    from_s: float
+    to_s: float = 0.0
+    robots: list[str] = []
+    max_abs: float = 0.0
+    min: float = 0.0
+    max: float = 0.0
+    held: bool | None
+    found: _Found | None
+    seen_to_s: float | None = None
+
+    @model_validator(mode="after")
+    def _says_how_far_it_was_seen(self) -> Self:
+        if self.held is None and self.seen_to_s is None:
+            raise ValueError("neither held nor seen up to some time")
+        return self
+
+
+class _Realtime(BaseModel):
+    miss_percent: float
+    late_us: dict[str, float]
+    round_trip_us: dict[str, float]
+    cpu_percent_of_one_core: float
+    refused: list[str]
+
+
+class _Stall(BaseModel):
+    t_s: float
+    lasted_s: float
+
+
+class _Machine(BaseModel):
+    """Of the launcher's view all is there or nothing."""
+
+    stalls: int = 0
+    stalled_s: float | None = None
+    longest_stall_s: float | None = None
+    longest_stall_at_s: float | None = None
+    stopped_and_continued: int | None = None
+    plant_stalls: list[_Stall] = []
+
+    @model_validator(mode="after")
+    def _tells_of_its_stalls(self) -> Self:
+        if self.stalls and None in (
+            self.stalled_s,
+            self.longest_stall_s,
+            self.longest_stall_at_s,
+            self.stopped_and_continued,
+        ):
+            raise ValueError("stalls without how long and when")
+        return self
+
+
+class _Summary(BaseModel):
+    verdict: str
+    reason: str
+    scenario: str
+    mode: str
+    started: str
+    ticks: int
+    simulated_s: float
+    wall_s: float
+    real_time_factor: float | None
+    startup_s: float
+    teardown_s: float
+    robots: dict[str, _Robot]
+    worst: _Worst | None
+    s_spread: _Spread | None
+    expectations: list[_Expectation]
+    cut_short: dict[str, str]
+    record_lost: str
+    stopped_robots: dict[str, str]
+    notices: dict[str, list[str]]
+    overruns: int
+    frames_per_bus: dict[str, int]
+    bus_troubles: dict[str, str]
+    cpu_s: dict[str, float]
+    realtime: _Realtime | None
+    machine: _Machine | None
+    seed: int
+    versions: dict[str, str]
+
+    @model_validator(mode="after")
+    def _names_the_worst(self) -> Self:
+        if len(self.robots) > 1 and self.worst is None:
+            raise ValueError("no worst of several robots")
+        return self
+
+
+def read_summary(folder: Path) -> Summary | None:
+    """The summary in a run's folder, None if the run left none.
+
+    Raises:
+        ScenarioError: the file can't be read, or isn't a summary as this version writes it.
+    """
+    path = folder / SUMMARY
+    try:
+        summary = json.loads(path.read_bytes())
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise ScenarioError(f"{path}: can't be read: {error.strerror or error}") from error
+    except (ValueError, RecursionError) as error:
+        raise _refusal(path, f"not JSON ({error})") from error
+    if not isinstance(summary, dict):
+        raise _refusal(path, "not an object of what a run came to")
+    try:
+        _Summary.model_validate(summary, strict=True)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"])) or "its robots"
+        wrong = "missing" if first["type"] == "missing" else "not what a run leaves there"
+        raise _refusal(path, f"{where} is {wrong}") from error
+    return summary
+
+
+def _refusal(path: Path, what: str) -> ScenarioError:
+    return ScenarioError(
+        f"{path}: {what}; without this file the page is made from the record alone"
+    )

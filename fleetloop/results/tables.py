@@ -1,0 +1,229 @@
+"""The results of a run as the operator sees them, in the terminal and on the page."""
+
+import sys
+from collections.abc import Iterator
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.markup import escape
+from rich.table import Table
+
+from bridge.profile import PARTS
+from fleetloop.results.summary import ERRORS, FINAL_S, Summary
+from fleetloop.terminal import ResultConsole, say
+
+_MARKS = {True: "held", False: "FAILED", None: "not reached"}
+_RULE = box.Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
+"""`box.SIMPLE_HEAD` in ASCII."""
+HOLDS_PERCENT = 2.0
+"""More misses than this, and the machine is said not to hold the rate."""
+EARLY_S = 0.05
+"""A robot whose rows end so long before the run's took part in a part of it [s]."""
+_SYMBOLS = {"x_e_m": ("x_e", "m"), "y_e_m": ("y_e", "m"), "theta_e_rad": ("θ_e", "rad")}
+
+
+def print_results(summary: Summary, folder: Path) -> None:
+    """Print the table of a run, its verdict, and where its files are."""
+    console = ResultConsole(file=sys.stdout, highlight=False)
+
+    def line(text: str, style: str | None = None) -> None:
+        console.print(text, style=style, soft_wrap=True, markup=False)
+
+    if summary["robots"]:
+        title = f"{summary['scenario']}: path following, {summary['mode']}"
+        table = Table(title=title, box=_rules(), padding=(0, 1, 0, 0), pad_edge=False)
+        first, *others = robot_header(break_lines=True)
+        table.add_column(first, no_wrap=True)
+        for header in others:
+            table.add_column(escape(header), justify="right", no_wrap=True)
+        for row in robot_rows(summary):
+            if row[0] == "worst":
+                table.add_section()
+            table.add_row(*row)
+        console.print_whole(table)
+        line(final_line(summary))
+        line(spread_line(summary))
+    for expect in summary["expectations"]:
+        line(f"{mark(expect):<11}  {claim(expect)}")
+    for text in trouble_lines(summary):
+        line(text)
+    if summary["real_time_factor"] is not None:
+        line(
+            f"{summary['ticks']} ticks in {summary['wall_s']:.2f} s:"
+            f" {summary['real_time_factor']:.2f} × real time"
+            f" (start {summary['startup_s']:.2f} s, end {summary['teardown_s']:.2f} s,"
+            f" overruns {summary['overruns']})"
+        )
+    if summary["profile_us_per_tick"]:
+        console.print_whole(_profile(summary["profile_us_per_tick"]))
+    for text in realtime_lines(summary):
+        line(text)
+    reason = f": {summary['reason']}" if summary["reason"] else ""
+    line(f"verdict  {summary['verdict']}{reason}", "bold")
+    line(f"run      {folder}")
+
+
+def print_report(page: Path) -> None:
+    """Say where the page of a run is, and its figures."""
+    say(f"report   {page}\nfigures  {page.parent / 'figures'}")
+
+
+def _profile(profile: dict[str, dict[str, float]]) -> Table:
+    """Processor time per tick, processes by parts."""
+    parts = [part for part in PARTS if any(part in shares for shares in profile.values())]
+    title = "processor time per tick [µs]; bus with its system calls, Zenoh with its threads"
+    table = Table(title=title, box=_rules(), pad_edge=False)
+    table.add_column("process", no_wrap=True)
+    for name in (*parts, "all"):
+        table.add_column(name, justify="right")
+    for process, shares in profile.items():
+        values = [shares.get(part, 0.0) for part in parts]
+        table.add_row(process, *(f"{v:.1f}" for v in (*values, sum(values))))
+    table.add_section()
+    totals = [sum(shares.get(part, 0.0) for shares in profile.values()) for part in parts]
+    table.add_row("all", *(f"{v:.1f}" for v in (*totals, sum(totals))))
+    return table
+
+
+def robot_header(*, break_lines: bool = False) -> list[str]:
+    """Headers of `robot_rows`."""
+    gap = "\n" if break_lines else " "
+    settled = [f"{_SYMBOLS[name][0]}{gap}settled" for name in ERRORS]
+    final = [f"{_SYMBOLS[name][0]} [{_SYMBOLS[name][1]}]{gap}final" for name in ERRORS]
+    return ["robot", *settled, *final, f"τ [N·m]{gap}peak"]
+
+
+def robot_rows(summary: Summary) -> Iterator[list[str]]:
+    """A row per robot, with its end if it was early; with several robots a last one, worst."""
+    for robot, values in summary["robots"].items():
+        yield [robot + _early(summary, values, " to"), *_cells(values)]
+    if len(summary["robots"]) > 1:
+        yield ["worst", *_cells(summary["worst"])]
+
+
+def final_line(summary: Summary) -> str:
+    """What is called final."""
+    return f"final: the greatest of a robot's last {min(FINAL_S, summary['simulated_s']):g} s"
+
+
+def spread_line(summary: Summary) -> str:
+    """The spread of the path variables in one line; it ends with the first robot that ends."""
+    spread = summary["s_spread"]
+    if spread is None or not summary["robots"]:
+        return ""
+    first = min(summary["robots"].values(), key=lambda values: values["ticks"])
+    return (
+        f"spread of s{_early(summary, first, ' up to')}: peak {_number(spread['peak'], '.4f')} m,"
+        f" settled {_time(spread['settle_s'])},"
+        f" final {_number(spread['final'], '.2e')} m"
+    )
+
+
+def _early(summary: Summary, robot: dict[str, Any], word: str) -> str:
+    """When a robot ended that ended well before the run did, after a word; else nothing."""
+    period_s = float(summary["simulated_s"]) / max(1, summary["ticks"])
+    left_s = period_s * (int(summary["ticks"]) - int(robot["ticks"]))
+    return f"{word} {period_s * int(robot['ticks']):.6g} s" if left_s > EARLY_S else ""
+
+
+def trouble_lines(summary: Summary) -> Iterator[str]:
+    """Robots that stopped themselves, what led to it, and buses that failed at times."""
+    for robot, reason in summary["stopped_robots"].items():
+        yield f"STOPPED {robot}: {reason}"
+    for robot, notices in summary["notices"].items():
+        told = summary["stopped_robots"].get(robot)
+        for notice in notices:
+            if notice.replace("STOPPED: ", "", 1) != told:
+                yield f"{robot}: {notice}"
+    for bus, trouble in summary["bus_troubles"].items():
+        yield f"BUS {bus}: {trouble}"
+    if summary["record_lost"]:
+        yield f"RECORD not all there: {summary['record_lost']}"
+    for robot, how in summary["cut_short"].items():
+        yield f"{robot}: {how}"
+    yield from machine_lines(summary)
+
+
+def machine_lines(summary: Summary) -> Iterator[str]:
+    """How often launcher and plant stood still; nothing if they didn't, or nobody watched."""
+    machine = {"stalls": 0, **(summary["machine"] or {})}
+    if machine["stalls"]:
+        stops = machine["stopped_and_continued"]
+        yield (
+            f"MACHINE stalled {machine['stalls']} times, {machine['stalled_s']:.2f} s in all,"
+            f" longest {machine['longest_stall_s']:.2f} s at"
+            f" t = {machine['longest_stall_at_s']:.2f} s"
+            + (f"; {stops} of them stopped by Ctrl-Z or a signal" if stops else "")
+        )
+    if stalls := machine.get("plant_stalls"):
+        worst = max(stalls, key=lambda stall: stall["lasted_s"])
+        yield (
+            f"PLANT, or its machine, stalled {len(stalls)} times, longest {worst['lasted_s']:.2f} s"
+            f" at t = {worst['t_s']:.2f} s"
+        )
+
+
+def realtime_lines(summary: Summary) -> Iterator[str]:
+    """How well the wall clock was kept, and what would help; nothing for a lockstep run."""
+    kept = summary.get("realtime")
+    if not kept:
+        return
+    late, trip = kept["late_us"], kept["round_trip_us"]
+    yield (
+        f"real time: misses {kept['miss_percent']:g} %, wake-up late p50 {late.get('p50', 0):.0f}"
+        f" p99 {late.get('p99', 0):.0f} max {late.get('max', 0):.0f} µs, torque to feedback p50"
+        f" {trip.get('p50', 0):.0f} p99 {trip.get('p99', 0):.0f} max {trip.get('max', 0):.0f} µs,"
+        f" processor {kept['cpu_percent_of_one_core']:g} % of one core"
+    )
+    if kept["refused"]:
+        yield f"note: refused to this user, so the clock jitters more: {', '.join(kept['refused'])}"
+    if kept["miss_percent"] > HOLDS_PERCENT:
+        yield (
+            f"WARNING: this machine does not hold the rate: {kept['miss_percent']:g} % of the ticks"
+            " had no feedback in time; lower the rate or free the machine"
+        )
+
+
+def mark(expect: dict[str, Any]) -> str:
+    """Whether an expectation held."""
+    return _MARKS[expect["held"]]
+
+
+def claim(expect: dict[str, Any]) -> str:
+    """An expectation and what was found, in one line."""
+    bounds = [f"{k} {expect[k]:g}" for k in ("max_abs", "min", "max") if k in expect]
+    until = f" to {expect['to_s']:g} s" if "to_s" in expect else ""
+    found = expect["found"]
+    shown = "nothing"
+    if found is not None:
+        shown = ", ".join(
+            f"{k} {_number(found[k], '.3g')}" for k in ("max_abs", "min", "max") if k in expect
+        )
+    if expect["held"] is None:
+        shown += f"; seen to {expect['seen_to_s']:.6g} s only"
+    robots = f" of {', '.join(expect['robots'])}" if "robots" in expect else ""
+    return (
+        f"{expect['signal']}{robots} from {expect['from_s']:g} s{until}:"
+        f" {', '.join(bounds)}; found {shown}"
+    )
+
+
+def _cells(values: dict[str, Any]) -> list[str]:
+    settles = [_time(values["settle_s"][name]) for name in ERRORS]
+    finals = [_number(values["final_max"][name], ".5f") for name in ERRORS]
+    return [*settles, *finals, _number(values["peak_torque_N_m"], ".2f")]
+
+
+def _number(value: float | None, spec: str) -> str:
+    """A number, or that it is none: of what a law that diverged says nothing is known."""
+    return "no number" if value is None or not isfinite(value) else format(value, spec)
+
+
+def _time(value: float | None) -> str:
+    return "not" if value is None else f"{value:.2f} s"
+
+
+def _rules() -> box.Box:
+    return _RULE if ResultConsole().options.ascii_only else box.SIMPLE_HEAD

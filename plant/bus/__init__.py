@@ -1,0 +1,1 @@
+"""The plant's buses: one file a kind."""

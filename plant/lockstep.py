@@ -1,0 +1,327 @@
+"""The lockstep clock: the plant owns time, everybody else answers.
+
+    bus's tick k   its robots' poses to Zenoh when the schedule localises; then what
+                   `plant.bus.ideal` or `plant.bus.timed` do between questions and answers; and on
+                   to its tick k + 1
+
+Robots of different buses meet only in their controllers' messages, for which each controller waits
+by tick. So a bus need not wait for all others at every tick: it may be up to `LEAD_TICKS` ahead
+of the slowest, which keeps all cores at work and changes no value. Held to a speed, all go tick by
+tick together.
+
+Bus time runs from power-up; scenario time is 0 when control starts, after the countdown in which
+the controllers arm their drives and the bodies are held as the scenario puts them. The run ends
+with one closing tick at which the controllers disarm.
+"""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import NamedTuple
+
+from bridge.awake import LOOK_S, STALL_S
+from bridge.can_bus.hub import Hub
+from bridge.network.link import Publisher
+from bridge.network.messages import PoseFix, Progress
+from bridge.process import Stop, launcher_stopped
+from bridge.telemetry import RowBuffer, Tap
+from configs.brief import LEAD_TICKS, PlantBrief
+from configs.errors import InfrastructureError, PeerLostError
+from plant.bus.build import Emulation, emulations
+from plant.bus.ideal import Ask, IdealBus
+from plant.bus.timed import WireBus
+from plant.robot import Unit
+
+REPORT_EVERY_NS = 100_000_000
+WAIT_S = LOOK_S
+"""Longest wait for an answer before somebody who doesn't answer is looked for."""
+_STALL_NS = int((LOOK_S + STALL_S) * 1e9)
+ANSWER_SHARE = 0.9
+"""Part of the tick deadline that the plant waits for answers: before that, controllers name who is
+silent; after it, the launcher names the plant."""
+
+
+@dataclass(slots=True)
+class Counters:
+    """What the run cost, for the summary."""
+
+    ticks: int = 0
+    wall_ns: int = 0
+    waited_ns: int = 0
+    overruns: int = 0
+    frames: dict[str, int] = field(default_factory=dict)
+
+
+class _Lane:
+    """One bus on its way through the ticks."""
+
+    __slots__ = ("asked", "asked_ns", "bus", "done", "robots", "tick")
+
+    def __init__(self, bus: str, units: Sequence[Unit], tick: int) -> None:
+        self.bus = bus
+        self.robots = [unit.brief.robot for unit in units]
+        self.tick = tick
+        self.asked = ""  # the robot that was asked; "": all
+        self.asked_ns = 0  # when it was asked to answer; 0: nobody was
+        self.done = False
+
+    def begin(self) -> Ask | None:
+        """Begin the next tick."""
+        raise NotImplementedError
+
+    def go_on(self, hub: Hub) -> Ask | None:
+        """Hand on what the clients had to say, up to the next question; None: the tick is over."""
+        raise NotImplementedError
+
+    def put(self, hub: Hub, ask: Ask) -> None:
+        """Put a question to the clients."""
+        raise NotImplementedError
+
+    def crossed(self, hub: Hub) -> int:
+        """How many frames crossed the bus."""
+        raise NotImplementedError
+
+
+class _IdealLane(_Lane):
+    """A bus on which frames take no time."""
+
+    __slots__ = ("_steps",)
+
+    def __init__(self, bus: str, emulation: IdealBus, tick: int) -> None:
+        super().__init__(bus, emulation.units, tick)
+        self._steps = emulation.steps()
+
+    def begin(self) -> Ask | None:
+        return next(self._steps)
+
+    def go_on(self, hub: Hub) -> Ask | None:
+        return self._steps.send(hub.take(self.bus))
+
+    def put(self, hub: Hub, ask: Ask) -> None:
+        hub.deliver(self.bus, ask.stamp_ns, ask.frames)
+
+    def crossed(self, hub: Hub) -> int:
+        counters = hub.counters(self.bus)
+        return counters.from_drives + counters.from_clients
+
+
+class _WireLane(_Lane):
+    """A bus with bit timing."""
+
+    __slots__ = ("_steps", "_wire")
+
+    def __init__(self, bus: str, emulation: WireBus, tick: int) -> None:
+        super().__init__(bus, emulation.units, tick)
+        self._wire = emulation
+        self._steps = emulation.steps()
+
+    def begin(self) -> Ask | None:
+        return next(self._steps)
+
+    def go_on(self, hub: Hub) -> Ask | None:
+        for key in hub.departed(self.bus):
+            self._wire.depart(key)
+        return self._steps.send(hub.say(self.bus))
+
+    def put(self, hub: Hub, ask: Ask) -> None:
+        for key, count in ask.freed:
+            hub.left_queue(self.bus, key, count)
+        hub.pass_on(self.bus, ask.stamp_ns, ask.passed, ask.asked)
+
+    def crossed(self, hub: Hub) -> int:  # noqa: ARG002 - the wire knows better
+        return self._wire.crossed
+
+
+def _lane(bus: str, emulation: Emulation, tick: int) -> _Lane:
+    if isinstance(emulation, WireBus):
+        return _WireLane(bus, emulation, tick)
+    return _IdealLane(bus, emulation, tick)
+
+
+class _Ends(NamedTuple):
+    """Where a robot's pose and truth go."""
+
+    pose: Publisher
+    rows: RowBuffer
+
+
+class LockstepLoop:
+    """Runs all units of a plant against the controllers on the hub's buses."""
+
+    def __init__(
+        self,
+        brief: PlantBrief,
+        units: Sequence[Unit],
+        hub: Hub,
+        poses: Sequence[Publisher],
+        rows: Sequence[RowBuffer],
+        report: Callable[[Progress], None],
+        taps: Mapping[str, Tap],
+    ) -> None:
+        self._schedule = schedule = brief.schedule
+        self._period_ns, self._ticks = schedule.period_ns, schedule.ticks
+        self._tick_wall_ns = int(schedule.period_ns / brief.speed) if brief.speed > 0.0 else 0
+        self._window = 0 if self._tick_wall_ns else LEAD_TICKS
+        self._limit_s = ANSWER_SHARE * schedule.tick_deadline_s
+        self._hub = hub
+        self._report = report
+        first = -schedule.countdown_ticks
+        ends = {
+            unit: _Ends(pose, truth) for unit, pose, truth in zip(units, poses, rows, strict=True)
+        }
+
+        def begin(group: Sequence[Unit]) -> Callable[[int], None]:
+            return partial(self._begin, [(unit, ends[unit]) for unit in group])
+
+        buses = emulations(brief, units, begin, taps)
+        self._lanes = {name: _lane(name, bus, first) for name, bus in buses.items()}
+        self._slowest = first
+        self._at_slowest = len(self._lanes)
+        self._held: list[_Lane] = []
+        self._start_ns = 0
+        self.counters = Counters()
+
+    def run(self, stop: Stop) -> None:
+        """Run from the first tick of the countdown to the closing tick, or until told to stop.
+
+        Raises:
+            InfrastructureError: a controller did not answer within the tick deadline.
+            PeerLostError: a controller left its bus.
+        """
+        self._start_ns = now_ns = next_report_ns = time.monotonic_ns()
+        hub = self._hub
+        for lane in self._lanes.values():
+            self._ask(lane, now_ns)
+        while self._at_slowest and not stop.requested:
+            answered = hub.collect(WAIT_S)
+            after_ns = time.monotonic_ns()
+            self.counters.waited_ns += after_ns - now_ns
+            if after_ns - now_ns > _STALL_NS or (not answered and launcher_stopped()):
+                self._forgive(after_ns - now_ns)
+            for bus in answered:
+                self._go_on(self._lanes[bus], after_ns)
+            now_ns = time.monotonic_ns()
+            if now_ns - after_ns > _STALL_NS:
+                self._forgive(now_ns - after_ns)
+            if not answered:
+                self._look_for_the_absent(now_ns)
+            elif now_ns >= next_report_ns:
+                next_report_ns = now_ns + REPORT_EVERY_NS
+                self._report(self.progress())
+        self.counters.wall_ns = time.monotonic_ns() - self._start_ns
+        for bus, lane in self._lanes.items():
+            self.counters.frames[bus] = lane.crossed(hub)
+
+    def progress(self) -> Progress:
+        """How far the slowest robot is."""
+        tick = self._slowest
+        self.counters.ticks = max(tick, 0)
+        return Progress(tick, tick * self._schedule.period_ns, time.monotonic_ns() - self._start_ns)
+
+    # --- one bus -------------------------------------------------------------------------------
+
+    def _begin(self, robots: Sequence[tuple[Unit, _Ends]], tick: int) -> None:
+        """A tick begins: what is true now goes to the record, where a robot is to the robot."""
+        t_ns = tick * self._period_ns
+        for unit, ends in robots:
+            if 0 <= tick < self._ticks:
+                ends.rows.add(tick, unit.row(t_ns * 1e-9))
+            if self._schedule.localises(tick):
+                state = unit.state
+                ends.pose.put(PoseFix(tick, t_ns, state.x, state.y, state.theta).encode())
+
+    def _ask(self, lane: _Lane, now_ns: int) -> None:
+        """Begin the next tick of a bus."""
+        ask = lane.begin()
+        if ask is not None:
+            self._put(lane, ask, now_ns)
+
+    def _go_on(self, lane: _Lane, now_ns: int) -> None:
+        ask = lane.go_on(self._hub)
+        if ask is not None:
+            self._put(lane, ask, now_ns)
+        else:
+            self._take_on(lane, now_ns)
+
+    def _put(self, lane: _Lane, ask: Ask, now_ns: int) -> None:
+        lane.asked_ns, lane.asked = now_ns, ask.asked
+        lane.put(self._hub, ask)
+
+    def _take_on(self, lane: _Lane, now_ns: int) -> None:
+        """A bus from its tick to the next, and on as far as the slowest allows."""
+        tick = lane.tick
+        lane.asked_ns = 0
+        lane.tick = tick + 1
+        lane.done = tick >= self._ticks
+        if tick == self._slowest:
+            self._at_slowest -= 1
+            if not self._at_slowest:
+                self._next_tick()
+                self._release(now_ns)
+        if lane.done:
+            return
+        if lane.tick <= self._slowest + self._window:
+            self._ask(lane, now_ns)
+        else:
+            self._held.append(lane)
+
+    # --- all of them ---------------------------------------------------------------------------
+
+    def _next_tick(self) -> None:
+        """The slowest have gone on; with nobody left at all, the run is over."""
+        ticks = [lane.tick for lane in self._lanes.values() if not lane.done]
+        if not ticks:
+            self._slowest = self._schedule.ticks
+            return
+        self._slowest = min(ticks)
+        self._at_slowest = ticks.count(self._slowest)
+        if self._slowest <= 0:
+            self._start_ns = time.monotonic_ns()
+        elif self._tick_wall_ns:
+            self._pace()
+
+    def _release(self, now_ns: int) -> None:
+        """Ask the controllers of all buses that the window lets go on."""
+        latest = self._slowest + self._window
+        going = [lane for lane in self._held if lane.tick <= latest]
+        if going:
+            self._held = [lane for lane in self._held if lane.tick > latest]
+            for lane in going:
+                self._ask(lane, now_ns)
+
+    def _pace(self) -> None:
+        """Wait for the wall time of the slowest's tick; the buses are served meanwhile."""
+        due_ns = self._start_ns + self._slowest * self._tick_wall_ns
+        left_ns = due_ns - time.monotonic_ns()
+        if left_ns < -self._tick_wall_ns:
+            self.counters.overruns += 1
+        while left_ns > 0:
+            self._hub.serve(left_ns * 1e-9)
+            left_ns = due_ns - time.monotonic_ns()
+
+    def _forgive(self, stood_still_ns: int) -> None:
+        """Time in which this process, or who carries messages, stood still is nobody's delay."""
+        for lane in self._lanes.values():
+            if lane.asked_ns:
+                lane.asked_ns += stood_still_ns
+
+    def _look_for_the_absent(self, now_ns: int) -> None:
+        left = set(self._hub.left())
+        limit_ns = int(self._limit_s * 1e9)
+        for lane in self._lanes.values():
+            when = self._schedule.when(lane.tick)
+            robot = lane.asked or " or ".join(lane.robots)
+            # Each controller leaves when it has answered the closing tick.
+            if lane.tick < self._ticks and (gone := left.intersection(lane.robots)):
+                names = " and ".join(sorted(gone))
+                raise PeerLostError(f"{when}: the controller of {names} left its bus")
+            if lane.asked_ns and now_ns - lane.asked_ns > limit_ns:
+                raise InfrastructureError(
+                    f"{when}: no answer from the controller of {robot} within {self._limit_s:g} s"
+                )
+
+
+def bus_frames(counters: Counters) -> Mapping[str, int]:
+    """Frames that crossed each bus, as flat values for a report."""
+    return {f"frames.{bus}": count for bus, count in counters.frames.items()}

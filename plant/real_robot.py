@@ -1,0 +1,35 @@
+"""A robot that the plant doesn't emulate: what the localisation system says of it is its truth.
+
+Its rows in the record have the pose that was said last, and no number for what nobody measures.
+"""
+
+from math import nan
+
+from bridge.network.messages import PoseFix
+from configs.brief import Pose
+from configs.reach import within_world
+from configs.signals import PLANT_SIGNALS
+
+_UNKNOWN = (nan,) * (len(PLANT_SIGNALS) - 4)
+
+
+class Witness:
+    """What is known of one real robot."""
+
+    __slots__ = ("_pose", "refused", "robot")
+
+    def __init__(self, robot: str, start: Pose) -> None:
+        self.robot = robot
+        self.refused = 0
+        self._pose = start.x_m, start.y_m, start.theta_rad
+
+    def take(self, fix: PoseFix | None) -> None:
+        """Take what the localisation system says; what is no pose of this world is counted."""
+        if fix is None or not within_world(fix.x_m, fix.y_m, fix.theta_rad):
+            self.refused += 1
+            return
+        self._pose = fix.x_m, fix.y_m, fix.theta_rad
+
+    def row(self, t_s: float) -> tuple[float, ...]:
+        """The signals of `configs.signals.PLANT_SIGNALS` at this instant."""
+        return (t_s, *self._pose, *_UNKNOWN)

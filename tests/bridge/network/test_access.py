@@ -1,0 +1,207 @@
+"""Access control: generated from the graph, default deny, over real sessions."""
+
+import json
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bridge.network import access, keys
+from bridge.network.zenoh_link import RouterLink, ZenohLink, open_client, open_router
+from configs.brief import NetworkLink
+from configs.errors import InfrastructureError
+
+ROBOTS = ("r1", "r2", "r3", "r4")
+HEARS = {"r1": (), "r2": ("r1",), "r3": ("r2",), "r4": ("r2", "r3")}
+RUN = "test"
+
+
+@pytest.fixture
+def plan() -> access.AccessPlan:
+    return access.plan(RUN, ROBOTS, HEARS, ("r1",))
+
+
+@pytest.fixture
+def router(plan: access.AccessPlan, tmp_path: Path) -> Iterator[RouterLink]:
+    with open_router(None, plan, tmp_path) as link:
+        yield link
+
+
+def client(router: RouterLink, plan: access.AccessPlan, user: str) -> ZenohLink:
+    return open_client(NetworkLink(RUN, router.endpoint, user, plan.passwords[user]), 5.0)
+
+
+def test_rights_of_a_robot_are_its_graph(plan: access.AccessPlan) -> None:
+    rights = plan.rights["agent-r4"]
+    assert keys.path(RUN, "r4") in rights.puts
+    assert set(rights.hears) == {
+        keys.pose(RUN, "r4"),
+        keys.go(RUN),
+        keys.report(RUN, access.LAUNCHER),
+        keys.path(RUN, "r2"),
+        keys.path(RUN, "r3"),
+    }
+    assert keys.leader_speed(RUN) in plan.rights["agent-r1"].hears
+    assert keys.leader_speed(RUN) not in plan.rights["agent-r2"].hears
+
+
+def test_everything_that_is_not_allowed_is_denied(plan: access.AccessPlan) -> None:
+    rules = json.loads(plan.access_control())
+    assert rules["default_permission"] == "deny"
+    assert {rule["permission"] for rule in rules["rules"]} == {"allow"}
+    assert all("*" not in key for rule in rules["rules"] for key in rule["key_exprs"])
+
+
+def test_passwords_are_long_random_and_not_shown(plan: access.AccessPlan) -> None:
+    assert len(set(plan.passwords.values())) == len(plan.passwords)
+    assert min(map(len, plan.passwords.values())) >= 32
+    assert not any(word in repr(plan) for word in plan.passwords.values())
+
+
+def test_the_user_dictionary_does_not_stay_on_disk(router: RouterLink, tmp_path: Path) -> None:
+    assert list(tmp_path.iterdir()) == []
+
+
+def heard_by(link: ZenohLink, seconds: float) -> set[tuple[str, bytes]]:
+    """All (tag, payload) that arrive until nothing new came for a while."""
+    found = set()
+    while (arrival := link.receive(seconds)) is not None:
+        found.add((arrival.tag, arrival.payload))
+    return found
+
+
+@pytest.mark.system
+def test_a_robot_hears_exactly_its_in_neighbours_on_every_pair(
+    router: RouterLink, plan: access.AccessPlan
+) -> None:
+    links = {robot: client(router, plan, access.agent_user(robot)) for robot in ROBOTS}
+    try:
+        for link in links.values():
+            for other in ROBOTS:
+                link.subscribe(keys.path(RUN, other), other)
+            link.subscribe(keys.leader_speed(RUN), "leader")
+        mouths = {robot: link.publisher(keys.path(RUN, robot)) for robot, link in links.items()}
+        leader = router.publisher(keys.leader_speed(RUN))
+        expected = {
+            robot: {(other, b"from " + other.encode()) for other in HEARS[robot]}
+            | ({("leader", b"v_r")} if robot == "r1" else set())
+            for robot in ROBOTS
+        }
+        found: dict[str, set[tuple[str, bytes]]] = {robot: set() for robot in ROBOTS}
+        deadline = time.monotonic() + 20.0
+        # Again and again until every allowed edge has carried something; each round gives a
+        # forbidden one the same chance.
+        while found != expected and time.monotonic() < deadline:
+            for robot, mouth in mouths.items():
+                mouth.put(b"from " + robot.encode())
+            leader.put(b"v_r")
+            for robot, link in links.items():
+                found[robot] |= heard_by(link, 0.05)
+            assert all(found[robot] <= expected[robot] for robot in ROBOTS)
+        assert found == expected
+    finally:
+        for link in links.values():
+            link.close()
+
+
+@pytest.mark.system
+def test_nobody_can_speak_under_another_robots_key(
+    router: RouterLink, plan: access.AccessPlan
+) -> None:
+    for robot in ROBOTS:
+        router.subscribe(keys.path(RUN, robot), f"path of {robot}")
+    router.subscribe(keys.leader_speed(RUN), "leader")
+    router.subscribe(keys.go(RUN), "go")
+    for impostor in ROBOTS:
+        router.subscribe(keys.report(RUN, f"agent/{impostor}"), f"report of {impostor}")
+        with client(router, plan, access.agent_user(impostor)) as link:
+            forged = [keys.path(RUN, r) for r in ROBOTS if r != impostor]
+            forged += [keys.pose(RUN, impostor), keys.leader_speed(RUN), keys.go(RUN)]
+            for key in forged:
+                link.publisher(key).put(b"forged")
+            own = link.publisher(keys.report(RUN, f"agent/{impostor}"))
+            honest = set()
+            deadline = time.monotonic() + 10.0
+            # One session keeps order: once its own key arrives, the forged ones would have.
+            while not honest and time.monotonic() < deadline:
+                own.put(b"honest")
+                honest = heard_by(router, 0.05)
+            assert honest == {(f"report of {impostor}", b"honest")}
+
+
+@pytest.mark.system
+def test_a_wrong_password_and_an_unknown_user_are_refused(
+    router: RouterLink, plan: access.AccessPlan
+) -> None:
+    for user, word in (("agent-r1", "wrong"), ("stranger", plan.passwords["agent-r1"])):
+        with pytest.raises(InfrastructureError, match=f"{user}: no session with the router"):
+            open_client(NetworkLink(RUN, router.endpoint, user, word), 1.0)
+
+
+@pytest.mark.system
+def test_a_port_in_use_is_named(
+    router: RouterLink, plan: access.AccessPlan, tmp_path: Path
+) -> None:
+    (tmp_path / "second").mkdir()
+    with (
+        pytest.raises(InfrastructureError, match="already in use") as caught,
+        open_router(router.endpoint, plan, tmp_path / "second"),
+    ):
+        pass
+    assert router.endpoint in str(caught.value)
+
+
+@pytest.mark.system
+def test_a_liveliness_token_comes_and_goes_with_its_session(
+    router: RouterLink, plan: access.AccessPlan
+) -> None:
+    router.watch_live(keys.live_all(RUN), "live")
+    with client(router, plan, access.PLANT) as link:
+        link.declare_live(keys.live(RUN, "plant"))
+        link.declare_live(keys.live(RUN, "recorder"))  # not its own
+        arrival = router.receive(5.0)
+        assert arrival is not None
+        assert (keys.process_of(arrival.key), arrival.payload) == ("plant", b"1")
+    arrival = router.receive(5.0)
+    assert arrival is not None
+    assert (keys.process_of(arrival.key), arrival.payload) == ("plant", b"0")
+    assert router.receive(0.1) is None
+
+
+def test_guests_keep_their_passwords_and_show_certificates_if_they_must() -> None:
+    plan = access.plan(RUN, ROBOTS, HEARS, ("r1",), guests={"agent-r2": "agreed"}, certified=True)
+    assert plan.passwords["agent-r2"] == "agreed"
+    assert len(plan.passwords["agent-r1"]) >= 32
+    subjects = {s["id"]: s for s in json.loads(plan.access_control())["subjects"]}
+    assert subjects["agent-r2"]["cert_common_names"] == ["agent-r2"]
+    assert "cert_common_names" not in subjects["agent-r1"]
+
+
+def test_the_pose_of_a_robot_that_is_not_emulated_is_the_localisation_systems_alone() -> None:
+    plan = access.plan(RUN, ROBOTS, HEARS, ("r1",), witnessed=["r3"])
+    pose = keys.pose(RUN, "r3")
+    speakers = [user for user, rights in plan.rights.items() if pose in rights.puts]
+    assert speakers == [access.LOCALISATION]
+    assert pose in plan.rights[access.PLANT].hears
+    assert keys.pose(RUN, "r1") in plan.rights[access.PLANT].puts
+    assert access.LOCALISATION not in access.plan(RUN, ROBOTS, HEARS, ("r1",)).rights
+
+
+def test_a_token_that_is_withdrawn_or_whose_session_ends_is_noticed(
+    router: RouterLink, plan: access.AccessPlan
+) -> None:
+    token = keys.live(RUN, access.LAUNCHER)
+    gone = threading.Event()
+    with client(router, plan, "agent-r1") as watcher:
+        router.declare_live(token)
+        watcher.on_gone(token, gone.set)
+        assert not gone.wait(0.1)
+        router.withdraw_live(token)
+        assert gone.wait(5.0)
+        gone.clear()
+        router.declare_live(token)
+        assert not gone.wait(0.1)
+        router.close()
+        assert gone.wait(5.0)

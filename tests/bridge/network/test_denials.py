@@ -1,0 +1,193 @@
+"""Refused logins and denied puts leave a line with whom and how often, from a router's own log."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from support.certificates import certificates
+
+from bridge.network.denials import MOST, Denials
+
+PROLOGUE = """
+import socket, sys, time
+from pathlib import Path
+from bridge.network import access
+from bridge.network import keys
+from bridge.network.zenoh_link import open_client, open_router
+from configs.brief import NetworkLink, Outside, TlsFiles
+from configs.errors import InfrastructureError
+
+folder = Path(sys.argv[1])
+with socket.socket() as probe:
+    probe.bind(("127.0.0.1", 0))
+    port = probe.getsockname()[1]
+
+def files(name):
+    return TlsFiles(*(str(folder / file) for file in ("ca.pem", f"{name}.pem", f"{name}.key")))
+
+plan = access.plan("t", ("r1", "r2"), {"r1": (), "r2": ()}, ("r1",), certified=sys.argv[2] == "tls",
+                   guests={"agent-r1": "one", "agent-r2": "two"})
+tls = sys.argv[2] == "tls"
+outside = Outside(f"{sys.argv[2]}/localhost:{port}", files("router") if tls else None)
+
+def login(user, word, certificate=None):
+    return open_client(NetworkLink("t", outside.endpoint, user, word,
+                                   files(certificate or user) if tls else None), 5.0)
+
+def denied(user, word, certificate=None):
+    try:
+        login(user, word, certificate).close()
+    except InfrastructureError:
+        pass
+
+def said_last(link):
+    time.sleep(0.1)  # the log's reader looks a little later
+    for note in link.denials.notes():
+        print(note)
+"""
+LOGINS = """
+with open_router(None, plan, folder, outside) as router:
+    denied("agent-r1", "wrong")
+    denied("a\\x1b[31mb", "wrong")
+    with login("agent-r2", "two"):
+        pass
+    said_last(router)
+    print(router.denials.logins_of("agent-r1"))
+"""
+PUTS = """
+with open_router(None, plan, folder, outside) as router:
+    router.subscribe(keys.path("t", "r1"), "own")
+    with login("agent-r1", "one") as link:
+        own, others = (link.publisher(keys.path("t", robot)) for robot in ("r1", "r2"))
+        for _ in range(7):
+            others.put(b"forged")
+        link._session.put("anything/at/all", b"forged")
+        link.subscribe(keys.path("t", "r2"), "secret")
+        while router.receive(0.05) is None:
+            own.put(b"honest")
+        own.put(b"honest")
+    said_last(router)
+"""
+CERTIFICATES = """
+with open_router(None, plan, folder, outside) as router:
+    router.subscribe(keys.path("t", "r2"), "path")
+    with login("agent-r2", "two", certificate="agent-r1") as link:
+        link.publisher(keys.path("t", "r2")).put(b"by r1")
+    denied("agent-r2", "two", certificate="stranger")
+    with login("agent-r2", "two") as link:
+        mouth = link.publisher(keys.path("t", "r2"))
+        while (heard := router.receive(0.05)) is None:
+            mouth.put(b"by r2")
+        assert heard.payload == b"by r2"
+    said_last(router)
+"""
+
+
+def notes(program: str, folder: Path, scheme: str, **env: str) -> tuple[list[str], str]:
+    """What a program of its own prints, whose log is its own: (standard output, error)."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROLOGUE + program, str(folder), scheme],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)} | env,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines(), done.stderr
+
+
+@pytest.mark.parametrize("asked", ["", "info", "zenoh=off"])
+def test_a_refused_login_leaves_who_from_where_why_and_how_often(
+    tmp_path: Path, asked: str
+) -> None:
+    said, _ = notes(LOGINS, tmp_path, "tcp", RUST_LOG=asked)
+    mine = "refused the login of 'agent-r1' from 127.0.0.1: wrong password (2 times)"
+    assert said == [
+        mine,
+        "refused the login of 'a\N{REPLACEMENT CHARACTER}[31mb' from 127.0.0.1: no identity of this"
+        " run (2 times)",
+        f"[{mine!r}]".replace("'refused", '"refused').replace(")']", ')"]'),
+    ]
+
+
+def test_a_denied_put_leaves_who_what_and_how_often_and_an_allowed_one_nothing(
+    tmp_path: Path,
+) -> None:
+    said, _ = notes(PUTS, tmp_path, "tcp")
+    *others, forged = sorted(said)
+    assert others == [
+        "denied to 'agent-r1' from 127.0.0.1: listening on fleetloop/t/robot/r2/path",
+        "denied to 'agent-r1' from 127.0.0.1: put on anything/at/all",
+    ]
+    # All seven, or fewer: once the client is told that nobody listens there it sends none.
+    assert re.fullmatch(
+        r"denied to 'agent-r1' from 127\.0\.0\.1: put on fleetloop/t/robot/r2/path \([2-7] times\)",
+        forged,
+    )
+
+
+def test_a_certificate_of_somebody_else_may_connect_and_nothing_more_and_both_are_named(
+    tmp_path: Path,
+) -> None:
+    certificates(tmp_path, ("router", "agent-r1", "agent-r2"))
+    certificates(tmp_path, ("stranger",), authority="other")
+    said, _ = notes(CERTIFICATES, tmp_path, "tls")
+    assert said[0] == (
+        "'agent-r2' from 127.0.0.1 came with the certificate of 'agent-r1': may neither say nor"
+        " hear anything"
+    )
+    assert "denied to 'agent-r2' from 127.0.0.1: put on fleetloop/t/robot/r2/path" in said
+    assert any(note.startswith("refused a connection over TLS: ") for note in said)
+
+
+def test_the_log_that_a_user_asks_for_goes_to_standard_error_without_what_is_ours(
+    tmp_path: Path,
+) -> None:
+    said, log = notes(LOGINS, tmp_path, "tcp", RUST_LOG="info")
+    assert len(said) == 3
+    assert "Zenoh can be reached at: tcp/" in log
+    assert "Establishment Accept" not in log
+
+
+def test_no_line_whatever_breaks_the_reader_and_what_it_keeps_is_bounded() -> None:
+    denials = Denials()
+    head = "2026-11-26T17:19:09.991607Z TRACE acc-0 ThreadId(05) "
+    accept = head + "zenoh_transport::unicast::establishment::accept: "
+    for junk in ("", "x", head, accept, f"{accept}Establishment Accept OpenSyn: a => tcp/b. Rec"):
+        denials.take(junk)
+    for n in range(3 * MOST):
+        user = f"u{n}".encode()
+        login = bytes((0x42, len(user) + 1, len(user))) + user
+        slices = ", ".join(f"{byte:02x}" for byte in login)
+        syn = f"Establishment Accept OpenSyn: tcp/a => tcp/h:{n}. Received: "
+        denials.take(f"{accept}{syn}ext_auth: Some(ZExtZBuf {{ slices: [[{slices}]] }})")
+        denials.take(f"{accept}UsrPwd extension - Recv OpenSyn. Invalid user. at x.rs:1.")
+    assert "refused the login of 'u7' from h: no identity of this run" in denials.notes()
+    assert len(denials.notes()) == MOST + 1
+    assert denials.notes()[-1] == f"refused much else ({2 * MOST} times)"
+    assert denials.news() and not denials.news()
+
+
+FLOODS = """
+with open_router(None, plan, folder, outside) as router:
+    with login("agent-r1", "one"):
+        time.sleep(0.1)
+    router.denials.note_flood("agent-r1", "127.0.0.1:1")
+    with login("agent-r1", "one") as again, login("agent-r2", "two") as other:
+        for robot in ("r1", "r2"):
+            router.subscribe(keys.path("t", robot), robot)
+        time.sleep(0.1)  # the log's reader looks a little later
+        again.publisher(keys.path("t", "r1")).put(b"flood")
+        other.publisher(keys.path("t", "r2")).put(b"honest")
+        print(router.receive(5.0).tag, router.receive(0.3))
+    said_last(router)
+"""
+
+
+def test_who_was_cut_off_for_a_flood_is_turned_away_when_he_comes_again(tmp_path) -> None:
+    (heard, *lines), _ = notes(FLOODS, tmp_path, "tcp")
+    assert heard == "r2 None"
+    assert "turned away 'agent-r1' from 127.0.0.1: it was cut off before" in lines

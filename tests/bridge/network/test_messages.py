@@ -1,0 +1,148 @@
+"""Messages: there and back, and bounded decoding of anything at all."""
+
+from math import inf, nan
+
+import msgpack
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.network.messages import (
+    MAX_BYTES,
+    MAX_NOTICE,
+    Go,
+    LeaderSpeed,
+    Notice,
+    PathState,
+    PoseFix,
+    Progress,
+    Report,
+    Rows,
+)
+
+ints = st.integers(-(2**62), 2**62)
+floats = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@given(st.builds(PathState, ints, ints, floats, floats))
+def test_a_path_state_survives_the_wire(state: PathState) -> None:
+    assert PathState.decode(state.encode()) == state
+
+
+@given(st.builds(PoseFix, ints, ints, floats, floats, floats))
+def test_a_pose_survives_the_wire(fix: PoseFix) -> None:
+    assert PoseFix.decode(fix.encode()) == fix
+
+
+@given(st.lists(st.tuples(ints, floats), min_size=1, max_size=5).map(sorted))
+def test_a_leader_speed_survives_the_wire(steps: list[tuple[int, float]]) -> None:
+    speed = LeaderSpeed(tuple(steps))
+    assert LeaderSpeed.decode(speed.encode()) == speed
+
+
+@given(st.integers(0, 2**40), st.integers(0, 20), st.booleans())
+def test_rows_survive_the_wire(first: int, length: int, final: bool) -> None:
+    rows = Rows(first, length, bytes(24 * length), final)
+    assert Rows.decode(rows.encode(), 24) == rows
+    assert (Rows.decode(rows.encode(), 16) is None) == (length > 0)
+
+
+@given(st.builds(Progress, ints, ints, ints))
+def test_progress_survives_the_wire(progress: Progress) -> None:
+    assert Progress.decode(progress.encode()) == progress
+
+
+def test_a_report_and_a_go_survive_the_wire() -> None:
+    report = Report({"ticks": 3, "stopped": "because", "share": 0.5})
+    assert Report.decode(report.encode()) == report
+    assert Go.decode(Go(5, 400).encode()) == Go(5, 400)
+
+
+def test_a_path_state_is_a_msgpack_array_that_begins_with_its_version() -> None:
+    assert msgpack.unpackb(PathState(7, 7_000_000, 0.5, 0.6).encode()) == [
+        1,
+        7,
+        7_000_000,
+        0.5,
+        0.6,
+    ]
+
+
+DECODERS = [
+    PathState.decode,
+    PoseFix.decode,
+    LeaderSpeed.decode,
+    lambda payload: Rows.decode(payload, 24),
+    Progress.decode,
+    Report.decode,
+    Go.decode,
+]
+
+
+@pytest.mark.parametrize("decode", DECODERS)
+@given(st.binary(max_size=200))
+def test_no_bytes_raise(decode, payload: bytes) -> None:
+    decode(payload)
+
+
+junk = st.recursive(
+    st.none() | st.booleans() | ints | st.floats() | st.text(max_size=5) | st.binary(max_size=5),
+    lambda inner: st.lists(inner, max_size=6) | st.dictionaries(st.text(max_size=3), inner),
+    max_leaves=12,
+)
+
+
+@pytest.mark.parametrize("decode", DECODERS)
+@given(junk)
+def test_no_well_formed_msgpack_raises(decode, value) -> None:
+    decode(msgpack.packb(value))
+    decode(msgpack.packb([1, value, value, value, value]))
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        [2, 0, 0, 0.0, 0.0],  # another version
+        [1, 0, 0, 0.0],  # too short
+        [1, 0, 0, 0.0, 0.0, 0.0],  # too long
+        [1, 0, 0, nan, 0.0],
+        [1, 0, 0, 0.0, inf],
+        [1, 0, 0.5, 0.0, 0.0],  # a float where an int belongs
+        [1, True, 0, 0.0, 0.0],
+        [1, 0, 0, 1, 0.0],
+        [1, 0, 0, "0.0", 0.0],
+    ],
+)
+def test_a_path_state_that_is_not_exactly_one_is_none(fields) -> None:
+    assert PathState.decode(msgpack.packb(fields)) is None
+
+
+def test_what_is_too_long_is_not_even_looked_at() -> None:
+    assert Report.decode(msgpack.packb([1, {"x": "y" * MAX_BYTES}])) is None
+
+
+def test_the_leader_speed_holds_from_each_step_on_and_before_the_first() -> None:
+    speed = LeaderSpeed(((0, 0.6), (10, 0.4), (20, 0.5)))
+    assert [speed.at(t) for t in (-5, 0, 9, 10, 19, 20, 99)] == [
+        0.6,
+        0.6,
+        0.6,
+        0.4,
+        0.4,
+        0.5,
+        0.5,
+    ]
+
+
+def test_steps_out_of_order_are_no_leader_speed() -> None:
+    assert LeaderSpeed.decode(msgpack.packb([1, [[10, 0.4], [0, 0.6]]])) is None
+
+
+@given(st.text(max_size=600))
+def test_a_notice_is_one_line_that_a_terminal_can_show(text: str) -> None:
+    notice = Notice.decode(Notice(text).encode())
+    assert notice is not None
+    assert notice.text.isprintable()
+    assert len(notice.text) == min(len(text), MAX_NOTICE)
+    assert Notice.decode(msgpack.packb([1, "x" * (MAX_NOTICE + 1)])) is None
+    assert Notice.decode(msgpack.packb([1, 7])) is None

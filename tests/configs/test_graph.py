@@ -1,0 +1,94 @@
+"""Directed graphs: arrows along the flow of information, the two graph conditions, generators."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from configs.graph import Graph, generated, parse_edge, random_rooted
+
+FOUR = ("r1", "r2", "r3", "r4")
+
+
+def test_an_edge_says_who_is_heard_by_whom() -> None:
+    graph = Graph.of(("r1", "r2"), [("r1", "r2")], ("r1",))
+    assert graph.hears == {"r1": (), "r2": ("r1",)}
+    assert graph.adjacency().tolist() == [[0, 0], [1, 0]]
+    assert graph.laplacian().tolist() == [[0, 0], [-1, 1]]
+    assert graph.leader_links().tolist() == [[1, 0], [0, 0]]
+
+
+@pytest.mark.parametrize("text", ["r1 > r2", "r1 ->", "-> r2", "r1 r2", ""])
+def test_what_is_no_edge_is_none(text: str) -> None:
+    assert parse_edge(text) is None
+
+
+def test_an_edge_is_read_with_any_spaces() -> None:
+    assert parse_edge(" r1->r2 ") == ("r1", "r2")
+
+
+@pytest.mark.parametrize(
+    ("kind", "edges"),
+    [
+        ("chain", {("r1", "r2"), ("r2", "r3"), ("r3", "r4")}),
+        ("ring", {("r1", "r2"), ("r2", "r3"), ("r3", "r4"), ("r4", "r1")}),
+        ("tree", {("r1", "r2"), ("r1", "r3"), ("r2", "r4")}),
+        ("star", {("r1", "r2"), ("r1", "r3"), ("r1", "r4")}),
+        ("complete", {(a, b) for a in FOUR for b in FOUR if a != b}),
+    ],
+)
+def test_generators_make_the_named_shapes(kind: str, edges: set[tuple[str, str]]) -> None:
+    assert set(generated(kind, FOUR)) == edges
+
+
+def test_a_root_reaches_all_others_along_the_flow_of_information() -> None:
+    fork = Graph.of(("r1", "r2", "r3"), [("r2", "r1"), ("r3", "r1")], ("r1",))
+    assert fork.roots() == ()  # the paper's wording would call r1 one
+    assert Graph.of(FOUR, generated("chain", FOUR), ("r1",)).roots() == ("r1",)
+    assert Graph.of(FOUR, generated("ring", FOUR), ("r1",)).roots() == FOUR
+
+
+graphs = st.integers(2, 7).flatmap(
+    lambda n: st.tuples(
+        st.just(n),
+        st.sets(st.tuples(st.integers(0, n - 1), st.integers(0, n - 1)), max_size=2 * n),
+        st.sets(st.integers(0, n - 1), max_size=n),
+    )
+)
+
+
+@given(graphs)
+def test_the_leader_reaches_everybody_iff_l_plus_h_is_nonsingular(drawn) -> None:
+    n, edges, leader = drawn
+    names = [f"r{k}" for k in range(n)]
+    graph = Graph.of(
+        names,
+        [(names[a], names[b]) for a, b in edges if a != b],
+        [names[k] for k in sorted(leader)],
+    )
+    smallest = np.linalg.svd(graph.laplacian() + graph.leader_links(), compute_uv=False)[-1]
+    assert (graph.unreached_from(graph.leader) == ()) == (smallest > 1e-9)
+
+
+@given(graphs)
+def test_the_graph_is_rooted_iff_the_laplacian_has_a_simple_zero(drawn) -> None:
+    n, edges, _ = drawn
+    names = [f"r{k}" for k in range(n)]
+    graph = Graph.of(names, [(names[a], names[b]) for a, b in edges if a != b], ())
+    assert bool(graph.roots()) == (np.linalg.matrix_rank(graph.laplacian(), tol=1e-9) == n - 1)
+
+
+@given(n=st.integers(1, 20), degree=st.integers(1, 5), seed=st.integers(0, 1000))
+def test_random_graphs_are_rooted_bounded_and_reproducible(n: int, degree: int, seed: int) -> None:
+    names = [f"r{k}" for k in range(n)]
+    edges = random_rooted(names, max_in_degree=degree, seed=seed)
+    graph = Graph.of(names, edges, names[:1])
+    assert graph.unreached_from(names[:1]) == ()
+    assert graph.max_in_degree <= degree
+    assert len(set(edges)) == len(edges)
+    assert edges == random_rooted(names, max_in_degree=degree, seed=seed)
+
+
+def test_graphml_carries_a_graph_there_and_back() -> None:
+    graph = Graph.of(FOUR, generated("tree", FOUR), ("r1", "r3"))
+    assert Graph.from_graphml(graph.to_graphml()) == graph

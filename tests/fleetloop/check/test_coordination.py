@@ -1,0 +1,85 @@
+"""Coordination forecast and sampled map, against known numbers and the controllers themselves."""
+
+from math import inf, isclose
+
+import numpy as np
+import pytest
+
+from agents.coordination import CoordinationState, Coordinator
+from agents.neighbours import Neighbours
+from configs.brief import NetworkLink
+from configs.graph import Graph, generated
+from configs.loading import load
+from configs.resolve import agent_brief
+from configs.scenario import Scenario
+from fleetloop.check.coordination import delay_margin_s, forecast, radii
+
+NOWHERE = NetworkLink("none", "", "", "")
+
+
+def shape(kind: str, n: int) -> Graph:
+    names = [f"r{k}" for k in range(n)]
+    return Graph.of(names, generated(kind, names), names[:1])
+
+
+def driven(scenario: Scenario, ticks: int) -> np.ndarray:
+    """(ticks, robots): the path variables of the controllers' own objects."""
+    h, graph = scenario.clock.control_period_s, scenario.topology
+    every = round(scenario.clock.share_period_s / h)
+    briefs = [agent_brief(scenario, r, network=NOWHERE, bus=()) for r in graph.robots]
+    ears = {b.robot: Neighbours(b.hears, b.coordination, h) for b in briefs}
+    minds = {b.robot: Coordinator(b.coordination, h, b.hears_leader) for b in briefs}
+    states = {
+        b.robot: CoordinationState(b.coordination.v_hat_0, b.coordination.mu_0, b.coordination.s_0)
+        for b in briefs
+    }
+    rows = []
+    for tick in range(ticks):
+        now_ns = round(tick * h * 1e9)
+        if tick % every == 0:
+            for speaker, hearer in graph.edges:
+                ears[hearer].hear(speaker, now_ns, states[speaker].s, states[speaker].v_hat)
+        rows.append([states[robot].s for robot in graph.robots])
+        speed = scenario.leader.speed_m_s
+        states = {r: minds[r].advance(states[r], *ears[r].sums(now_ns), speed) for r in states}
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("share_s", [0.02, 0.5, 3.0])
+def test_the_forecast_is_what_the_controllers_will_do(share_s: float) -> None:
+    scenario = load(
+        "paper_extra",
+        (
+            f"clock.share_period_s={share_s}",
+            "coordination.silence_limit_s=4.0",
+            "duration_s=12.0",
+            "expect=[]",
+        ),
+    )
+    ahead = forecast(scenario)
+    rows = driven(scenario, 12_000)
+    ours = np.stack([np.interp(np.arange(12_000) * 1e-3, ahead.t_s, s) for s in ahead.s.T], axis=1)
+    assert np.abs(ours - rows).max() < 2e-3
+
+
+@pytest.mark.parametrize(("robots", "margin_s"), [(5, 2.36), (11, 1.02), (21, 0.63)])
+def test_complete_graphs_have_the_delay_margin_of_the_frequency_sweep(
+    robots: int, margin_s: float
+) -> None:
+    assert isclose(delay_margin_s(shape("complete", robots), 2.0, 1.0), margin_s, rel_tol=0.03)
+
+
+def test_a_chain_stands_any_delay() -> None:
+    assert delay_margin_s(shape("chain", 6), 2.0, 1.0) == inf
+
+
+def test_a_robot_alone_with_its_leader_has_the_radius_of_a_first_order_lag() -> None:
+    speeds, places = radii(shape("chain", 1), 2.0, 1.0, 0.5, 2.0)
+    assert isclose(speeds, np.exp(-0.5))
+    assert isclose(places, np.exp(-1.0))  # μ alone: exp(−p T)
+
+
+@pytest.mark.parametrize("period_s", [0.02, 0.6, 1.5, 3.0])
+def test_rings_converge_however_slowly_they_share(period_s: float) -> None:
+    for robots in (2, 3, 4, 6):
+        assert max(radii(shape("ring", robots), 2.0, 1.0, period_s, 4.0)) < 1.0

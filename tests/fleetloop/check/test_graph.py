@@ -1,0 +1,101 @@
+"""Checks before a run, against what is known in closed form."""
+
+import pytest
+
+from configs.graph import Graph, generated
+from configs.loading import load
+from fleetloop.check.coordination import forecast
+from fleetloop.check.finding import Finding
+from fleetloop.check.graph import delay_class, graph_findings, synchronisation
+
+
+def complete(n: int) -> Graph:
+    names = [f"r{k}" for k in range(n)]
+    return Graph.of(names, generated("complete", names), names[:1])
+
+
+def circulant(n: int, predecessors: int) -> Graph:
+    names = [f"r{k}" for k in range(n)]
+    edges = [(names[(k - d) % n], names[k]) for k in range(n) for d in range(1, predecessors + 1)]
+    return Graph.of(names, edges, names[:1])
+
+
+def test_a_ring_of_three_needs_exactly_one_half() -> None:
+    # Eigenvalues 1 − exp(±2πi/3) = 3/2 ∓ i √3/2, so Im²/Re = (3/4)/(3/2).
+    finding = synchronisation(circulant(3, 1), p=1.0, q=1.0)
+    assert finding.level == "ok"
+    assert "1 > 0.5" in finding.text
+    assert synchronisation(circulant(3, 1), p=0.7, q=1.0).level == "error"
+
+
+def test_the_papers_gains_fail_on_twenty_robots_that_hear_their_three_predecessors() -> None:
+    finding = synchronisation(circulant(20, 3), p=2.0, q=1.0)
+    assert finding.level == "error"
+    assert "4.46" in finding.text
+
+
+def test_in_degree_decides_how_much_delay_is_stood() -> None:
+    assert "any switching" in delay_class(circulant(4, 1), p=2.0, q=1.0).text
+    assert "any delay" in delay_class(circulant(4, 2), p=2.0, q=1.0).text
+    assert "< 2" in delay_class(circulant(5, 3), p=2.0, q=1.0).text
+
+
+def text_of(title: str, *overrides: str) -> Finding:
+    scenario = load("paper", overrides)
+    found = graph_findings(scenario, forecast(scenario))
+    return next(finding for finding in found if finding.title.startswith(title))
+
+
+def test_a_dense_graph_has_a_delay_limit_and_it_is_a_number() -> None:
+    finding = delay_class(complete(5), p=2.0, q=1.0)
+    assert "up to 2.36 s of delay" in finding.text
+
+
+@pytest.mark.parametrize(
+    "change", ["leader.speed_m_s=-0.4", "leader.steps=[{t_s=3.0, speed_m_s=-0.1}]"]
+)
+def test_a_leader_that_goes_backwards_is_an_error_with_its_key(change: str) -> None:
+    finding = text_of("ṡ > 0", change)
+    assert finding.level == "error"
+    assert finding.key in ("leader.speed_m_s", "leader.steps.0.speed_m_s")
+    assert "must be positive" in finding.text
+
+
+def test_a_leader_that_stops_on_the_way_is_only_warned_of() -> None:
+    assert text_of("ṡ > 0", "leader.steps=[{t_s=9.0, speed_m_s=0.0}]").level == "warning"
+
+
+def test_path_variables_that_have_not_agreed_at_the_end_are_warned_of() -> None:
+    assert "within 0.05 m after 13.2 s" in text_of("max s_i").text
+    early = text_of("max s_i", "duration_s=8.0", "expect=[]")
+    assert (early.level, early.key) == ("warning", "coordination.v_hat_0")
+    assert (
+        text_of("max s_i", "duration_s=8.0", "expect=[]", "coordination.v_hat_0=0.6").level == "ok"
+    )
+
+
+def test_path_variables_that_agree_only_at_the_last_moment_are_warned_of() -> None:
+    assert text_of("max s_i", "duration_s=15.0", "expect=[]").level == "warning"
+    assert text_of("max s_i", "duration_s=19.0", "expect=[]").level == "ok"
+
+
+def test_speed_estimates_that_rise_together_but_late_are_warned_of() -> None:
+    # All of four hear each other, one the leader: min eig(L + H) = 0.21, so 4.8 s ln(0.6/0.05).
+    late = "graph.edges=%r" % [f"r{i} -> r{j}" for i in range(1, 5) for j in range(1, 5) if i != j]
+    assert text_of("max s_i", late, "duration_s=14.0", "expect=[]").level == "ok"
+    finding = text_of("max |v̂_i − v_r|", late, "duration_s=14.0", "expect=[]")
+    assert (finding.level, finding.key) == ("warning", "coordination.v_hat_0")
+    assert "within 0.05 m/s after 12.5 s" in finding.text
+    assert text_of("max |v̂_i − v_r|", late, "duration_s=20.0", "expect=[]").level == "ok"
+
+
+def test_who_starts_ahead_goes_back_to_meet_the_others() -> None:
+    finding = text_of("ṡ > 0: path variables", "robot.r4.s_0=2.0")
+    assert (finding.robots, finding.key) == (("r4",), "robot.r4.s_0")
+
+
+def test_sharing_beyond_the_age_limit_is_warned_of_and_unstable_sharing_an_error() -> None:
+    slow = "clock.share_period_s=3.0", "coordination.silence_limit_s=4.0"
+    assert text_of("shared every 3 s", *slow).level == "warning"
+    ring = "graph={generator='ring'}", "coordination.p=0.5", "clock.share_period_s=1.5"
+    assert text_of("shared every 1.5 s", *ring).level == "error"

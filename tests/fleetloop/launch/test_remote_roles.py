@@ -1,0 +1,52 @@
+"""What the launcher makes of roles that somebody else started."""
+
+from bridge.network.messages import Report
+from fleetloop.launch.child import CRASHED, GAVE_UP
+from fleetloop.launch.remote_roles import GRACE_S, Elsewhere
+
+R2 = "agent/r2"
+
+
+def test_who_has_not_come_is_absent() -> None:
+    far = Elsewhere([R2, "agent/r3"])
+    far.note_token(R2, 0.0, there=True)
+    far.note_token("plant", 0.0, there=True)
+    assert far.absent() == ["agent/r3"]
+    assert not far.ended()
+
+
+def test_without_roles_elsewhere_nobody_is_missed() -> None:
+    nobody = Elsewhere([])
+    assert nobody.ended()
+    assert nobody.absent() == []
+    assert nobody.failure(1e9) is None
+
+
+def test_a_report_is_an_end_and_its_failure_the_runs() -> None:
+    far = Elsewhere([R2])
+    far.note_token(R2, 0.0, there=True)
+    far.note_report(R2, Report({"failure": "", "ticks": 5}))
+    assert far.ended()
+    assert far.failure(1.0) is None
+    far.note_report(R2, Report({"failure": "r2: lost its bus"}))
+    failure = far.failure(1.0)
+    assert (failure.rank, failure.name, failure.text) == (GAVE_UP, R2, "r2: lost its bus")
+
+
+def test_a_token_that_goes_without_a_report_is_a_loss_after_a_grace() -> None:
+    far = Elsewhere([R2])
+    far.note_token(R2, 0.0, there=True)
+    far.note_token(R2, 1.0, there=False)
+    assert far.failure(1.0 + 0.9 * GRACE_S) is None
+    failure = far.failure(1.0 + 1.1 * GRACE_S)
+    assert failure.rank == CRASHED
+    assert failure.text.startswith("agent/r2: lost")
+
+
+def test_a_token_that_comes_back_is_no_loss() -> None:
+    far = Elsewhere([R2])
+    far.note_token(R2, 0.0, there=True)
+    far.note_token(R2, 1.0, there=False)
+    far.note_token(R2, 1.2, there=True)
+    assert far.failure(9.0) is None
+    assert not far.ended()

@@ -1,0 +1,90 @@
+"""The recorder's judgement of what it hears; its process is tested with whole runs."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridge.network.link import Arrival
+from bridge.network.messages import Rows
+from bridge.telemetry import AGENT_ROW, PLANT_ROW
+from configs.brief import NetworkLink, RecorderBrief
+from fleetloop.record.reader import Record
+from fleetloop.record.recorder import _Recorder
+from fleetloop.record.run_record import RunRecord
+
+
+def rows(tag: str, first: int, count: int, *, final: bool = False) -> Arrival:
+    size = PLANT_ROW.size if tag.startswith("plant") else AGENT_ROW.size
+    block = np.full((count, size // 8), 1.5).tobytes()
+    return Arrival(tag, "", Rows(first, count, block, final).encode())
+
+
+def record(path: Path, *arrivals: Arrival) -> tuple[_Recorder, Record]:
+    """What comes of these messages."""
+    network = NetworkLink("x", "", "", "")
+    brief = RecorderBrief(
+        str(path), ("r1", "r2"), (), (), "", 1_000_000, 1.0, 0.1, network, "", 300, 0
+    )
+    with RunRecord(path, brief.robots, "", brief.period_ns) as file:
+        recorder = _Recorder(brief, file)
+        for arrival in arrivals:
+            recorder.take(arrival)
+    return recorder, Record.open(path)
+
+
+SOURCES = [f"{kind}/{robot}" for robot in ("r1", "r2") for kind in ("plant", "controller")]
+
+
+def whole(*sources: str) -> list[Arrival]:
+    """All 300 rows of these sources."""
+    blocks = ((0, 128, False), (128, 128, False), (256, 44, True))
+    return [rows(source, *block[:2], final=block[2]) for source in sources for block in blocks]
+
+
+def test_a_run_whose_sources_all_said_their_last_is_whole(tmp_path: Path) -> None:
+    recorder, found = record(tmp_path / "a.mcap", *whole(*SOURCES))
+    assert not recorder.unfinished
+    assert not recorder.refusals.lines()
+    assert all(len(r) == 300 for r in (*found.plant.values(), *found.controller.values()))
+
+
+@pytest.mark.parametrize("wrong", [0, 99, -1])
+def test_rows_that_come_twice_are_refused_and_the_right_ones_taken(
+    tmp_path: Path, wrong: int
+) -> None:
+    recorder, found = record(
+        tmp_path / "a.mcap",
+        rows("controller/r1", 0, 100),
+        rows("controller/r1", wrong, 100),
+        rows("controller/r1", 100, 100),
+        rows("controller/r1", 200, 100, final=True),
+        *whole("plant/r1", "plant/r2", "controller/r2"),
+    )
+    assert not recorder.unfinished
+    assert recorder.refusals.lines() == [
+        f"refused 1 row block of r1's controller: begins at tick {wrong}, expected 100"
+    ]
+    assert len(found.controller["r1"]) == len(found.controller["r2"]) == 300
+
+
+def test_a_gap_costs_its_source_the_rest_and_nobody_else(tmp_path: Path) -> None:
+    recorder, found = record(
+        tmp_path / "a.mcap",
+        rows("controller/r1", 0, 100),
+        rows("controller/r1", 101, 100),
+        rows("controller/r1", 201, 99, final=True),
+        *whole("plant/r1", "plant/r2", "controller/r2"),
+    )
+    assert not recorder.unfinished
+    assert "begins at tick 101, expected 100" in recorder.refusals.lines()[0]
+    assert len(found.controller["r1"]) == 100
+    assert len(found.plant["r1"]) == len(found.controller["r2"]) == 300
+
+
+def test_what_is_no_rows_is_counted(tmp_path: Path) -> None:
+    short = Rows(0, 2, bytes(8), final=False).encode()
+    junk = (Arrival("plant/r1", "", b"x"), Arrival("plant/r1", "", short))
+    recorder, found = record(tmp_path / "a.mcap", *junk, *whole(*SOURCES))
+    assert recorder.undecodable == 2
+    assert len(found.plant["r1"]) == 300

@@ -1,0 +1,72 @@
+"""An emulated axis, and the few words that tests say to it."""
+
+from dataclasses import replace
+
+from bridge.drives.feeling import Feeling
+from bridge.drives.odrive import frames as f
+from bridge.drives.odrive.frames import AxisState, Command
+from bridge.drives.odrive.local_axis import OdriveNode
+from bridge.frame import Frame
+from configs.brief import DriveModel
+
+MS = 1_000_000
+NODE = 3
+MODEL = DriveModel(
+    protocol="odrive",
+    torque_constant_N_m_A=0.05,
+    current_limit_A=10.0,
+    velocity_limit_rev_s=10.0,
+    velocity_gain_N_m_s_rev=1 / 6,
+    overspeed_ratio=1.2,
+    torque_limiters=True,
+    heartbeat_period_ns=100 * MS,
+    encoder_period_ns=1 * MS,
+    torques_period_ns=0,
+    watchdog_ns=100 * MS,
+    zero_torque_on_disarm=False,
+    serial_number=0xABCDEF,
+)
+HEALTHY = Feeling(
+    torque_N_m=0.0, current_A=0.0, fet_C=30.0, motor_C=float("nan"), bus_V=24.0, bus_A=0.0
+)
+
+
+def axis(**changes) -> OdriveNode:
+    return OdriveNode(replace(MODEL, **changes), NODE, MODEL.serial_number)
+
+
+def tell(node: OdriveNode, command: Command, data: bytes = b"", now_ns: int = 0) -> list[Frame]:
+    return list(node.hear(Frame(f.identifier(node.node_id, command), data), now_ns))
+
+
+def ask_state(node: OdriveNode, state: int, now_ns: int = 0) -> None:
+    tell(node, Command.SET_AXIS_STATE, f.ONE_U32.pack(state), now_ns)
+
+
+def arm(node: OdriveNode, now_ns: int = 0) -> OdriveNode:
+    ask_state(node, AxisState.CLOSED_LOOP_CONTROL, now_ns)
+    assert node.state is AxisState.CLOSED_LOOP_CONTROL
+    return node
+
+
+def torque(node: OdriveNode, value: float, now_ns: int = 0) -> None:
+    tell(node, Command.SET_INPUT_TORQUE, f.ONE_FLOAT.pack(value), now_ns)
+
+
+def floats(node: OdriveNode, command: Command, *values: float, now_ns: int = 0) -> None:
+    data = b"".join(f.ONE_FLOAT.pack(value) for value in values)
+    tell(node, command, data, now_ns)
+
+
+def modes(node: OdriveNode, control: int, inputs: int = 1) -> None:
+    tell(node, Command.SET_CONTROLLER_MODE, f.TWO_U32.pack(control, inputs))
+
+
+def beat(node: OdriveNode, now_ns: int = 0) -> f.Heartbeat:
+    (frame,) = node.hear(f.request(node.node_id, Command.HEARTBEAT), now_ns)
+    return f.decode_heartbeat(frame.data)
+
+
+def asked(node: OdriveNode, command: Command, now_ns: int = 0) -> tuple[float, float]:
+    (frame,) = node.hear(f.request(node.node_id, command), now_ns)
+    return f.decode_floats(frame.data)

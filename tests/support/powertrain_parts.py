@@ -1,0 +1,43 @@
+"""Models with the defaults of a scenario, for the tests of motor, encoder and supply."""
+
+from dataclasses import replace
+from random import Random
+from typing import Any
+
+from configs.brief import EncoderModel, MotorModel, NetworkLink, PowertrainModel, SupplyModel
+from configs.loading import load
+from configs.resolve import plant_brief
+from plant.encoder import Encoder
+from plant.motor import Motor
+from plant.supply import Supply
+
+INERTIA = 6e-3  # kg m²
+
+
+def _defaults() -> PowertrainModel:
+    scenario = load("two_robots", ("drive.preset='realistic'",))
+    model = plant_brief(scenario, network=NetworkLink("t", "", "", "")).robots[0].powertrain
+    assert model is not None
+    return model
+
+
+MODEL = _defaults()
+
+
+def motor_model(**changes: Any) -> MotorModel:
+    return replace(MODEL.motor, **changes)
+
+
+def motor(seed: int = 1, supply: Supply | None = None, **changes: Any) -> Motor:
+    source = supply or Supply(MODEL.supply)
+    return Motor(motor_model(**changes), INERTIA, source, Random(seed))
+
+
+def encoder(seed: int = 1, **changes: Any) -> Encoder:
+    model: EncoderModel = replace(MODEL.encoder, **changes)
+    return Encoder(model, Random(seed))
+
+
+def supply(**changes: Any) -> Supply:
+    model: SupplyModel = replace(MODEL.supply, **changes)
+    return Supply(model)
