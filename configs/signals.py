@@ -55,11 +55,11 @@ LAW_SIGNALS: tuple[Signal, ...] = (
 
 AGENT_SIGNALS: tuple[Signal, ...] = (
     Signal("t_s", "s", "scenario time of the tick"),
-    Signal("x_hat_m", "m", "position that the controller used"),
-    Signal("y_hat_m", "m", "position that the controller used"),
-    Signal("theta_hat_rad", "rad", "heading that the controller used"),
-    Signal("v_hat_m_s", "m/s", "forward speed that the controller used"),
-    Signal("omega_hat_rad_s", "rad/s", "turn rate that the controller used"),
+    Signal("x_used_m", "m", "position that the controller used"),
+    Signal("y_used_m", "m", "position that the controller used"),
+    Signal("theta_used_rad", "rad", "heading that the controller used"),
+    Signal("v_used_m_s", "m/s", "forward speed that the controller used"),
+    Signal("omega_used_rad_s", "rad/s", "turn rate that the controller used"),
     Signal("s", "m", "path variable"),
     Signal("s_dot", "m/s", "its rate, mu + v_r_hat"),
     Signal("mu", "m/s", "coordination state of (40)"),

@@ -94,7 +94,7 @@ def test_a_row_holds_what_was_used_and_commanded() -> None:
     bench.agent._rows.finish()
     (row,) = (dict(zip(COLUMNS, values, strict=True)) for values in bench.rows)
     assert row["t_s"] == 0.0
-    assert (row["x_hat_m"], row["y_hat_m"]) == (1.95, 0.05)
+    assert (row["x_used_m"], row["y_used_m"]) == (1.95, 0.05)
     assert (row["s"], row["s_dot"], row["v_r_hat"], row["neighbours"]) == (0.0, 0.6, 0.6, 1.0)
     assert (row["x_d_m"], row["y_d_m"]) == pytest.approx((2.0, 0.0))
     assert row["tau_right_N_m"] == bench.axes[0].torque_demand(0.0)
