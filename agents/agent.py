@@ -82,7 +82,7 @@ class Agent:
         self._states: dict[int, dict[str, PathState]] = {}  # by tick, until due
         self._unheard = set(brief.hears)
         self._at_once = brief.schedule.realtime
-        self._encoders = EncoderCheck(brief.host.encoder_mismatch_limit_rad, self._h)
+        self._encoders = EncoderCheck(brief.host.encoder_mismatch_limit_wheel_rad, self._h)
         fused = brief.localisation == "fused"
         self._pose_mismatch_m = brief.host.pose_mismatch_limit_m if fused else inf
         self.last_tick = brief.schedule.ticks

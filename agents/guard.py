@@ -83,7 +83,7 @@ class Guard:
         self._bus_time_ns = schedule.bus_time_ns
         self._when = schedule.when
         self._limiter = TorqueLimiter(
-            host.torque_limit_N_m, host.torque_slew_limit_N_m_s, schedule.period_s
+            host.torque_limit_wheel_N_m, host.torque_slew_limit_wheel_N_m_s, schedule.period_s
         )
         self._pose_age_ticks = -(-host.pose_age_limit_ns // schedule.period_ns)
         self._pose_until = self._pose_age_ticks if host.pose_age_limit_ns else schedule.ticks

@@ -67,7 +67,7 @@ def adaptive_dsc_robust(gains: Gains, wheels: Wheels, period_s: float) -> Law:
 
         v̄ = −V tanh(k_1 x_e / V) + v̄_d ṡ cos θ_e           bounded approach speed    (15)
         θ̄ = −atan(k_2 y_e / (1 + k_2 |x_e|))                 no spinning far off       (17)
-        |τ| ≤ `torque_limit_N_m`; Θ̂ and κ̂ hold still while a wheel is at it           (34)
+        |τ| ≤ `torque_limit_wheel_N_m`; Θ̂ and κ̂ hold still while a wheel is at it           (34)
         Θ̂_r' divided by 1 + h |K_5 F_r²| / (k_4/4)           stable when sampled       (35)
     """
     return _dsc(gains, wheels, period_s, robust=True)
@@ -84,7 +84,7 @@ def _dsc(gains: Gains, wheels: Wheels, period_s: float, *, robust: bool) -> Law:
     keep = exp(-gains.eta * gains.rho * period_s)
     gain = (1.0 - keep) / gains.rho
     width = gains.sgn_width
-    v_limit, tau_limit = gains.v_bar_limit_m_s, gains.torque_limit_N_m
+    v_limit, tau_limit = gains.v_bar_limit_m_s, gains.torque_limit_wheel_N_m
     radius, half_track = wheels.radius_m, wheels.half_track_m
     t = gains.theta_hat_0
 

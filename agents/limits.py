@@ -22,11 +22,11 @@ class TorqueLimiter:
 
     __slots__ = ("_last", "_limit", "_step", "active")
 
-    def __init__(self, limit_N_m: float, slew_N_m_s: float, period_s: float) -> None:
-        self._limit = limit_N_m
-        self._step = slew_N_m_s * period_s
+    def __init__(self, limit_wheel_N_m: float, slew_wheel_N_m_s: float, period_s: float) -> None:
+        self._limit = limit_wheel_N_m
+        self._step = slew_wheel_N_m_s * period_s
         self._last = (0.0, 0.0)
-        self.active = limit_N_m < inf or slew_N_m_s < inf
+        self.active = limit_wheel_N_m < inf or slew_wheel_N_m_s < inf
         """Whether there is any limit at all."""
 
     def __call__(self, right: float, left: float) -> tuple[float, float]:
@@ -57,13 +57,13 @@ class EncoderCheck:
 
     __slots__ = ("_keep", "_last", "_left", "_limit", "_period_s", "_right", "active")
 
-    def __init__(self, limit_rad: float, period_s: float) -> None:
-        self._limit = limit_rad
+    def __init__(self, limit_wheel_rad: float, period_s: float) -> None:
+        self._limit = limit_wheel_rad
         self._period_s = period_s
         self._keep = exp(-period_s / FORGET_S)
         self._last: tuple[float, float, float, float] | None = None
         self._right = self._left = 0.0
-        self.active = limit_rad < inf
+        self.active = limit_wheel_rad < inf
         """Whether there is a limit."""
 
     def __call__(self, motion: tuple[float, float, float, float]) -> str | None:

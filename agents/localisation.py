@@ -56,12 +56,12 @@ class Localiser:
         self._anchor = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
     def wheels(
-        self, right_angle: float, left_angle: float, right_speed: float, left_speed: float
+        self, right_wheel_rad: float, left_wheel_rad: float, right_speed: float, left_speed: float
     ) -> Sense:
         """Take wheel angles [rad] and speeds [rad/s]; return the motion now."""
         if self._right is not None:
             x, y, theta = self._odometry
-            right, left = right_angle - self._right, left_angle - self._left
+            right, left = right_wheel_rad - self._right, left_wheel_rad - self._left
             distance = self._half * (right + left)
             turn = self._half_over_b * (right - left)
             middle = theta + 0.5 * turn
@@ -70,7 +70,7 @@ class Localiser:
                 y + distance * sin(middle),
                 theta + turn,
             )
-        self._right, self._left = right_angle, left_angle
+        self._right, self._left = right_wheel_rad, left_wheel_rad
         self._past.append(self._odometry)
         self._speeds = (
             self._half * (right_speed + left_speed),

@@ -160,7 +160,7 @@ class Gains:
     theta_hat_0: tuple[float, float, float, float, float, float, float, float]
     kappa_hat_0: float
     v_bar_limit_m_s: float  # of the robust law
-    torque_limit_N_m: float  # of the robust law
+    torque_limit_wheel_N_m: float  # of the robust law
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,7 +253,7 @@ class DriveLink:
     right_node: int
     left_node: int
     encoder_period_ns: int
-    velocity_limit_rev_s: float  # of the motor shaft
+    velocity_limit_shaft_rev_s: float  # of the motor shaft
     current_limit_A: float
     heartbeat_period_ns: int = 100_000_000
     encoder_age_limit_ns: int = 50_000_000  # older: the drive has dropped out
@@ -266,9 +266,9 @@ class HostLimits:
     """What a controller allows itself, whatever the law asks; at the wheels."""
 
     pose_age_limit_ns: int  # 0: none
-    torque_limit_N_m: float = inf
-    torque_slew_limit_N_m_s: float = inf
-    encoder_mismatch_limit_rad: float = inf
+    torque_limit_wheel_N_m: float = inf
+    torque_slew_limit_wheel_N_m_s: float = inf
+    encoder_mismatch_limit_wheel_rad: float = inf
     pose_mismatch_limit_m: float = inf
     dry_run: bool = False  # everything but torque
     estop_on_exit: bool = False  # else idle
@@ -364,8 +364,8 @@ class Body:
     body_inertia_kg_m2: float  # I_c, about the vertical through the centre of mass
     wheel_axle_inertia_kg_m2: float  # I_w
     wheel_diameter_inertia_kg_m2: float  # I_m
-    damping_right_N_m_s: float  # d_11
-    damping_left_N_m_s: float  # d_22
+    damping_right_wheel_N_m_s: float  # d_11
+    damping_left_wheel_N_m_s: float  # d_22
     wheels_in_mass: int  # m = m_c + n m_w: 1 as printed in the paper, 2 physically
 
 
@@ -373,7 +373,7 @@ class Body:
 class Disturbance:
     """Δ_i(t) = amplitude [sin(rate t + phase), cos(rate t + phase)] on (right, left) for t ≥ 0."""
 
-    amplitude_N_m: float
+    amplitude_wheel_N_m: float
     rate_rad_s: float
     phase_rad: float
 
@@ -385,8 +385,8 @@ class DriveModel:
     protocol: str
     torque_constant_N_m_A: float
     current_limit_A: float
-    velocity_limit_rev_s: float
-    velocity_gain_N_m_s_rev: float
+    velocity_limit_shaft_rev_s: float
+    velocity_gain_shaft_N_m_s_rev: float
     overspeed_ratio: float
     torque_limiters: bool  # False: torque reaches the wheel as commanded (ideal drive)
     heartbeat_period_ns: int
@@ -407,13 +407,13 @@ class DriveModel:
     calibration_ns: int = 2_000_000_000  # each of motor and encoder
     estop_blocks_arming: bool = True  # until errors are cleared
     position_gain_1_s: float = 20.0
-    velocity_integrator_gain_N_m_rev: float = 1.0 / 3.0
-    velocity_ramp_rev_s2: float = 1.0
-    torque_ramp_N_m_s: float = 0.01
+    velocity_integrator_gain_shaft_N_m_rev: float = 1.0 / 3.0
+    velocity_ramp_shaft_rev_s2: float = 1.0
+    torque_ramp_shaft_N_m_s: float = 0.01
     input_filter_bandwidth_1_s: float = 2.0
-    trajectory_velocity_rev_s: float = 2.0
-    trajectory_accel_rev_s2: float = 0.5
-    trajectory_decel_rev_s2: float = 0.5
+    trajectory_velocity_shaft_rev_s: float = 2.0
+    trajectory_accel_shaft_rev_s2: float = 0.5
+    trajectory_decel_shaft_rev_s2: float = 0.5
     current_margin_A: float = 8.0  # above the limit in force, then it disarms
     derate_from_C: float = 100.0  # the current limit falls linearly
     derate_to_C: float = 120.0  # to nothing; 5 K above, it disarms
@@ -433,22 +433,22 @@ class MotorModel:
     compute_delay_s: float
     winding_resistance_ohm: float  # heat is R i²
     fet_resistance_ohm: float
-    viscous_friction_N_m_s: float
-    coulomb_friction_N_m: float
+    viscous_friction_shaft_N_m_s: float
+    coulomb_friction_shaft_N_m: float
     ambient_C: float
     motor_thermal_resistance_K_W: float
     motor_thermal_time_s: float
     fet_thermal_resistance_K_W: float
     fet_thermal_time_s: float
-    torque_noise_N_m: float  # rms, of the drive's estimate
+    torque_noise_shaft_N_m: float  # rms, of the drive's estimate
     current_quantum_A: float  # of the drive's measurement; 0: none
 
 
 @dataclass(frozen=True, slots=True)
 class EncoderModel:
-    """The encoder on a wheel, and the drive's estimator behind it: see `plant.encoder`."""
+    """The encoder on a motor's shaft, and the drive's estimator behind it: see `plant.encoder`."""
 
-    counts_per_rev: int
+    counts_per_shaft_rev: int
     index: bool
     noise_counts: float  # rms
     pll_bandwidth_rad_s: float

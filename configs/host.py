@@ -25,11 +25,13 @@ class Host(Section):
         description="the delay and five localisation periods, at least 0.5 s, if not given; counts"
         " where fixes do: not with localisation.source odometry",
     )
-    torque_limit_N_m: Positive | None = Field(None, description="per wheel; none if not given")
-    torque_slew_limit_N_m_s: Positive | None = Field(
+    torque_limit_wheel_N_m: Positive | None = Field(
+        None, description="per wheel; none if not given"
+    )
+    torque_slew_limit_wheel_N_m_s: Positive | None = Field(
         None, description="per wheel, but a stop is at once; none if not given"
     )
-    encoder_mismatch_limit_rad: Positive | None = Field(
+    encoder_mismatch_limit_wheel_rad: Positive | None = Field(
         None,
         description="wheel angle against its own speed, integrated and forgotten in 0.2 s: jumps,"
         " freezes and flipped signs; not looked at if not given",

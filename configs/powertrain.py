@@ -14,7 +14,7 @@ AboveZeroKelvin = Annotated[float, Field(gt=-273.15, allow_inf_nan=False)]
 
 
 class Motor(Section):
-    """The motors with their power stages, one per wheel; torques at the wheel."""
+    """The motors with their power stages, one per wheel; torques at the motor's shaft."""
 
     torque_constant_N_m_A: Positive | None = Field(
         None, description="of the motor; the drive's, drive.torque_constant_N_m_A, if not given"
@@ -28,21 +28,21 @@ class Motor(Section):
         0.2, description="the heat is R i²: 1.5 times the phase resistance for amplitudes"
     )
     fet_resistance_ohm: NotNegative = Field(0.02, description="of the power stage, same sense")
-    viscous_friction_N_m_s: NotNegative = 2e-4
-    coulomb_friction_N_m: NotNegative = 5e-3
+    viscous_friction_shaft_N_m_s: NotNegative = 2e-4
+    coulomb_friction_shaft_N_m: NotNegative = 5e-3
     ambient_C: AboveZeroKelvin = 25.0
     motor_thermal_resistance_K_W: NotNegative = Field(15.0, description="windings to ambient")
     motor_thermal_time_s: Seconds = 60.0
     fet_thermal_resistance_K_W: NotNegative = Field(30.0, description="FETs to ambient")
     fet_thermal_time_s: Seconds = 60.0
-    torque_noise_N_m: NotNegative = Field(1e-3, description="rms, of the drive's estimate")
+    torque_noise_shaft_N_m: NotNegative = Field(1e-3, description="rms, of the drive's estimate")
     current_quantum_A: NotNegative = Field(0.01, description="of the drive's measurement; 0: none")
 
 
 class Encoder(Section):
-    """The encoders, one per wheel, and the drives' velocity estimators."""
+    """The encoders, one on each motor's shaft, and the drives' velocity estimators."""
 
-    counts_per_rev: Annotated[int, Field(ge=4, le=1 << 24)] = 8192
+    counts_per_shaft_rev: Annotated[int, Field(ge=4, le=1 << 24)] = 8192
     index: bool = Field(False, description="a mark each turn, at which lost counts are found again")
     noise_counts: Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)] = Field(
         0.0, description="rms, of the angle before it is counted"

@@ -151,8 +151,8 @@ class Body(Section):
     body_inertia_kg_m2: Positive = 0.01
     wheel_axle_inertia_kg_m2: NotNegative = 0.0056
     wheel_diameter_inertia_kg_m2: NotNegative = 0.002
-    damping_right_N_m_s: NotNegative = 0.02
-    damping_left_N_m_s: NotNegative = 0.02
+    damping_right_wheel_N_m_s: NotNegative = 0.02
+    damping_left_wheel_N_m_s: NotNegative = 0.02
     wheels_in_mass: Literal[1, 2] = Field(
         1, description="m = m_c + n m_w: 1 as the paper prints it, 2 physically"
     )
@@ -174,7 +174,7 @@ class Mounting(Section):
 class Disturbance(Section):
     """Δ(t) = amplitude [sin(rate t + i), cos(rate t + i)] on the wheels of robot number i."""
 
-    amplitude_N_m: NotNegative = 0.0
+    amplitude_wheel_N_m: NotNegative = 0.0
     rate_rad_s: Finite = 0.5
 
 
@@ -208,7 +208,7 @@ class Control(Section):
     theta_hat_0: Eight = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     kappa_hat_0: NotNegative = 0.0
     v_bar_limit_m_s: Positive = Field(2.0, description="approach speed of the robust law")
-    torque_limit_N_m: Positive = Field(2.0, description="per wheel, of the robust law")
+    torque_limit_wheel_N_m: Positive = Field(2.0, description="per wheel, of the robust law")
 
 
 class CoordinationSection(Section):
@@ -377,9 +377,9 @@ class Drive(Section):
     zero_torque_on_disarm: bool = Field(False, description="False: as in the field")
     torque_constant_N_m_A: Positive = 0.05
     current_limit_A: Positive = 10.0
-    velocity_limit_rev_s: Positive = 10.0
-    velocity_gain_N_m_s_rev: Positive = 1.0 / 6.0
-    velocity_integrator_gain_N_m_rev: NotNegative = 1.0 / 3.0
+    velocity_limit_shaft_rev_s: Positive = 10.0
+    velocity_gain_shaft_N_m_s_rev: Positive = 1.0 / 6.0
+    velocity_integrator_gain_shaft_N_m_rev: NotNegative = 1.0 / 3.0
     position_gain_1_s: NotNegative = 20.0
     overspeed_ratio: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.2
 

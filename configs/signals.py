@@ -23,12 +23,28 @@ PLANT_SIGNALS: tuple[Signal, ...] = (
     Signal("theta_rad", "rad", "true heading, not wrapped"),
     Signal("v_m_s", "m/s", "true forward speed"),
     Signal("omega_rad_s", "rad/s", "true turn rate"),
-    Signal("input_right_N_m", "N·m", "torque that the right drive was last told, before limits"),
-    Signal("input_left_N_m", "N·m", "torque that the left drive was last told, before limits"),
-    Signal("demand_right_N_m", "N·m", "torque asked of the right motor at last, after limits"),
-    Signal("demand_left_N_m", "N·m", "torque asked of the left motor at last, after limits"),
-    Signal("motor_right_N_m", "N·m", "torque that the right wheel felt at last"),
-    Signal("motor_left_N_m", "N·m", "torque that the left wheel felt at last"),
+    Signal(
+        "input_right_wheel_N_m",
+        "N·m",
+        "torque at the wheel that the right drive was last told, before limits",
+    ),
+    Signal(
+        "input_left_wheel_N_m",
+        "N·m",
+        "torque at the wheel that the left drive was last told, before limits",
+    ),
+    Signal(
+        "demand_right_wheel_N_m",
+        "N·m",
+        "torque at the wheel, asked of the right motor at last, after limits",
+    ),
+    Signal(
+        "demand_left_wheel_N_m",
+        "N·m",
+        "torque at the wheel, asked of the left motor at last, after limits",
+    ),
+    Signal("motor_right_wheel_N_m", "N·m", "torque that the right wheel felt at last"),
+    Signal("motor_left_wheel_N_m", "N·m", "torque that the left wheel felt at last"),
 )
 """Truth of one robot at one tick, before the controller answers."""
 
@@ -69,8 +85,16 @@ AGENT_SIGNALS: tuple[Signal, ...] = (
     Signal("y_d_m", "m", "reference position, (1)"),
     Signal("theta_d_rad", "rad", "reference heading, (8)"),
     *LAW_SIGNALS,
-    Signal("tau_right_N_m", "N·m", "torque commanded, as float32 on the bus"),
-    Signal("tau_left_N_m", "N·m", "torque commanded, as float32 on the bus"),
+    Signal(
+        "tau_right_wheel_N_m",
+        "N·m",
+        "torque commanded at the wheel, as float32 on the bus carries it",
+    ),
+    Signal(
+        "tau_left_wheel_N_m",
+        "N·m",
+        "torque commanded at the wheel, as float32 on the bus carries it",
+    ),
     Signal("late_s", "s", "in real time, wall time from the tick's due time to its computation"),
     Signal("round_trip_s", "s", "in real time, from the last torques sent to their feedback"),
 )

@@ -41,8 +41,8 @@ class RobotState(NamedTuple):
     theta_rad: float
     v_m_s: float
     omega_rad_s: float
-    torque_right_N_m: float
-    torque_left_N_m: float
+    torque_right_wheel_N_m: float
+    torque_left_wheel_N_m: float
 
 
 class EmulatedPlant:

@@ -32,8 +32,8 @@ class State(NamedTuple):
     theta: float
     v: float
     omega: float
-    right_angle: float
-    left_angle: float
+    right_wheel_rad: float
+    left_wheel_rad: float
 
 
 class Robot:
@@ -56,7 +56,7 @@ class Robot:
         """No wheel's rim moves faster."""
         self.c = r * r * body.body_mass_kg * a / (2.0 * b)
         self.mbar_1, self.mbar_2 = m11 + m12, m11 - m12
-        right, left = body.damping_right_N_m_s, body.damping_left_N_m_s
+        right, left = body.damping_right_wheel_N_m_s, body.damping_left_wheel_N_m_s
         self._damping = (
             0.5 * (right + left) / self.mbar_1,
             0.5 * b * (right - left) / self.mbar_1,
@@ -65,8 +65,8 @@ class Robot:
         )
         self.accelerations = self._equations()
         """(v, ω, right, left) ↦ (v', ω') under net wheel torques τ − Δ [N·m]."""
-        self.disturbed = disturbance.amplitude_N_m != 0.0
-        self._amplitude = disturbance.amplitude_N_m
+        self.disturbed = disturbance.amplitude_wheel_N_m != 0.0
+        self._amplitude = disturbance.amplitude_wheel_N_m
         self._rate, self._phase = disturbance.rate_rad_s, disturbance.phase_rad
 
     def wheel_speeds(self, v: float, omega: float) -> tuple[float, float]:

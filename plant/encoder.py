@@ -1,4 +1,4 @@
-"""The encoder on a wheel, and the drive's estimator behind it.
+"""The encoder on a motor's shaft, and the drive's estimator behind it.
 
 Counts are floor(N φ / 2π + phase), with N counts per revolution and a seeded phase within a count.
 The drive samples them in its control loop, every T, and tracks them with the phase-locked loop of
@@ -10,7 +10,7 @@ the ODrive firmware (0.5.6, `encoder.cpp`), in counts:
     k_p = 2 w, k_i = w²: both poles at w, the bandwidth [rad/s]; (1) is stable for w T < 2√2 − 2,
     and the firmware refuses k_p T ≥ 1.
 
-The loop runs at its own rate whatever the step: within a step the wheel turns evenly, and the loop
+The loop runs at its own rate whatever the step: within a step the shaft turns evenly, and the loop
 samples it at its own instants. So noise and lag are those of the drive: for 8192 counts and 8 kHz
 about 0.01 rev/s rms at w = 1000 rad/s and 0.0003 at 200.
 
@@ -92,20 +92,20 @@ class Encoder:
         """The count as of the end of the last step, without angle noise."""
         return int(self._angle // 1.0 + self._offset)
 
-    def reset(self, angle_rad: float = 0.0, speed_rad_s: float = 0.0) -> None:
+    def reset(self, angle_shaft_rad: float = 0.0, speed_shaft_rad_s: float = 0.0) -> None:
         """Start anew with the estimator settled on this angle and speed, both finite."""
-        per_radian = self._model.counts_per_rev * PER_RADIAN
-        self._angle = angle_rad * per_radian + self._phase
+        per_radian = self._model.counts_per_shaft_rev * PER_RADIAN
+        self._angle = angle_shaft_rad * per_radian + self._phase
         self._counted = self._angle // 1.0
         self._since = 0.0  # loop periods since the last sample
-        self._velocity = speed_rad_s * per_radian / self._model.pll_rate_Hz
+        self._velocity = speed_shaft_rad_s * per_radian / self._model.pll_rate_Hz
         self._position = self._counted + self._offset + 0.5
 
-    def step(self, angle_rad: float, dt_s: float) -> tuple[float, float]:
+    def step(self, angle_shaft_rad: float, dt_s: float) -> tuple[float, float]:
         """(position [rev], velocity [rev/s]) as the drive estimates them after `dt_s`."""
         model = self._model
         start = self._angle
-        end = angle_rad * model.counts_per_rev * PER_RADIAN + self._phase
+        end = angle_shaft_rad * model.counts_per_shaft_rev * PER_RADIAN + self._phase
         if not -_LARGEST_COUNT <= end <= _LARGEST_COUNT:
             end = copysign(_LARGEST_COUNT, end) if isfinite(end) else start
         periods = dt_s * model.pll_rate_Hz
@@ -120,7 +120,7 @@ class Encoder:
                 self._track(first + self._offset, slope, samples)
         self._since = since + periods - samples
         self._angle = end
-        counts = model.counts_per_rev
+        counts = model.counts_per_shaft_rev
         return self._position / counts, self._velocity * model.pll_rate_Hz / counts
 
     def inject(self, fault: EncoderFault, amount: float | None = None) -> None:
@@ -138,7 +138,7 @@ class Encoder:
                 turns = 0.1 if amount is None else amount
                 if not abs(turns) <= _FARTHEST_JUMP:
                     raise ValueError(f"{fault.value} = {turns}: must be within ±1e6 revolutions")
-                self._offset += float(round(turns * self._model.counts_per_rev))
+                self._offset += float(round(turns * self._model.counts_per_shaft_rev))
             case EncoderFault.SIGN_FLIP:
                 self._flipped = True
             case EncoderFault.COUNT_LOSS:
@@ -162,7 +162,7 @@ class Encoder:
 
     def _choose_path(self) -> None:
         """The plain path is the fast one: nothing happens to counts on the way."""
-        astray = self._model.index and self._offset % self._model.counts_per_rev != 0.0
+        astray = self._model.index and self._offset % self._model.counts_per_shaft_rev != 0.0
         self._plain = not (self._frozen or self._flipped or self._loss or self._noise or astray)
         self._counted = self._angle // 1.0
 
@@ -195,7 +195,7 @@ class Encoder:
 
     def _take(self, true: float) -> None:
         """Go on to the count `true`, with what the faults make of the edges in between."""
-        moved, counts = true - self._counted, self._model.counts_per_rev
+        moved, counts = true - self._counted, self._model.counts_per_shaft_rev
         if self._frozen:
             self._offset -= moved
         elif moved:

@@ -20,7 +20,7 @@ def rk4(
     None if the motion diverged: it would leave the bounds of `plant.divergence`.
     """
     try:
-        x, y, theta, v, omega, right_angle, left_angle = state
+        x, y, theta, v, omega, right_wheel_rad, left_wheel_rad = state
         accelerations = robot.accelerations
         half = 0.5 * step_s
         if robot.disturbed:
@@ -51,12 +51,12 @@ def rk4(
         theta += turn
         v += sixth * (a1 + 2.0 * (a2 + a3) + a4)
         omega += sixth * (w1 + 2.0 * (w2 + w3) + w4)
-        right_angle = right_angle + rolled + turned
-        left_angle = left_angle + rolled - turned
+        right_wheel_rad = right_wheel_rad + rolled + turned
+        left_wheel_rad = left_wheel_rad + rolled - turned
     except ValueError:  # the sine of infinity
         return None
     if not abs(v) + robot.b * abs(omega) <= robot.fastest_m_s:
         return None
-    if not abs(x) + abs(y) + abs(theta) + abs(right_angle) + abs(left_angle) <= FARTHEST:
+    if not abs(x) + abs(y) + abs(theta) + abs(right_wheel_rad) + abs(left_wheel_rad) <= FARTHEST:
         return None
-    return _new(State, (x, y, theta, v, omega, right_angle, left_angle))
+    return _new(State, (x, y, theta, v, omega, right_wheel_rad, left_wheel_rad))

@@ -1,24 +1,24 @@
-"""The motor behind a drive: what torque the wheel feels for what the drive asks of it.
+"""The motor behind a drive: the torque at its shaft for the drive's demand.
 
     i* = τ*/k_d, held to ±i_max and to what the bus voltage allows                              (1)
     T di/dt = i*(t − d) − i                        current loop, exact for a held demand        (2)
     τ_m = k i,   P = τ_m ν + (R + R_f) i²          torque and electrical power                  (3)
     |R i* + k ν| ≤ (√3/2) V                        space-vector modulation of the bus voltage   (4)
     T_th dθ/dt = θ_a + R_th R i² − θ               temperature of windings, and of FETs         (5)
-    τ = τ_m − b ν⁺ − F sgn(ν⁺)                     at the wheel; ν⁺: speed after the step       (6)
+    τ = τ_m − b ν⁺ − F sgn(ν⁺)                     at the shaft; ν⁺: speed after the step       (6)
 
     τ* demand [N·m]   k, k_d torque constant: the motor's, and the one set in the drive [N·m/A]
-    i  q-axis current [A]   T loop time constant, d compute delay [s]   ν wheel speed [rad/s]
+    i  q-axis current [A]   T loop time constant, d compute delay [s]   ν shaft speed [rad/s]
     V  bus voltage [V]   R, R_f winding and FET resistance [ohm], such that R i² is the heat (1.5
     times the phase resistance where currents are amplitudes)   R_th [K/W]   θ, θ_a ambient [°C]
     b  viscous [N·m·s/rad], F Coulomb friction [N·m]
 
-Friction is discretised implicitly: (6) is solved for ν⁺ of a wheel with inertia J, so sgn(0) takes
-whatever value in [−1, 1] holds the wheel. It sticks, neither reverses the wheel nor chatters, and
-never adds energy, at any step, as long as J isn't above the inertia that the body has in truth:
-give min(m̄_1, m̄_2). Source: R. Kikuuwe, N. Takesue, A. Sano, H. Mochiyama, H. Fujimoto, Admittance
-and impedance representations of friction based on implicit Euler integration, IEEE Transactions on
-Robotics 22(6), 2006.
+Friction is discretised implicitly: (6) is solved for ν⁺ of a shaft with inertia J, so sgn(0) takes
+whatever value in [−1, 1] holds the shaft. It sticks, neither reverses the shaft nor chatters, and
+never adds energy, at any step, as long as J isn't above the inertia that the body has in truth,
+seen at the shaft: give min(m̄_1, m̄_2) / gear ratio². Source: R. Kikuuwe, N. Takesue, A. Sano,
+H. Mochiyama, H. Fujimoto, Admittance and impedance representations of friction based on implicit
+Euler integration, IEEE Transactions on Robotics 22(6), 2006.
 
     fault                   drive measures    shaft                      amount (default)
     TORQUE_STUCK            last current      last torque
@@ -61,15 +61,15 @@ class IdealMotor:
 
     __slots__ = ()
 
-    def step(self, demand_N_m: float, speed_rad_s: float, dt_s: float) -> float:  # noqa: ARG002
-        """Torque at the wheel [N·m] for the drive's demand."""
-        return demand_N_m
+    def step(self, demand_shaft_N_m: float, speed_shaft_rad_s: float, dt_s: float) -> float:  # noqa: ARG002
+        """Torque at the shaft [N·m] for the drive's demand."""
+        return demand_shaft_N_m
 
 
 class Motor:
     """One motor on the bus of its robot.
 
-    `inertia_kg_m2` is J of (6): the least inertia that the body shows to its wheels.
+    `inertia_shaft_kg_m2` is J of (6): the least inertia that the body shows to its motors.
     """
 
     __slots__ = (
@@ -100,14 +100,14 @@ class Motor:
         "fet_C",
         "motor_C",
         "power_W",
-        "torque_N_m",
+        "torque_shaft_N_m",
     )
 
     def __init__(
-        self, model: MotorModel, inertia_kg_m2: float, supply: Supply, random: Random
+        self, model: MotorModel, inertia_shaft_kg_m2: float, supply: Supply, random: Random
     ) -> None:
         self._model = model
-        self._inertia = inertia_kg_m2
+        self._inertia = inertia_shaft_kg_m2
         self._supply = supply
         self._random = random
         self._constant = model.torque_constant_N_m_A
@@ -120,20 +120,20 @@ class Motor:
         self._fet_zero_C = self._motor_zero_C = model.ambient_C  # with what faults add
         self.current_A = 0.0
         """q-axis current at the end of the last step."""
-        self.torque_N_m = 0.0
+        self.torque_shaft_N_m = 0.0
         """τ_m, mean of the last step: what the motor made, before friction."""
         self.power_W = 0.0
         """P of (3), mean of the last step; negative while it feeds the bus."""
         self.fet_C = self.motor_C = model.ambient_C
         """What the thermistors say."""
 
-    def step(self, demand_N_m: float, speed_rad_s: float, dt_s: float) -> float:
-        """Mean torque at the wheel [N·m] over `dt_s`, for a demand and a speed at its start."""
+    def step(self, demand_shaft_N_m: float, speed_shaft_rad_s: float, dt_s: float) -> float:
+        """Mean torque at the shaft [N·m] over `dt_s`, for a demand and a speed at its start."""
         if dt_s != self._dt_s:
             self._discretise(dt_s)
-        if not -FASTEST_WHEEL_RAD_S <= speed_rad_s <= FASTEST_WHEEL_RAD_S:
-            speed_rad_s = _clamped(speed_rad_s, FASTEST_WHEEL_RAD_S)
-        asked = self._current_for(demand_N_m, speed_rad_s)
+        if not -FASTEST_WHEEL_RAD_S <= speed_shaft_rad_s <= FASTEST_WHEEL_RAD_S:
+            speed_shaft_rad_s = _clamped(speed_shaft_rad_s, FASTEST_WHEEL_RAD_S)
+        asked = self._current_for(demand_shaft_N_m, speed_shaft_rad_s)
         if asked == self._asked_A and not self._pending:
             off = self.current_A - asked
             self.current_A = asked + off * self._decay
@@ -141,9 +141,9 @@ class Motor:
             square = asked * asked + off * (2.0 * asked * self._mean + off * self._mean_square)
         else:
             mean, square = self._switch(asked, dt_s)
-        torque = self.torque_N_m = self._constant * mean
+        torque = self.torque_shaft_N_m = self._constant * mean
 
-        self.power_W = torque * speed_rad_s + self._resistance * square
+        self.power_W = torque * speed_shaft_rad_s + self._resistance * square
         windings = self._winding_K = (
             self._winding_K * self._winding_keep + self._winding_K_A2 * square
         )
@@ -151,13 +151,13 @@ class Motor:
         self.motor_C = windings + self._motor_zero_C
         self.fet_C = fets + self._fet_zero_C
 
-        coulomb = self._model.coulomb_friction_N_m
-        push = self._inertia_rate * speed_rad_s + torque
+        coulomb = self._model.coulomb_friction_shaft_N_m
+        push = self._inertia_rate * speed_shaft_rad_s + torque
         if -coulomb <= push <= coulomb:
             return torque - push
         if push < 0.0:
             coulomb = -coulomb
-        viscous = self._model.viscous_friction_N_m_s
+        viscous = self._model.viscous_friction_shaft_N_m_s
         return torque - coulomb - viscous * (push - coulomb) / (self._inertia_rate + viscous)
 
     def sense(self) -> tuple[float, float]:
@@ -169,8 +169,8 @@ class Motor:
         model = self._model
         current = self.current_A
         torque = model.assumed_torque_constant_N_m_A * current
-        if model.torque_noise_N_m:
-            torque += self._random.gauss(0.0, model.torque_noise_N_m)
+        if model.torque_noise_shaft_N_m:
+            torque += self._random.gauss(0.0, model.torque_noise_shaft_N_m)
         quantum = model.current_quantum_A
         return torque, quantum * round(current / quantum) if quantum else current
 
@@ -224,16 +224,16 @@ class Motor:
         self._fet_K_A2 = gain * model.fet_thermal_resistance_K_W * model.fet_resistance_ohm
         self._inertia_rate = self._inertia / dt_s
 
-    def _current_for(self, demand_N_m: float, speed_rad_s: float) -> float:
+    def _current_for(self, demand_shaft_N_m: float, speed_shaft_rad_s: float) -> float:
         """i* of (1) and (4)."""
         model = self._model
         limit = model.current_limit_A
-        current = demand_N_m / model.assumed_torque_constant_N_m_A
+        current = demand_shaft_N_m / model.assumed_torque_constant_N_m_A
         if not -limit <= current <= limit:
             current = _clamped(current, limit)
         if self._override_A is not None:
             current = self._override_A
-        resistance, back = model.winding_resistance_ohm, self._constant * speed_rad_s
+        resistance, back = model.winding_resistance_ohm, self._constant * speed_shaft_rad_s
         most = _MODULATION * self._supply.bus_V
         if -most <= resistance * current + back <= most:
             return current

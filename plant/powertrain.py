@@ -1,6 +1,6 @@
-"""What lies between the two drives of a robot and its wheels: motors, encoders, one supply.
+"""The powertrain between the two drives of a robot and its gears: motors, encoders, one supply.
 
-    demand ─► motor ─torque─► wheel ─angle─► encoder ─► drive
+    demand ─► motor ─torque─► shaft ─angle─► encoder ─► drive
                 │ power
               supply ─bus voltage─► both motors
 
@@ -28,19 +28,19 @@ class Powertrain(NamedTuple):
 
     def step(
         self,
-        demands_N_m: tuple[float, float],
-        speeds_rad_s: tuple[float, float],
+        demands_shaft_N_m: tuple[float, float],
+        speeds_shaft_rad_s: tuple[float, float],
         dt_s: float,
     ) -> tuple[float, float]:
-        """(right, left) torque at the wheels [N·m], held over `dt_s`; the supply follows."""
-        right = self.right_motor.step(demands_N_m[0], speeds_rad_s[0], dt_s)
-        left = self.left_motor.step(demands_N_m[1], speeds_rad_s[1], dt_s)
+        """(right, left) torque at the shafts [N·m], held over `dt_s`; the supply follows."""
+        right = self.right_motor.step(demands_shaft_N_m[0], speeds_shaft_rad_s[0], dt_s)
+        left = self.left_motor.step(demands_shaft_N_m[1], speeds_shaft_rad_s[1], dt_s)
         self.supply.step(self.right_motor.power_W, self.left_motor.power_W, dt_s)
         return right, left
 
 
-def powertrain(model: PowertrainModel, inertia_kg_m2: float) -> Powertrain:
-    """Build the parts; `inertia_kg_m2` as `plant.motor.Motor` wants it."""
+def powertrain(model: PowertrainModel, inertia_shaft_kg_m2: float) -> Powertrain:
+    """Build the parts; `inertia_shaft_kg_m2` as `plant.motor.Motor` wants it."""
     supply = Supply(model.supply)
 
     def source(part: str) -> Random:
@@ -48,8 +48,8 @@ def powertrain(model: PowertrainModel, inertia_kg_m2: float) -> Powertrain:
 
     return Powertrain(
         supply,
-        Motor(model.motor, inertia_kg_m2, supply, source("right motor")),
-        Motor(model.motor, inertia_kg_m2, supply, source("left motor")),
+        Motor(model.motor, inertia_shaft_kg_m2, supply, source("right motor")),
+        Motor(model.motor, inertia_shaft_kg_m2, supply, source("left motor")),
         Encoder(model.encoder, source("right encoder")),
         Encoder(model.encoder, source("left encoder")),
     )

@@ -75,8 +75,8 @@ class Unit:
         state = self.state
         right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
         right, left = PER_RADIAN * self._gear_right, PER_RADIAN * self._gear_left
-        self._right.feed(state.right_angle * right, right_speed * right)
-        self._left.feed(state.left_angle * left, left_speed * left)
+        self._right.feed(state.right_wheel_rad * right, right_speed * right)
+        self._left.feed(state.left_wheel_rad * left, left_speed * left)
 
     def feedback(self, now_ns: int) -> Sequence[Frame]:
         """Both encoder frames, once both drives have taken a set-point since the last ones."""
@@ -107,8 +107,8 @@ class Unit:
     def advance(self, t_s: float, period_s: float, substeps: int) -> None:
         """Integrate one control period from scenario time `t_s`, torques held."""
         state = self.state
-        right = self._right.torque_demand(period_s) * self._gear_right
-        left = self._left.torque_demand(period_s) * self._gear_left
+        right = self._right.torque_demand_shaft(period_s) * self._gear_right
+        left = self._left.torque_demand_shaft(period_s) * self._gear_left
         self._torque_right = self._demand_right = right
         self._torque_left = self._demand_left = left
         if self.divergence is not None:
@@ -152,8 +152,8 @@ class Unit:
             theta,
             v,
             omega,
-            self._right.input_torque * self._gear_right,
-            self._left.input_torque * self._gear_left,
+            self._right.input_torque_shaft * self._gear_right,
+            self._left.input_torque_shaft * self._gear_left,
             self._demand_right,
             self._demand_left,
             self._torque_right,
@@ -186,7 +186,7 @@ class RealUnit(Unit):
         gear_r, gear_l = self._gear_right, self._gear_left
         demands = torques = (0.0, 0.0)
         for n in range(substeps):
-            demands = right.torque_demand(step), left.torque_demand(step)
+            demands = right.torque_demand_shaft(step), left.torque_demand_shaft(step)
             right_speed, left_speed = body.wheel_speeds(state.v, state.omega)
             shafts = train.step(demands, (right_speed * gear_r, left_speed * gear_l), step)
             torques = shafts[0] * gear_r, shafts[1] * gear_l
@@ -195,8 +195,8 @@ class RealUnit(Unit):
                 if after is None:
                     after = self._stop(state, Divergence(t_s, state.v, state.omega, *torques))
                 state = after
-            right.feed(*train.right_encoder.step(state.right_angle * gear_r, step))
-            left.feed(*train.left_encoder.step(state.left_angle * gear_l, step))
+            right.feed(*train.right_encoder.step(state.right_wheel_rad * gear_r, step))
+            left.feed(*train.left_encoder.step(state.left_wheel_rad * gear_l, step))
         self.state = state
         self._demand_right, self._demand_left = demands[0] * gear_r, demands[1] * gear_l
         self._torque_right, self._torque_left = torques

@@ -48,7 +48,7 @@ class DriveClient(Protocol):
     def fault(self, now_ns: int) -> str | None:
         """Why the wheels can't be driven now, None if they can."""
 
-    def torque(self, right_N_m: float, left_N_m: float) -> Sequence[Frame]:
+    def torque(self, right_wheel_N_m: float, left_wheel_N_m: float) -> Sequence[Frame]:
         """Set-points for both wheels [N·m]; `sent` then says what the bus carries of them."""
 
     def rest(self, now_ns: int) -> Sequence[Frame]:
@@ -85,7 +85,7 @@ class DriveNode(Protocol):
         """Take one frame from the bus; return the replies."""
 
     @property
-    def input_torque(self) -> float:
+    def input_torque_shaft(self) -> float:
         """The torque that the set-point said [N·m], before limits."""
 
     @property
@@ -95,7 +95,7 @@ class DriveNode(Protocol):
     def feel(self, feeling: Feeling) -> None:
         """Take what the drive measures."""
 
-    def torque_demand(self, dt_s: float) -> float:
+    def torque_demand_shaft(self, dt_s: float) -> float:
         """Torque that the drive asks of its motor for the next `dt_s` [N·m]; always finite."""
 
 

@@ -44,9 +44,9 @@ class DryRun:
         """What is wrong with the drives."""
         return self._client.fault(now_ns) or ""
 
-    def torque(self, right_N_m: float, left_N_m: float) -> Sequence[Frame]:
+    def torque(self, right_wheel_N_m: float, left_wheel_N_m: float) -> Sequence[Frame]:
         """What would have been sent."""
-        self._client.torque(right_N_m, left_N_m)
+        self._client.torque(right_wheel_N_m, left_wheel_N_m)
         self.sent = self._client.sent
         return _NOTHING
 

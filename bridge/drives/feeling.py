@@ -6,7 +6,7 @@ from typing import NamedTuple
 class Feeling(NamedTuple):
     """What a drive measures of its motor and of the supply."""
 
-    torque_N_m: float  # the motor's, estimated
+    torque_shaft_N_m: float  # the motor's, estimated
     current_A: float  # q axis
     fet_C: float
     motor_C: float  # NaN: no thermistor

@@ -78,7 +78,7 @@ def loop_of(scenario: Scenario, robot: Robot) -> Loop:
     ticks = schedule(scenario)
     external = scenario.localisation.source == "external"
     # Limits aside: the channel is what happens close to the path.
-    gains = Gains(**control.model_dump(exclude={"law"}) | {"torque_limit_N_m": inf})
+    gains = Gains(**control.model_dump(exclude={"law"}) | {"torque_limit_wheel_N_m": inf})
     return Loop(
         control.law,
         gains,
@@ -176,7 +176,9 @@ def _learnt(scenario: Scenario, loop: Loop) -> tuple[float, ...]:
     for robot in scenario.robot:
         body = scenario.body_of(robot)
         if robot_body(body).mbar_1 == loop.body.mbar_1:
-            return true_theta(loop.body, (body.damping_right_N_m_s, body.damping_left_N_m_s))
+            return true_theta(
+                loop.body, (body.damping_right_wheel_N_m_s, body.damping_left_wheel_N_m_s)
+            )
     return loop.theta
 
 

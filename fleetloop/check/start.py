@@ -37,8 +37,8 @@ _STEP_S = 0.005
 class _Start:
     """What was seen of one robot's first second."""
 
-    first_N_m: float = 0.0
-    asked_N_m: float = 0.0
+    first_wheel_N_m: float = 0.0
+    asked_wheel_N_m: float = 0.0
     asked_at_s: float = 0.0
     ratio: float = 0.0  # h Σ k_5 F² / k_4
     ratio_at_s: float = 0.0
@@ -64,7 +64,7 @@ def _start(scenario: Scenario, robot: Robot, ahead: Forecast, number: int, ticks
     body, h = robot_body(section), scenario.clock.control_period_s
     law = LAWS[control.law](gains, Wheels(section.wheel_radius_m, section.half_track_m), h)
     path = path_of(scenario, robot)
-    most = min((limit.torque_N_m for limit in limits(scenario, robot)), default=inf)
+    most = min((limit.torque_wheel_N_m for limit in limits(scenario, robot)), default=inf)
     instants = h * np.arange(ticks)
     places = np.interp(instants, ahead.t_s, ahead.s[:, number]).tolist()
     speeds = np.interp(instants, ahead.t_s, ahead.s_dot[:, number]).tolist()
@@ -77,9 +77,9 @@ def _start(scenario: Scenario, robot: Robot, ahead: Forecast, number: int, ticks
         out = law(memory, sense, path(s), s_dot)
         asked = max(abs(out.tau_right), abs(out.tau_left))
         if tick == 0:
-            seen.first_N_m = asked
-        if asked > seen.asked_N_m:
-            seen.asked_N_m, seen.asked_at_s = asked, tick * h
+            seen.first_wheel_N_m = asked
+        if asked > seen.asked_wheel_N_m:
+            seen.asked_wheel_N_m, seen.asked_at_s = asked, tick * h
         ratio = _ratio(gains, h, memory, out.state, sense)
         if ratio > seen.ratio:
             seen.ratio, seen.ratio_at_s = ratio, tick * h
@@ -118,15 +118,17 @@ def _first_torque(scenario: Scenario, robot: Robot, seen: _Start) -> Finding:
     title = "first torques"
     x_e, y_e, _ = _errors(scenario, robot)
     off = f"{hypot(x_e, y_e):.3g} m off the path"
-    said = f"{off}: asks for {seen.asked_N_m:.3g} N·m {seen.asked_at_s:.3g} s after the start"
-    bounds = [limit for limit in limits(scenario, robot) if limit.key != "control.torque_limit_N_m"]
+    said = f"{off}: asks for {seen.asked_wheel_N_m:.3g} N·m {seen.asked_at_s:.3g} s after the start"
+    bounds = [
+        limit for limit in limits(scenario, robot) if limit.key != "control.torque_limit_wheel_N_m"
+    ]
     paper = scenario.control_of(robot).law == "adaptive_dsc"
     if bounds and paper:
-        limit = min(bounds, key=lambda one: one.torque_N_m)
-        if seen.asked_N_m > limit.torque_N_m:
+        limit = min(bounds, key=lambda one: one.torque_wheel_N_m)
+        if seen.asked_wheel_N_m > limit.torque_wheel_N_m:
             text = (
-                f"{said}, gets {limit.torque_N_m:.3g} N·m, {limit.words}: the paper's law learns"
-                ' the limit; control.law = "adaptive_dsc_robust" doesn\'t, or start closer'
+                f"{said}, gets {limit.torque_wheel_N_m:.3g} N·m, {limit.words}: the paper's law"
+                ' learns the limit; control.law = "adaptive_dsc_robust" doesn\'t, or start closer'
             )
             return Finding("warning", title, text, (robot.name,), "control.law")
     return Finding("ok", title, said, (robot.name,))

@@ -5,10 +5,10 @@
 
 On a steady curve (1) is d (v̄_d + b |ω̄_d|) v_r / r at the outer wheel. Let through is the least of
 
-    the law's limit (robust)      control.torque_limit_N_m
-    the host's                    host.torque_limit_N_m
+    the law's limit (robust)      control.torque_limit_wheel_N_m
+    the host's                    host.torque_limit_wheel_N_m
     gear × k_t × i_max            drive.torque_constant_N_m_A, current_limit_A, and [motor]'s
-    gear × k_v (v_max − gear ν)   drive.velocity_limit_rev_s: torque mode's limiter              (3)
+    gear × k_v (v_max − gear ν)   drive.velocity_limit_shaft_rev_s: torque mode's                (3)
     gear × k_t × (U − k_t ω_s)/R  supply.voltage_V at the shaft's speed ω_s                      (4)
 
 Where need exceeds it, only a part f < 1 of the speed is kept up; the robot falls behind by
@@ -41,8 +41,8 @@ class Limit:
 
     key: str
     words: str
-    torque_N_m: float
-    slope_N_m_s: float = 0.0
+    torque_wheel_N_m: float
+    slope_wheel_N_m_s: float = 0.0
     speed_m_s: float = inf
     """Robot's speed straight on at which nothing is left."""
 
@@ -51,10 +51,10 @@ class Limit:
 class Need:
     """Both wheels of one robot along its course; columns right, left; all at the wheel."""
 
-    torque_N_m: Series  # all of (1) and (2), disturbance at its largest
-    motion_N_m: Series  # the part that goes with the speed
-    rest_N_m: Series  # friction and disturbance
-    nu_rad_s: Series
+    torque_wheel_N_m: Series  # all of (1) and (2), disturbance at its largest
+    motion_wheel_N_m: Series  # the part that goes with the speed
+    rest_wheel_N_m: Series  # friction and disturbance
+    nu_wheel_rad_s: Series
 
 
 def torque_findings(scenario: Scenario, courses: list[Course]) -> Iterator[Finding]:
@@ -71,15 +71,15 @@ def needed(scenario: Scenario, course: Course) -> Need:
     body = scenario.body_of(course.robot)
     r, b = body.wheel_radius_m, body.half_track_m
     v, omega = course.v, course.omega
-    right, left = body.damping_right_N_m_s, body.damping_left_N_m_s
+    right, left = body.damping_right_wheel_N_m_s, body.damping_left_wheel_N_m_s
     nu = np.column_stack([v + b * omega, v - b * omega]) / r
     motion = nu * np.array([right, left])
     rest = np.zeros_like(nu)
     if scenario.drive.preset == "realistic":
         gear, motor = scenario.mounting_of(course.robot).gear_ratio, scenario.motor
-        motion = motion + gear**2 * motor.viscous_friction_N_m_s * nu
-        rest = gear * motor.coulomb_friction_N_m * np.sign(nu)
-    push = (course.robot.disturbance or scenario.disturbance).amplitude_N_m
+        motion = motion + gear**2 * motor.viscous_friction_shaft_N_m_s * nu
+        rest = gear * motor.coulomb_friction_shaft_N_m * np.sign(nu)
+    push = (course.robot.disturbance or scenario.disturbance).amplitude_wheel_N_m
     inertial = _inertial(body, course)
     return Need(np.abs(motion + rest + inertial) + push, motion, rest, nu)
 
@@ -89,9 +89,15 @@ def limits(scenario: Scenario, robot: Robot) -> list[Limit]:
     control, host, drive = scenario.control_of(robot), scenario.host, scenario.drive
     found = []
     if control.law == "adaptive_dsc_robust":
-        found.append(Limit("control.torque_limit_N_m", "the law's limit", control.torque_limit_N_m))
-    if host.torque_limit_N_m is not None:
-        found.append(Limit("host.torque_limit_N_m", "the host's limit", host.torque_limit_N_m))
+        found.append(
+            Limit(
+                "control.torque_limit_wheel_N_m", "the law's limit", control.torque_limit_wheel_N_m
+            )
+        )
+    if host.torque_limit_wheel_N_m is not None:
+        found.append(
+            Limit("host.torque_limit_wheel_N_m", "the host's limit", host.torque_limit_wheel_N_m)
+        )
     if drive.preset != "ideal":
         found += _drive_limits(scenario, robot)
     return found
@@ -109,11 +115,11 @@ def _drive_limits(scenario: Scenario, robot: Robot) -> list[Limit]:
             key, limit_A = "motor.current_limit_A", motor.current_limit_A
     words = f"gear {gear:g} × {constant:g} N·m/A × {limit_A:g} A"
     per_rad = 1.0 / (2.0 * pi)
-    gain, fastest = drive.velocity_gain_N_m_s_rev, drive.velocity_limit_rev_s
+    gain, fastest = drive.velocity_gain_shaft_N_m_s_rev, drive.velocity_limit_shaft_rev_s
     found = [
         Limit(key, words, gear * constant * limit_A),
         Limit(
-            "drive.velocity_limit_rev_s",
+            "drive.velocity_limit_shaft_rev_s",
             f"what the drive's velocity limit of {fastest:g} rev/s leaves",
             gear * gain * fastest,
             gear**2 * gain * per_rad,
@@ -152,13 +158,15 @@ def _inertial(body: Body, course: Course) -> Series:
 def _torque(scenario: Scenario, course: Course, need: Need, bounds: list[Limit]) -> Finding:
     robot = course.robot
     title = "wheel torque along the path"
-    most = np.abs(need.torque_N_m)
+    most = np.abs(need.torque_wheel_N_m)
     place = np.unravel_index(int(most.argmax()), most.shape)
     peak, speed = float(most[place]), float(course.v[place[0]])
     said = f"up to {peak:.3g} N·m at {speed:.3g} m/s"
     if not bounds:
         return Finding("ok", title, f"{said}; nothing limits it", (robot.name,))
-    left = np.array([b.torque_N_m - b.slope_N_m_s * np.abs(need.nu_rad_s) for b in bounds])
+    left = np.array(
+        [b.torque_wheel_N_m - b.slope_wheel_N_m_s * np.abs(need.nu_wheel_rad_s) for b in bounds]
+    )
     ratios = left / np.maximum(most, 1e-12)
     tightest = np.unravel_index(int(ratios.argmin()), ratios.shape)
     limit, (_, instant, wheel) = bounds[tightest[0]], tightest
@@ -182,9 +190,13 @@ def _torque(scenario: Scenario, course: Course, need: Need, bounds: list[Limit])
 
 def _behind(scenario: Scenario, course: Course, need: Need, bounds: list[Limit]) -> Series:
     """How far the robot is behind at each instant [m]."""
-    motion, rest, nu = (np.abs(x) for x in (need.motion_N_m, need.rest_N_m, need.nu_rad_s))
+    motion, rest, nu = (
+        np.abs(x) for x in (need.motion_wheel_N_m, need.rest_wheel_N_m, need.nu_wheel_rad_s)
+    )
     parts = [
-        ((b.torque_N_m - rest) / np.maximum(motion + b.slope_N_m_s * nu, 1e-12)).min(axis=1)
+        ((b.torque_wheel_N_m - rest) / np.maximum(motion + b.slope_wheel_N_m_s * nu, 1e-12)).min(
+            axis=1
+        )
         for b in bounds
     ]
     part = np.clip(np.min(parts, axis=0), 0.0, 10.0)
@@ -211,8 +223,10 @@ def _heat(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:
     gear = scenario.mounting_of(course.robot).gear_ratio
     constant = motor.torque_constant_N_m_A or drive.torque_constant_N_m_A
     # What limits don't let through makes no heat.
-    most_A = min(limit.torque_N_m for limit in limits(scenario, course.robot)) / gear / constant
-    amps = np.minimum(np.abs(need.torque_N_m) / gear / constant, most_A)
+    most_A = (
+        min(limit.torque_wheel_N_m for limit in limits(scenario, course.robot)) / gear / constant
+    )
+    amps = np.minimum(np.abs(need.torque_wheel_N_m) / gear / constant, most_A)
     square = float((amps**2).mean(axis=0).max())
     allowed_K = drive.derate_from_C - motor.ambient_C
     parts = [
@@ -259,18 +273,18 @@ def _warm_up_s(rise_K: float, allowed_K: float, time_s: float) -> tuple[float, f
 
 def _slew(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:
     """The host's slew limit against the time in which the law wants to reach the steady torque."""
-    slew = scenario.host.torque_slew_limit_N_m_s
+    slew = scenario.host.torque_slew_limit_wheel_N_m_s
     if slew is None:
         return
     control, body = scenario.control_of(course.robot), scenario.body_of(course.robot)
     lag_s = min(inertias(body)) / control.k4
-    takes_s = float(np.abs(need.torque_N_m).max()) / slew
+    takes_s = float(np.abs(need.torque_wheel_N_m).max()) / slew
     if takes_s > lag_s:
         yield Finding(
             "warning",
-            "host.torque_slew_limit_N_m_s",
+            "host.torque_slew_limit_wheel_N_m_s",
             f"{slew:g} N·m/s take {takes_s:.2g} s to the needed torque; the speed loop's time"
             f" constant m̄/k4 is {lag_s:.2g} s: the limit is felt as lag, and may swing",
             (course.robot.name,),
-            "host.torque_slew_limit_N_m_s",
+            "host.torque_slew_limit_wheel_N_m_s",
         )

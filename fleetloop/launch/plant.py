@@ -235,7 +235,7 @@ def _poses(units: Sequence[Unit], loop: RealtimeLoop) -> dict[str, Any]:
             "theta_rad": state.theta,
             "v_m_s": state.v,
             "omega_rad_s": state.omega,
-            "torque_right_N_m": row["motor_right_N_m"],
-            "torque_left_N_m": row["motor_left_N_m"],
+            "torque_right_wheel_N_m": row["motor_right_wheel_N_m"],
+            "torque_left_wheel_N_m": row["motor_left_wheel_N_m"],
         }
     return {"t_s": loop.progress().t_ns * 1e-9, "robots": robots}

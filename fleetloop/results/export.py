@@ -31,7 +31,7 @@ SIGNALS = tuple(
 """Every signal that can be asked for; `t_s` is in every table."""
 DEFAULT = (
     *("x_m", "y_m", "theta_rad", "v_m_s", "omega_rad_s", "s", "s_dot", "v_r_hat"),
-    *("x_e_m", "y_e_m", "theta_e_rad", "tau_right_N_m", "tau_left_N_m"),
+    *("x_e_m", "y_e_m", "theta_e_rad", "tau_right_wheel_N_m", "tau_left_wheel_N_m"),
 )
 _KEYS = ("t_s", "robot")
 

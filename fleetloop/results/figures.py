@@ -191,9 +191,9 @@ def torques(record: Record, _: Scenario) -> Figure:
         for n, robot in enumerate(record.robots):
             rows = record.controller[robot]
             colour, dash = _style(n)
-            t, values = _envelope(rows["t_s"], rows[f"tau_{side}_N_m"])
+            t, values = _envelope(rows["t_s"], rows[f"tau_{side}_wheel_N_m"])
             axes.plot(t, values, color=colour, linestyle=dash, linewidth=1.0, label=robot)
-        commanded = (np.abs(rows[f"tau_{side}_N_m"]) for rows in record.controller.values())
+        commanded = (np.abs(rows[f"tau_{side}_wheel_N_m"]) for rows in record.controller.values())
         peak = max(float(values.max(initial=0.0)) for values in commanded)
         if peak > 1.0:
             axes.set_yscale("symlog", linthresh=1.0, linscale=2.0)

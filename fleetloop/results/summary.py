@@ -166,13 +166,13 @@ def _cut_short(record: Record, scenario: Scenario, stats: RunStats) -> dict[str,
 
 def _robot(rows: np.ndarray, speed: Callable[[np.ndarray], np.ndarray]) -> dict[str, Any]:
     t, last = rows["t_s"], _final(rows["t_s"])
-    torque = max(_peak(rows["tau_right_N_m"]), _peak(rows["tau_left_N_m"]))
+    torque = max(_peak(rows["tau_right_wheel_N_m"]), _peak(rows["tau_left_wheel_N_m"]))
     return {
         "ticks": len(rows),
         "settle_s": {name: settle_s(t, rows[name]) for name in ERRORS},
         "final_max": {name: _peak(rows[name][last]) for name in ERRORS},
         "final_from_s": _seconds(t[last][0]),
-        "peak_torque_N_m": torque,
+        "peak_torque_wheel_N_m": torque,
         "settle_s_dot_s": settle_s(t, rows["s_dot"] - speed(np.rint(t * 1e9).astype(np.int64))),
     }
 
@@ -188,7 +188,7 @@ def _worst(robots: list[dict[str, Any]]) -> dict[str, Any] | None:
     return {
         "settle_s": {name: None if None in v else max(v) for name, v in settles.items()},
         "final_max": {name: max(robot["final_max"][name] for robot in robots) for name in ERRORS},
-        "peak_torque_N_m": max(robot["peak_torque_N_m"] for robot in robots),
+        "peak_torque_wheel_N_m": max(robot["peak_torque_wheel_N_m"] for robot in robots),
     }
 
 

@@ -24,7 +24,7 @@ def _of_every_error(values: dict[str, Any]) -> dict[str, Any]:
 class _Worst(BaseModel):
     settle_s: Annotated[dict[str, float | None], AfterValidator(_of_every_error)]
     final_max: Annotated[dict[str, float | None], AfterValidator(_of_every_error)]
-    peak_torque_N_m: float | None
+    peak_torque_wheel_N_m: float | None
 
 
 class _Robot(_Worst):

@@ -213,7 +213,7 @@ def claim(expect: dict[str, Any]) -> str:
 def _cells(values: dict[str, Any]) -> list[str]:
     settles = [_time(values["settle_s"][name]) for name in ERRORS]
     finals = [_number(values["final_max"][name], ".5f") for name in ERRORS]
-    return [*settles, *finals, _number(values["peak_torque_N_m"], ".2f")]
+    return [*settles, *finals, _number(values["peak_torque_wheel_N_m"], ".2f")]
 
 
 def _number(value: float | None, spec: str) -> str:

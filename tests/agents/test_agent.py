@@ -24,7 +24,7 @@ def test_a_controller_arms_in_the_countdown_and_drives_from_tick_0() -> None:
     frames = bench.tick()
     assert bench.agent.phase is Phase.DRIVING
     assert [frame.can_id for frame in frames] == [0x00E, 0x02E]
-    assert any(axis.torque_demand(0.0) != 0.0 for axis in bench.axes)
+    assert any(axis.torque_demand_shaft(0.0) != 0.0 for axis in bench.axes)
 
 
 def test_no_torque_but_zero_is_sent_before_control_starts() -> None:
@@ -54,7 +54,7 @@ def test_a_drive_that_drops_out_stops_both_wheels_and_sharing_goes_on() -> None:
     bench.run(119)
     assert bench.agent.phase is Phase.STOPPED
     assert "left drive (node 1) dropped out: ESTOP_REQUESTED" in bench.agent.guard.stopped_because
-    assert [axis.torque_demand(0.0) for axis in bench.axes] == [0.0, 0.0]
+    assert [axis.torque_demand_shaft(0.0) for axis in bench.axes] == [0.0, 0.0]
     before = bench.agent.share(120).s
     bench.run(20)
     assert bench.agent.share(140).s > before
@@ -67,7 +67,7 @@ def test_the_closing_tick_disarms() -> None:
     bench.tick_now = bench.schedule.ticks
     bench.tick()
     assert bench.agent.phase is Phase.DONE
-    assert [axis.torque_demand(0.0) for axis in bench.axes] == [0.0, 0.0]
+    assert [axis.torque_demand_shaft(0.0) for axis in bench.axes] == [0.0, 0.0]
 
 
 def test_what_is_missing_is_named() -> None:
@@ -97,7 +97,7 @@ def test_a_row_holds_what_was_used_and_commanded() -> None:
     assert (row["x_used_m"], row["y_used_m"]) == (1.95, 0.05)
     assert (row["s"], row["s_dot"], row["v_r_hat"], row["neighbours"]) == (0.0, 0.6, 0.6, 1.0)
     assert (row["x_d_m"], row["y_d_m"]) == pytest.approx((2.0, 0.0))
-    assert row["tau_right_N_m"] == bench.axes[0].torque_demand(0.0)
+    assert row["tau_right_wheel_N_m"] == bench.axes[0].torque_demand_shaft(0.0)
 
 
 def test_a_leader_link_moves_the_estimate_and_its_absence_does_not() -> None:

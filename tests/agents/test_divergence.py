@@ -77,7 +77,7 @@ def test_gains_beyond_all_numbers_are_no_reason_to_fail_before_the_run() -> None
 def test_whatever_encoders_say_the_controller_lives_and_sends_numbers(
     law: str, source: str, wheels: list[tuple[float, float, float, float]]
 ) -> None:
-    host = replace(BRIEF.host, encoder_mismatch_limit_rad=1e300)
+    host = replace(BRIEF.host, encoder_mismatch_limit_wheel_rad=1e300)
     bench = Bench("r2", law=law, localisation=source, host=host)
     bench.drive(3)
     for right, left, right_speed, left_speed in wheels:

@@ -200,7 +200,7 @@ def test_a_stopped_robot_stays_stopped_unless_told_otherwise() -> None:
 
 
 def test_an_encoder_that_jumps_or_a_pose_that_does_is_not_believed() -> None:
-    limits = ("host.encoder_mismatch_limit_rad=1.0", "host.pose_mismatch_limit_m=0.3")
+    limits = ("host.encoder_mismatch_limit_wheel_rad=1.0", "host.pose_mismatch_limit_m=0.3")
     bench = Bench("r2", *limits)
     bench.drive(50)
     bench.axes[0].feed(1.0, 0.0)
@@ -326,7 +326,7 @@ def test_a_frame_of_arming_that_was_not_sent_begins_it_anew() -> None:
 
 
 def test_the_law_and_the_limiter_begin_anew_after_arming_again() -> None:
-    bench = Bench("r2", *REARM, "host.torque_slew_limit_N_m_s=1.0")
+    bench = Bench("r2", *REARM, "host.torque_slew_limit_wheel_N_m_s=1.0")
     bench.drive(100)
     bench.reboot(0)
     failing(bench)
@@ -343,7 +343,10 @@ def test_the_law_and_the_limiter_begin_anew_after_arming_again() -> None:
 def test_torque_and_slew_limits_hold_on_the_bus_from_the_first_tick() -> None:
     free, held = (
         Bench("r2", *limits)
-        for limits in ((), ("host.torque_limit_N_m=0.3", "host.torque_slew_limit_N_m_s=5.0"))
+        for limits in (
+            (),
+            ("host.torque_limit_wheel_N_m=0.3", "host.torque_slew_limit_wheel_N_m_s=5.0"),
+        )
     )
     last = (0.0, 0.0)
     for bench in (free, held):

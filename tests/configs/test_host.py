@@ -19,7 +19,7 @@ def brief(*overrides: str, bus=(), robot: str = "r1"):
 def test_by_default_ages_are_limited_and_torques_are_not() -> None:
     host = brief().host
     assert host == HostLimits(pose_age_limit_ns=500_000_000)
-    assert host.torque_limit_N_m == host.torque_slew_limit_N_m_s == inf
+    assert host.torque_limit_wheel_N_m == host.torque_slew_limit_wheel_N_m_s == inf
     drives = brief().drives
     assert (drives.encoder_age_limit_ns, drives.heartbeat_age_limit_ns) == (50_000_000, 500_000_000)
 
@@ -48,8 +48,12 @@ def test_plant_and_controller_are_told_the_same_mounting_robot_by_robot() -> Non
 @pytest.mark.parametrize(
     ("override", "key", "right"),
     [
-        ("host.torque_limit_N_m=0", "host.torque_limit_N_m", "greater than 0"),
-        ("host.torque_slew_limit_N_m_s=-1.0", "host.torque_slew_limit_N_m_s", "greater than 0"),
+        ("host.torque_limit_wheel_N_m=0", "host.torque_limit_wheel_N_m", "greater than 0"),
+        (
+            "host.torque_slew_limit_wheel_N_m_s=-1.0",
+            "host.torque_slew_limit_wheel_N_m_s",
+            "greater than 0",
+        ),
         ("host.heartbeat_age_limit_s=0.15", "host.heartbeat_age_limit_s", "0.2 s, or more"),
         ("host.encoder_age_limit_s=0.001", "host.encoder_age_limit_s", "0.004 s, or more"),
         ("host.pose_age_limit_s=0.01", "host.pose_age_limit_s", "or more"),

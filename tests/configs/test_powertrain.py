@@ -28,11 +28,11 @@ def test_the_defaults_are_those_of_a_small_robot_on_odrives() -> None:
     motor, encoder, supply = model().motor, model().encoder, model().supply
     assert motor.torque_constant_N_m_A * motor.current_limit_A == pytest.approx(0.5)
     assert (motor.current_loop_s, motor.compute_delay_s) == (0.001, 0.000125)
-    assert (motor.viscous_friction_N_m_s, motor.coulomb_friction_N_m) == (2e-4, 5e-3)
-    assert (motor.torque_noise_N_m, motor.current_quantum_A) == (1e-3, 0.01)
+    assert (motor.viscous_friction_shaft_N_m_s, motor.coulomb_friction_shaft_N_m) == (2e-4, 5e-3)
+    assert (motor.torque_noise_shaft_N_m, motor.current_quantum_A) == (1e-3, 0.01)
     assert (motor.motor_thermal_time_s, motor.fet_thermal_time_s) == (60.0, 60.0)
     assert motor.ambient_C == 25.0
-    assert (encoder.counts_per_rev, encoder.pll_bandwidth_rad_s) == (8192, 1000.0)
+    assert (encoder.counts_per_shaft_rev, encoder.pll_bandwidth_rad_s) == (8192, 1000.0)
     assert encoder.pll_rate_Hz == 8000.0
     assert (supply.voltage_V, supply.resistance_ohm, supply.absorbs) == (24.0, 0.1, True)
 
@@ -77,8 +77,8 @@ def test_every_robot_of_every_seed_has_a_noise_of_its_own() -> None:
         ("motor.winding_resistance_ohm=-1.0", "motor.winding_resistance_ohm", "greater than 0"),
         ("motor.ambient_C=-300.0", "motor.ambient_C", "greater than -273.15"),
         ("motor.friction=1.0", "motor.friction", "unknown key"),
-        ("encoder.counts_per_rev=0", "encoder.counts_per_rev", "must be 4 or more"),
-        ("encoder.counts_per_rev=8192.5", "encoder.counts_per_rev", "whole number"),
+        ("encoder.counts_per_shaft_rev=0", "encoder.counts_per_shaft_rev", "must be 4 or more"),
+        ("encoder.counts_per_shaft_rev=8192.5", "encoder.counts_per_shaft_rev", "whole number"),
         ("encoder.pll_bandwidth_rad_s=4000.0", "encoder.pll_bandwidth_rad_s", "below half"),
         ("encoder.pll_rate_Hz=1.0", "encoder.pll_rate_Hz", "must be 100 or more"),
         ("supply.voltage_V=0.0", "supply.voltage_V", "greater than 0"),

@@ -33,7 +33,7 @@ def test_the_summary_holds_what_is_promised(finished_run: Path) -> None:
                 "theta_e_rad",
             }
         )
-        assert robot["peak_torque_N_m"] > 0
+        assert robot["peak_torque_wheel_N_m"] > 0
     assert set(summary["s_spread"]) == {"peak", "settle_s", "final", "final_from_s"}
     # The last five seconds of a run of four are all of them.
     assert summary["s_spread"]["final_from_s"] == 0.0

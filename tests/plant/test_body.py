@@ -48,7 +48,7 @@ def test_equal_torques_from_rest_give_the_closed_form_of_a_first_order_lag() -> 
     assert end.v == pytest.approx(final * (1 - exp(-rate * 2.0)), rel=1e-9)
     assert end.x == pytest.approx(final * (2.0 - (1 - exp(-rate * 2.0)) / rate), rel=1e-9)
     assert (end.y, end.theta, end.omega) == (0.0, 0.0, 0.0)
-    assert end.right_angle == pytest.approx(end.x / 0.04, rel=1e-12)
+    assert end.right_wheel_rad == pytest.approx(end.x / 0.04, rel=1e-12)
 
 
 def test_opposite_torques_turn_on_the_spot_with_the_centre_of_mass_on_the_axle() -> None:
@@ -61,7 +61,7 @@ def test_opposite_torques_turn_on_the_spot_with_the_centre_of_mass_on_the_axle()
 
 @given(st.floats(-2, 2), st.floats(-5, 5))
 def test_without_damping_and_torque_energy_stays(v: float, omega: float) -> None:
-    robot = Robot(replace(ETSRO, damping_right_N_m_s=0.0, damping_left_N_m_s=0.0), CALM)
+    robot = Robot(replace(ETSRO, damping_right_wheel_N_m_s=0.0, damping_left_wheel_N_m_s=0.0), CALM)
     end = run(robot, REST._replace(v=v, omega=omega), 0.0, 0.0, 0.5)
 
     # Energy in body speeds: m̄_1 v² + b² m̄_2 ω², up to the factor 1/r².
@@ -75,7 +75,7 @@ def test_without_damping_and_torque_energy_stays(v: float, omega: float) -> None
 
 @given(st.floats(0, 0.1), st.floats(0, 0.1), st.floats(-2, 2), st.floats(-5, 5))
 def test_damping_with_unequal_sides_never_adds_energy(right, left, v, omega) -> None:
-    body = replace(ETSRO, damping_right_N_m_s=right, damping_left_N_m_s=left)
+    body = replace(ETSRO, damping_right_wheel_N_m_s=right, damping_left_wheel_N_m_s=left)
     robot = Robot(body, CALM)
     dv, domega = robot.accelerations(v, omega, 0.0, 0.0)
     power = robot.mbar_1 * v * dv + 0.01 * robot.mbar_2 * omega * domega
@@ -83,7 +83,7 @@ def test_damping_with_unequal_sides_never_adds_energy(right, left, v, omega) -> 
 
 
 def test_the_step_is_of_fourth_order() -> None:
-    robot = Robot(replace(ETSRO, damping_left_N_m_s=0.01), Disturbance(0.02, 9.0, 0.3))
+    robot = Robot(replace(ETSRO, damping_left_wheel_N_m_s=0.01), Disturbance(0.02, 9.0, 0.3))
     start = REST._replace(v=0.5, omega=2.0)
     fine = run(robot, start, 0.06, 0.02, 0.512, 0.001)
     errors = [abs(run(robot, start, 0.06, 0.02, 0.512, step).y - fine.y) for step in (0.064, 0.032)]
@@ -93,7 +93,7 @@ def test_the_step_is_of_fourth_order() -> None:
 def test_wheel_angles_follow_from_what_the_body_did() -> None:
     robot = Robot(ETSRO, CALM)
     end = run(robot, REST, 0.06, 0.01, 1.0)
-    assert 0.5 * 0.04 / 0.1 * (end.right_angle - end.left_angle) == pytest.approx(end.theta)
+    assert 0.5 * 0.04 / 0.1 * (end.right_wheel_rad - end.left_wheel_rad) == pytest.approx(end.theta)
 
 
 def test_the_disturbance_is_a_sine_and_a_cosine_from_t_0_on() -> None:
@@ -114,12 +114,12 @@ def test_a_disturbance_acts_like_the_opposite_torque() -> None:
     ("v", "omega"), [(1e308, 1e308), (4.1e4, 0.0), (0.0, 4.1e5), (inf, 0.0), (nan, 0.0)]
 )
 def test_a_step_that_leaves_the_bounds_of_a_motion_leads_nowhere(v: float, omega: float) -> None:
-    robot = Robot(replace(ETSRO, damping_right_N_m_s=0.0, damping_left_N_m_s=0.0), CALM)
+    robot = Robot(replace(ETSRO, damping_right_wheel_N_m_s=0.0, damping_left_wheel_N_m_s=0.0), CALM)
     assert rk4(robot, REST._replace(v=v, omega=omega), 0.0, 0.0, 1.5, 0.001) is None
 
 
 def test_the_fastest_motion_is_that_of_the_fastest_wheel() -> None:
-    robot = Robot(replace(ETSRO, com_offset_m=0.0, damping_right_N_m_s=0.0), CALM)
+    robot = Robot(replace(ETSRO, com_offset_m=0.0, damping_right_wheel_N_m_s=0.0), CALM)
     fastest = REST._replace(v=0.0399 * FASTEST_WHEEL_RAD_S)
     assert rk4(robot, fastest, 0.0, 0.0, 0.0, 0.001) is not None
     assert rk4(robot, fastest, 200.0, 200.0, 0.0, 1.0) is None

@@ -25,7 +25,7 @@ def turn_to(made: Encoder, angle: Callable[[float], float], seconds: float, step
 
 def noise(counts: int, bandwidth: float, rev_s: float) -> float:
     """Velocity error [rev/s rms] at every loop of the drive, from power-up on, once settled."""
-    made = encoder(counts_per_rev=counts, pll_bandwidth_rad_s=bandwidth)
+    made = encoder(counts_per_shaft_rev=counts, pll_bandwidth_rad_s=bandwidth)
     errors = []
     for n in range(1, 12_000):
         _, speed = made.step(TURN * rev_s * n * LOOP_S, LOOP_S)
@@ -70,7 +70,7 @@ def test_a_steady_speed_is_found_at_every_step_and_without_bias(
 
 
 def test_a_step_of_speed_is_followed_as_two_poles_at_the_bandwidth() -> None:
-    made = encoder(counts_per_rev=1 << 22, pll_bandwidth_rad_s=200.0)
+    made = encoder(counts_per_shaft_rev=1 << 22, pll_bandwidth_rad_s=200.0)
     for n in range(1, 400):
         _, speed = made.step(TURN * 2.0 * n * LOOP_S, LOOP_S)
         wt = 200.0 * n * LOOP_S
@@ -81,7 +81,7 @@ def test_a_step_of_speed_is_followed_as_two_poles_at_the_bandwidth() -> None:
 def test_a_ramp_of_speed_is_followed_with_the_lag_of_a_double_integrator_loop(
     bandwidth: float, seconds: float
 ) -> None:
-    made, rate = encoder(counts_per_rev=1 << 22, pll_bandwidth_rad_s=bandwidth), 5.0  # rev/s²
+    made, rate = encoder(counts_per_shaft_rev=1 << 22, pll_bandwidth_rad_s=bandwidth), 5.0  # rev/s²
     lags, behind = [], []
     for n in range(1, round(seconds / LOOP_S)):
         t = n * LOOP_S

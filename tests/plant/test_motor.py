@@ -16,7 +16,7 @@ from plant.integrate import rk4
 from plant.motor import IdealMotor, Motor, MotorFault
 from plant.supply import SupplyFault
 
-FREE = {"viscous_friction_N_m_s": 0.0, "coulomb_friction_N_m": 0.0}
+FREE = {"viscous_friction_shaft_N_m_s": 0.0, "coulomb_friction_shaft_N_m": 0.0}
 TAU_S, DELAY_S = 1e-3, 1.25e-4
 STEPS_S = [0.00005, 0.0001, 0.000125, 0.0003, 0.0005, 0.001, 0.01]
 ANY = st.floats(allow_nan=True, allow_infinity=True) | st.sampled_from([3e38, -3e38, 1e308])
@@ -75,7 +75,7 @@ def test_no_demand_takes_the_current_above_its_limit() -> None:
 
 
 def test_a_wrong_torque_constant_in_the_drive_shows_at_the_wheel_and_not_in_its_estimate() -> None:
-    made = motor(torque_constant_N_m_A=0.04, torque_noise_N_m=0.0, **FREE)
+    made = motor(torque_constant_N_m_A=0.04, torque_noise_shaft_N_m=0.0, **FREE)
     assert settled(made, 0.2) == pytest.approx(0.16)
     assert made.sense()[0] == pytest.approx(0.2)
 
@@ -192,7 +192,7 @@ def test_friction_never_pushes_a_wheel_the_way_it_goes(
     made = motor()
     for _ in range(20):
         torque = made.step(demand, speed, step_s)
-        friction = made.torque_N_m - torque
+        friction = made.torque_shaft_N_m - torque
         speed += step_s * torque / INERTIA
         assert friction * speed >= -1e-15
         assert abs(friction) <= 5e-3 + 2e-4 * abs(speed) + 1e-12
@@ -208,7 +208,7 @@ def test_friction_at_both_wheels_of_a_body_never_adds_energy(
 ) -> None:
     robot = Robot(replace(ETSRO, com_offset_m=com_offset_m), Disturbance(0.0, 0.0, 0.0))
     inertia = min(robot.mbar_1, robot.mbar_2)
-    model, source = motor_model(coulomb_friction_N_m=0.05), supply()
+    model, source = motor_model(coulomb_friction_shaft_N_m=0.05), supply()
     right = Motor(model, inertia, source, Random(1))
     left = Motor(model, inertia, source, Random(2))
     state = State(0.0, 0.0, 0.0, v, omega, 0.0, 0.0)
@@ -251,7 +251,7 @@ def test_the_estimate_is_noisy_and_the_current_comes_in_steps() -> None:
 
 
 def test_noise_and_steps_may_be_switched_off() -> None:
-    made = motor(torque_noise_N_m=0.0, current_quantum_A=0.0)
+    made = motor(torque_noise_shaft_N_m=0.0, current_quantum_A=0.0)
     settled(made, 0.1234)
     assert made.sense() == pytest.approx((0.1234, 2.468))
 

@@ -46,7 +46,7 @@ def test_a_mounting_changes_the_shafts_and_nothing_at_the_wheels(overrides, shaf
     motion, row, robot = driven(*overrides)
     assert motion == pytest.approx(plain, rel=1e-6)
     assert row == pytest.approx(plain_row, rel=1e-6)
-    assert [drive.input_torque for drive in robot.drives] == pytest.approx(shafts)
+    assert [drive.input_torque_shaft for drive in robot.drives] == pytest.approx(shafts)
 
 
 def test_a_real_motor_that_is_mirrored_drives_its_wheel_forward_too() -> None:

@@ -37,7 +37,7 @@ def test_the_source_pays_for_motion_heat_and_standby_of_both_wheels(
     current = supply.right_A + supply.left_A
     power = 2.0 * MODEL.supply.standby_W
     for motor, speed in zip((parts.right_motor, parts.left_motor), speeds, strict=True):
-        power += motor.torque_N_m * speed + 0.22 * motor.current_A**2
+        power += motor.torque_shaft_N_m * speed + 0.22 * motor.current_A**2
     assert MODEL.supply.voltage_V * current == pytest.approx(
         power + MODEL.supply.resistance_ohm * current**2, abs=1e-6
     )

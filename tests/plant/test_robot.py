@@ -67,8 +67,8 @@ def test_a_row_is_the_truth_and_the_torques_of_the_last_period() -> None:
     row = dict(zip(COLUMNS, robot.row(0.001), strict=True))
     assert row["t_s"] == 0.001
     assert row["v_m_s"] == robot.state.v
-    assert row["demand_right_N_m"] == row["motor_right_N_m"] == pytest.approx(0.1)
-    assert row["demand_left_N_m"] == pytest.approx(0.05)
+    assert row["demand_right_wheel_N_m"] == row["motor_right_wheel_N_m"] == pytest.approx(0.1)
+    assert row["demand_left_wheel_N_m"] == pytest.approx(0.05)
 
 
 def test_feedback_comes_once_both_drives_have_taken_a_set_point() -> None:

@@ -188,7 +188,7 @@ def test_an_interface_that_goes_down_and_up_disarms_the_drive_and_is_reported(
         with can.Bus(**plant.buses["r1"]) as bus:
             disarmed = next(m for m in heartbeats(bus, 10.0) if m.data[4] == 1)
         assert int.from_bytes(disarmed.data[:4], "little") == 0x01000000  # WATCHDOG_TIMER_EXPIRED
-        assert plant.poses()["r1"].torque_right_N_m == 0.0
+        assert plant.poses()["r1"].torque_right_wheel_N_m == 0.0
         assert re.search(r"BUS r1: 1 × failed for .* s in all, \d+ frames not sent", plant.stop())
 
 
@@ -224,7 +224,7 @@ def test_a_run_survives_an_interface_that_goes_down_and_up_and_arms_again(
     assert set(torques) == {bytes(4)}
     rows = Record.open(tmp_path / "run" / "record.mcap").controller
     assert {robot: len(of_robot) for robot, of_robot in rows.items()} == {"r1": 1400, "r2": 1400}
-    assert np.abs(rows["r1"]["tau_right_N_m"][-100:]).min() > 0.0  # it drives again
+    assert np.abs(rows["r1"]["tau_right_wheel_N_m"][-100:]).min() > 0.0  # it drives again
 
 
 def heard(bus: can.BusABC, torques: int, within_s: float) -> list[tuple[float, int, bytes]]:

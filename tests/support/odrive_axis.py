@@ -15,8 +15,8 @@ MODEL = DriveModel(
     protocol="odrive",
     torque_constant_N_m_A=0.05,
     current_limit_A=10.0,
-    velocity_limit_rev_s=10.0,
-    velocity_gain_N_m_s_rev=1 / 6,
+    velocity_limit_shaft_rev_s=10.0,
+    velocity_gain_shaft_N_m_s_rev=1 / 6,
     overspeed_ratio=1.2,
     torque_limiters=True,
     heartbeat_period_ns=100 * MS,
@@ -27,7 +27,7 @@ MODEL = DriveModel(
     serial_number=0xABCDEF,
 )
 HEALTHY = Feeling(
-    torque_N_m=0.0, current_A=0.0, fet_C=30.0, motor_C=float("nan"), bus_V=24.0, bus_A=0.0
+    torque_shaft_N_m=0.0, current_A=0.0, fet_C=30.0, motor_C=float("nan"), bus_V=24.0, bus_A=0.0
 )
 
 

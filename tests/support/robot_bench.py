@@ -118,7 +118,7 @@ class Bench:
 
     def torques(self) -> tuple[float, float]:
         """What the drives ask of their motors."""
-        right, left = (axis.torque_demand(0.0) for axis in self.axes)
+        right, left = (axis.torque_demand_shaft(0.0) for axis in self.axes)
         return right, left
 
     def closed(self) -> list[bool]:

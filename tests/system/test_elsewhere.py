@@ -170,7 +170,7 @@ def test_a_controller_elsewhere_that_is_interrupted_says_so_and_leaves_its_drive
         run.kill()
     assert status == 130
     assert "interrupted by SIGTERM" in said
-    torque = Record.open(tmp_path / "run" / "record.mcap").plant["r2"]["motor_right_N_m"]
+    torque = Record.open(tmp_path / "run" / "record.mcap").plant["r2"]["motor_right_wheel_N_m"]
     assert torque[-1] == 0.0
 
 

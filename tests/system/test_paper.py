@@ -65,8 +65,8 @@ def test_an_unequal_damping_and_a_disturbance_are_learned(tmp_path: Path) -> Non
         tmp_path / "run",
         "duration_s=20.0",
         "expect=[]",
-        "robot_types.etsro.damping_left_N_m_s=0.03",
-        "disturbance={amplitude_N_m=0.02, rate_rad_s=0.5}",
+        "robot_types.etsro.damping_left_wheel_N_m_s=0.03",
+        "disturbance={amplitude_wheel_N_m=0.02, rate_rad_s=0.5}",
     )
     finals = summary["worst"]["final_max"]
     assert max(finals.values()) < 0.02

@@ -56,15 +56,15 @@ async def drive_left_wheel(plant: EmulatedPlant) -> None:
             before = plant.poses()["r1"]
             await until(lambda: plant.poses()["r1"].theta_rad < before.theta_rad - 0.1, push)
             pushed = plant.poses()["r1"]
-            assert pushed.torque_left_N_m == pytest.approx(0.1)
-            assert pushed.torque_right_N_m == 0.0
+            assert pushed.torque_left_wheel_N_m == pytest.approx(0.1)
+            assert pushed.torque_right_wheel_N_m == 0.0
             assert feedback[-1].data["Vel_Estimate"] > 0.0
             assert feedback[-1].data["Pos_Estimate"] > feedback[0].data["Pos_Estimate"]
             axis._send_message("Estop")
             await until(lambda: axis.axis_state == "IDLE", push)
             with pytest.raises(DriveError, match="ESTOP_REQUESTED"):
                 axis.check_errors()
-            assert plant.poses()["r1"].torque_left_N_m == 0.0
+            assert plant.poses()["r1"].torque_left_wheel_N_m == 0.0
             axis.clear_errors()
             await axis.wait_for_heartbeat()
             await axis.wait_for_heartbeat()
@@ -82,7 +82,7 @@ def test_a_client_that_falls_silent_is_disarmed_by_the_watchdog(fleetloop_plant)
     assert states[:1] in ([1], [8])
     assert 8 in states
     assert states[-1] == 1
-    assert plant.poses()["r1"].torque_right_N_m == 0.0
+    assert plant.poses()["r1"].torque_right_wheel_N_m == 0.0
 
 
 def test_an_absurd_set_point_ends_the_motion_of_its_robot_alone() -> None:

@@ -76,9 +76,9 @@ def test_a_real_robot_and_an_emulated_one_keep_their_formation(tmp_path: Path) -
     record = Record.open(tmp_path / "run" / "record.mcap")
     truth = record.plant["r2"]
     assert truth["tick"].tolist() == list(range(1000))
-    assert np.isnan(truth["motor_right_N_m"]).all()
+    assert np.isnan(truth["motor_right_wheel_N_m"]).all()
     # What was recorded of it is where it was, and it has been left without torque: from then on it
     # coasts by v m̄_1 / d̄_11 = 0.6 · 0.0077 / 0.02 = 0.23 m at most.
     assert np.hypot(truth["x_m"][-1] - after.x_m, truth["y_m"][-1] - after.y_m) < 0.25
-    assert after.torque_right_N_m == 0.0
+    assert after.torque_right_wheel_N_m == 0.0
     assert run.summary()["verdict"] == "held"

@@ -34,7 +34,7 @@ def test_a_real_time_run_takes_its_time_and_records_every_tick(tmp_path: Path) -
         # It goes where it should, whatever the machine was doing.
         errors = np.hypot(record.controller[robot]["x_e_m"], record.controller[robot]["y_e_m"])
         assert errors[-1] < 0.5 * errors[0]
-        assert np.abs(record.controller[robot]["tau_right_N_m"]).max() <= 2.0
+        assert np.abs(record.controller[robot]["tau_right_wheel_N_m"]).max() <= 2.0
 
 
 def test_lockstep_runs_the_same_scenario_without_the_clock(tmp_path: Path) -> None:

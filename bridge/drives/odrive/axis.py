@@ -30,7 +30,7 @@ class Axis:
         "_encoder_cadence",
         "_heartbeat_cadence",
         "_heartbeats",
-        "angle_rad",
+        "angle_wheel_rad",
         "closed_loop",
         "commanded",
         "encoder_frames",
@@ -38,26 +38,26 @@ class Axis:
         "heard_ns",
         "name",
         "node",
-        "radians",
         "result",
-        "speed_rad_s",
+        "speed_wheel_rad_s",
         "stamp_ns",
         "state",
         "to_shaft",
         "to_wheel",
         "trouble",
+        "wheel_rad_per_shaft_rev",
     )
 
     def __init__(self, name: str, node: int, sign: int, link: DriveLink) -> None:
         ratio = link.mounting.gear_ratio
         self.name = f"{name} drive (node {node})"
         self.node = node
-        self.radians = 2.0 * pi * sign / ratio
+        self.wheel_rad_per_shaft_rev = 2.0 * pi * sign / ratio
         """Wheel angle per shaft revolution."""
         self.to_shaft = sign / ratio
         self.to_wheel = sign * ratio
         """Torque at the wheel per torque at the shaft."""
-        self.angle_rad = self.speed_rad_s = 0.0
+        self.angle_wheel_rad = self.speed_wheel_rad_s = 0.0
         self.stamp_ns = NEVER
         self.heard_ns: int | None = None
         self.state = int(AxisState.UNDEFINED)

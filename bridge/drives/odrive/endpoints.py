@@ -108,7 +108,7 @@ def _input(write: Callable[[Axis, float], None]) -> Write:
 
 
 def _input_torque(axis: Axis, value: float) -> None:
-    axis.input_torque = value
+    axis.input_torque_shaft = value
 
 
 def _input_velocity(axis: Axis, value: float) -> None:
@@ -152,7 +152,7 @@ def _rows() -> Iterator[tuple[str, str, Read] | tuple[str, str, Read, Write]]:
     at = "axis0.controller"
     yield f"{at}.input_pos", "f", lambda x: x.controller.input_position, _input(_input_position)
     yield f"{at}.input_vel", "f", lambda x: x.controller.input_velocity, _input(_input_velocity)
-    yield f"{at}.input_torque", "f", lambda x: x.input_torque, _input(_input_torque)
+    yield f"{at}.input_torque", "f", lambda x: x.input_torque_shaft, _input(_input_torque)
     yield f"{at}.trajectory_done", "?", lambda x: x.controller.trajectory_done
     modes = "control_mode", "input_mode"
     yield (

@@ -74,7 +74,7 @@ class SpinoutDetector:
     def detects(self, feeling: Feeling, velocity_rev_s: float, dt_s: float) -> bool:
         """Take what was measured over `dt_s`."""
         keep = exp(-_POWER_BANDWIDTH_RAD_S * dt_s)
-        mechanical = feeling.torque_N_m * velocity_rev_s * 2.0 * pi
+        mechanical = feeling.torque_shaft_N_m * velocity_rev_s * 2.0 * pi
         electrical = feeling.bus_V * feeling.bus_A
         self._mechanical_W = mechanical + keep * (self._mechanical_W - mechanical)
         self._electrical_W = electrical + keep * (self._electrical_W - electrical)

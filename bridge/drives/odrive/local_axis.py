@@ -92,7 +92,7 @@ class OdriveNode(Axis):
             (torque,) = _UNPACK_FLOAT(data)
             if -FLOAT32_MAX <= torque <= FLOAT32_MAX:
                 self.fed_ns = now_ns
-                self.input_torque = torque
+                self.input_torque_shaft = torque
             else:
                 self.set_torque(torque, now_ns)
             return _NONE

@@ -54,7 +54,7 @@ class Axis:
         "errors",
         "fed_ns",
         "feeling",
-        "input_torque",
+        "input_torque_shaft",
         "model",
         "parameters",
         "position",
@@ -76,7 +76,7 @@ class Axis:
         self.state = AxisState.IDLE
         self.errors, self.disarm_reason = self._lasting, AxisError(0)
         self.result = Result.SUCCESS
-        self.input_torque = self.demand = 0.0
+        self.input_torque_shaft = self.demand = 0.0
         self.position = self.velocity = self._offset = 0.0
         self.feeling: Feeling | None = None
         self.fed_ns = 0
@@ -134,18 +134,18 @@ class Axis:
         if raised:
             self.disarm(AxisError(raised))
 
-    def torque_demand(self, dt_s: float = 0.0) -> float:
+    def torque_demand_shaft(self, dt_s: float = 0.0) -> float:
         """Torque asked of the motor for the next `dt_s` [N·m]; always finite, 0 unless armed."""
         if self.state is not AxisState.CLOSED_LOOP_CONTROL:
             return 0.0
         if self._plain:
-            return self.input_torque
+            return self.input_torque_shaft
         self._check_motion()
         if self.state is not AxisState.CLOSED_LOOP_CONTROL:
             return 0.0
         self._unfelt_s += dt_s
         motion = self.position, self.velocity
-        torque = self.controller.step(dt_s, self.input_torque, motion, self._torque_limit)
+        torque = self.controller.step(dt_s, self.input_torque_shaft, motion, self._torque_limit)
         if not -FLOAT32_MAX <= torque <= FLOAT32_MAX:
             self.disarm(AxisError.BAD_CONFIG)
             return 0.0
@@ -153,10 +153,10 @@ class Axis:
         return torque
 
     @property
-    def effective_torque(self) -> float:
+    def effective_torque_shaft(self) -> float:
         """The torque that it asks for now, without going on [N·m]."""
         if self._plain and self.state is AxisState.CLOSED_LOOP_CONTROL:
-            return self.input_torque
+            return self.input_torque_shaft
         return self.demand
 
     # --- supervision -----------------------------------------------------------------------------
@@ -208,11 +208,11 @@ class Axis:
     def set_torque(self, torque: float, now_ns: int) -> None:
         """Take a torque input [N·m]. NaN disarms, and so does ∞ where nothing limits it."""
         if torque != torque or not (self.model.torque_limiters or isfinite(torque)):
-            self.input_torque = 0.0
+            self.input_torque_shaft = 0.0
             self.disarm(AxisError.BAD_CONFIG)
             return
         self.fed_ns = now_ns
-        self.input_torque = min(max(torque, -FLOAT32_MAX), FLOAT32_MAX)
+        self.input_torque_shaft = min(max(torque, -FLOAT32_MAX), FLOAT32_MAX)
 
     def set_velocity(self, velocity: float, torque: float, now_ns: int) -> None:
         """Take a velocity input [rev/s] and its feed-forward, the torque input from now on."""
@@ -301,4 +301,4 @@ class Axis:
         self._silence_ns = NEVER
         self.calibration.cancel()
         if self.model.zero_torque_on_disarm:
-            self.input_torque = self.controller.input_velocity = 0.0
+            self.input_torque_shaft = self.controller.input_velocity = 0.0

@@ -89,8 +89,8 @@ class OdriveClient:
             angle, speed = _UNPACK_TWO(data)
             total = angle + speed
             if total - total == 0.0:  # both are finite
-                axis.angle_rad = angle * axis.radians
-                axis.speed_rad_s = speed * axis.radians
+                axis.angle_wheel_rad = angle * axis.wheel_rad_per_shaft_rev
+                axis.speed_wheel_rad_s = speed * axis.wheel_rad_per_shaft_rev
                 axis.stamp_ns = now_ns
                 axis.encoder_frames += 1
         elif not data:
@@ -105,7 +105,12 @@ class OdriveClient:
         right, left = self._right, self._left
         if right.stamp_ns == NEVER or left.stamp_ns == NEVER:
             return None
-        return right.angle_rad, left.angle_rad, right.speed_rad_s, left.speed_rad_s
+        return (
+            right.angle_wheel_rad,
+            left.angle_wheel_rad,
+            right.speed_wheel_rad_s,
+            left.speed_wheel_rad_s,
+        )
 
     # --- arming ----------------------------------------------------------------------------------
 
@@ -130,7 +135,7 @@ class OdriveClient:
             case _Step.SET:
                 self._step = _Step.CLOSE
                 limits = f.TWO_FLOATS.pack(
-                    self._link.velocity_limit_rev_s, self._link.current_limit_A
+                    self._link.velocity_limit_shaft_rev_s, self._link.current_limit_A
                 )
                 mode = f.TWO_U32.pack(ControlMode.TORQUE, InputMode.PASSTHROUGH)
                 return [
@@ -215,13 +220,15 @@ class OdriveClient:
 
     # --- torque ----------------------------------------------------------------------------------
 
-    def torque(self, right_N_m: float, left_N_m: float) -> tuple[Frame, Frame]:
+    def torque(self, right_wheel_N_m: float, left_wheel_N_m: float) -> tuple[Frame, Frame]:
         """Set-points for both wheels [N·m]; beyond float32 they saturate."""
         to_right, to_left = self._to_shaft
         try:
-            both = _PACK_TWO(right_N_m * to_right, left_N_m * to_left)
+            both = _PACK_TWO(right_wheel_N_m * to_right, left_wheel_N_m * to_left)
         except OverflowError:
-            both = _PACK_TWO(_saturated(right_N_m * to_right), _saturated(left_N_m * to_left))
+            both = _PACK_TWO(
+                _saturated(right_wheel_N_m * to_right), _saturated(left_wheel_N_m * to_left)
+            )
         right, left = _UNPACK_TWO(both)
         of_right, of_left = self._to_wheel
         self.sent = (right * of_right, left * of_left)

@@ -74,7 +74,7 @@ def bus(axis: Axis) -> bytes:
 
 def torques(axis: Axis) -> bytes:
     """Get_Torques: target after limits, and estimate."""
-    return floats(axis.effective_torque, _torque_estimate(axis))
+    return floats(axis.effective_torque_shaft, _torque_estimate(axis))
 
 
 def powers(axis: Axis) -> bytes:
@@ -84,7 +84,7 @@ def powers(axis: Axis) -> bytes:
 
 def iq_setpoint(axis: Axis) -> float:
     """Current asked for [A]."""
-    return axis.effective_torque / axis.model.torque_constant_N_m_A
+    return axis.effective_torque_shaft / axis.model.torque_constant_N_m_A
 
 
 def iq_measured(axis: Axis) -> float:
@@ -103,7 +103,7 @@ def bus_current(axis: Axis) -> float:
 
 
 def _torque_estimate(axis: Axis) -> float:
-    return axis.effective_torque if axis.feeling is None else axis.feeling.torque_N_m
+    return axis.effective_torque_shaft if axis.feeling is None else axis.feeling.torque_shaft_N_m
 
 
 def _mechanical_power(axis: Axis) -> float:

@@ -86,7 +86,7 @@ def test_a_section_that_the_preset_does_not_look_at_is_warned_of() -> None:
 def test_the_worst_level_is_told_to_machines(capsys: pytest.CaptureFixture[str]) -> None:
     for change, worst_level in (
         ("control.k1=2.0", "ok"),
-        ("control.torque_limit_N_m=0.9", "warning"),
+        ("control.torque_limit_wheel_N_m=0.9", "warning"),
     ):
         check_scenario("realtime_100hz", (change, "duration_s=30.0"), as_json=True)
         said = json.loads(capsys.readouterr().out)

@@ -27,7 +27,7 @@ def test_robots_that_stop_themselves_are_named_with_the_reason() -> None:
 
 
 def test_robots_that_end_off_their_paths_are_named() -> None:
-    weak = "control.torque_limit_N_m=0.1", "duration_s=12.0", "expect=[]"
+    weak = "control.torque_limit_wheel_N_m=0.1", "duration_s=12.0", "expect=[]"
     found = rehearse(load("two_robots_100hz", weak))
     assert worst(found) == "error"
     assert all("off its path at the end" in finding.text for finding in found)

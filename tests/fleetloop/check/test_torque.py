@@ -21,7 +21,9 @@ coordination = { v_hat_0 = 0.6 }
 path = { kind = "line" }
 robot = [{ name = "r1", pose = { x_m = 0.0, y_m = 0.0 } }]
 """
-LIMITED = "drive = { preset = 'limited', velocity_limit_rev_s = 1000.0, current_limit_A = %s }\n"
+LIMITED = (
+    "drive = { preset = 'limited', velocity_limit_shaft_rev_s = 1000.0, current_limit_A = %s }\n"
+)
 
 
 def scenario_of(*lines: str, path: str = '{ kind = "line" }', law: str = "") -> Scenario:
@@ -41,7 +43,7 @@ def finding_of(scenario: Scenario) -> Finding:
 
 def most(scenario: Scenario) -> float:
     (course,) = courses(scenario, forecast(scenario))
-    return float(needed(scenario, course).torque_N_m.max())
+    return float(needed(scenario, course).torque_wheel_N_m.max())
 
 
 def test_on_a_line_it_is_damping_times_speed_over_radius() -> None:
@@ -57,9 +59,9 @@ def test_on_a_circle_the_outer_wheel_has_d_v_plus_b_omega_over_r() -> None:
 def test_friction_is_counted_through_the_gear_and_the_disturbance_at_its_largest() -> None:
     geared = scenario_of(
         "mounting = { gear_ratio = 3.0 }",
-        "motor = { coulomb_friction_N_m = 0.01, viscous_friction_N_m_s = 1e-3 }",
+        "motor = { coulomb_friction_shaft_N_m = 0.01, viscous_friction_shaft_N_m_s = 1e-3 }",
         "drive = { preset = 'realistic' }",
-        "disturbance = { amplitude_N_m = 0.05 }",
+        "disturbance = { amplitude_wheel_N_m = 0.05 }",
     )
     assert most(geared) == pytest.approx(0.3 + 3 * 0.01 + 9 * 1e-3 * 15.0 + 0.05)
 
@@ -81,33 +83,36 @@ def test_a_gear_of_ten_is_no_error() -> None:
 
 
 def test_a_velocity_limit_below_the_speed_is_an_error_that_says_what_it_allows() -> None:
-    finding = finding_of(scenario_of("drive = { preset = 'limited', velocity_limit_rev_s = 2.2 }"))
-    assert (finding.level, finding.key) == ("error", "drive.velocity_limit_rev_s")
+    finding = finding_of(
+        scenario_of("drive = { preset = 'limited', velocity_limit_shaft_rev_s = 2.2 }")
+    )
+    assert (finding.level, finding.key) == ("error", "drive.velocity_limit_shaft_rev_s")
     assert "it allows 0.553 m/s of 0.6" in finding.text
 
 
 def test_a_velocity_limit_just_above_the_speed_leaves_too_little_torque() -> None:
     # 2.39 rev/s at 0.6 m/s; the limiter leaves (2.6 − 2.39)/6 N·m of the needed 0.3.
-    near = scenario_of("drive = { preset = 'limited', velocity_limit_rev_s = 2.6 }")
+    near = scenario_of("drive = { preset = 'limited', velocity_limit_shaft_rev_s = 2.6 }")
     assert finding_of(near).level == "error"
 
 
 def test_the_laws_and_the_hosts_limits_count_with_ideal_drives_too() -> None:
-    assert finding_of(scenario_of(law=", torque_limit_N_m = 0.2")).level == "error"
+    assert finding_of(scenario_of(law=", torque_limit_wheel_N_m = 0.2")).level == "error"
     assert (
-        finding_of(scenario_of("host = { torque_limit_N_m = 0.25 }")).key == "host.torque_limit_N_m"
+        finding_of(scenario_of("host = { torque_limit_wheel_N_m = 0.25 }")).key
+        == "host.torque_limit_wheel_N_m"
     )
     assert finding_of(scenario_of()).level == "ok"
 
 
 def test_twice_the_need_is_the_margin() -> None:
-    assert finding_of(scenario_of(law=", torque_limit_N_m = 0.5")).level == "warning"
-    assert finding_of(scenario_of(law=", torque_limit_N_m = 0.61")).level == "ok"
+    assert finding_of(scenario_of(law=", torque_limit_wheel_N_m = 0.5")).level == "warning"
+    assert finding_of(scenario_of(law=", torque_limit_wheel_N_m = 0.61")).level == "ok"
 
 
 def test_a_bend_that_is_too_tight_for_a_moment_is_a_warning() -> None:
     eight = '{ kind = "figure_eight", half_length_m = 2.0, half_width_m = 1.0 }'
-    scenario = scenario_of(path=eight, law=", torque_limit_N_m = 0.4")
+    scenario = scenario_of(path=eight, law=", torque_limit_wheel_N_m = 0.4")
     assert most(scenario) > 0.4
     assert finding_of(scenario).level == "warning"
 
@@ -115,12 +120,12 @@ def test_a_bend_that_is_too_tight_for_a_moment_is_a_warning() -> None:
 def test_supply_and_limiter_take_from_the_torque_as_the_shaft_speeds_up() -> None:
     scenario = scenario_of("drive = { preset = 'realistic' }", "mounting = { gear_ratio = 2.0 }")
     by_key = {limit.key: limit for limit in limits(scenario, scenario.robot[0])}
-    velocity = by_key["drive.velocity_limit_rev_s"]
+    velocity = by_key["drive.velocity_limit_shaft_rev_s"]
     assert velocity.speed_m_s == pytest.approx(10.0 * 2 * pi / 2.0 * 0.04)
-    at_limit = velocity.torque_N_m - velocity.slope_N_m_s * velocity.speed_m_s / 0.04
+    at_limit = velocity.torque_wheel_N_m - velocity.slope_wheel_N_m_s * velocity.speed_m_s / 0.04
     assert at_limit == pytest.approx(0.0, abs=1e-12)
     supply = by_key["supply.voltage_V"]
-    assert supply.torque_N_m == pytest.approx(2.0 * 0.05 * np.sqrt(0.75) * 24.0 / 0.22)
+    assert supply.torque_wheel_N_m == pytest.approx(2.0 * 0.05 * np.sqrt(0.75) * 24.0 / 0.22)
 
 
 @pytest.mark.parametrize(("duration_s", "level"), [("20.0", "ok"), ("60.0", "warning")])

@@ -15,7 +15,7 @@ from fleetloop.results.export import DEFAULT, SIGNALS, Selection, export, table
 
 HEADER = (
     "t_s,robot,x_m,y_m,theta_rad,v_m_s,omega_rad_s,s,s_dot,v_r_hat,x_e_m,y_e_m,theta_e_rad,"
-    "tau_right_N_m,tau_left_N_m"
+    "tau_right_wheel_N_m,tau_left_wheel_N_m"
 )
 
 
@@ -41,7 +41,7 @@ def test_the_table_has_the_promised_columns_and_a_row_per_tick_and_robot(
     row = rows[2 * 1500 + 1]
     assert float(row["t_s"]) == 3.0
     assert float(row["x_m"]) == record.plant["r2"]["x_m"][1500]
-    assert float(row["tau_left_N_m"]) == record.controller["r2"]["tau_left_N_m"][1500]
+    assert float(row["tau_left_wheel_N_m"]) == record.controller["r2"]["tau_left_wheel_N_m"][1500]
 
 
 def test_npz_and_csv_hold_the_same(finished_run: Path, tmp_path: Path) -> None:
@@ -72,7 +72,7 @@ def test_every_robot_has_all_its_rows_after_one_controller_ended(
     last = read(tmp_path / "a.csv")[-2:]
     assert [row["robot"] for row in last] == ["r1", "r2"]
     assert last[0]["s"] != "" != last[1]["x_m"]
-    assert last[1]["s"] == last[1]["tau_left_N_m"] == ""
+    assert last[1]["s"] == last[1]["tau_left_wheel_N_m"] == ""
 
 
 def test_signals_robots_and_time_are_chosen(finished_run: Path, tmp_path: Path) -> None:

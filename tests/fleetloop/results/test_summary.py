@@ -142,7 +142,11 @@ def test_figures_bear_a_robot_without_any_row(uneven_run: Path) -> None:
 
 def test_what_is_no_number_is_null_in_the_file_and_said_in_the_table() -> None:
     errors = dict.fromkeys(("x_e_m", "y_e_m", "theta_e_rad"), None)
-    robot = {"settle_s": errors, "final_max": dict.fromkeys(errors, np.nan), "peak_torque_N_m": 0.0}
+    robot = {
+        "settle_s": errors,
+        "final_max": dict.fromkeys(errors, np.nan),
+        "peak_torque_wheel_N_m": 0.0,
+    }
     robot |= {"ticks": 1}
     said = {
         "ticks": 1,

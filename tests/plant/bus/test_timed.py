@@ -108,7 +108,7 @@ def test_firmware_acts_after_its_latency_and_in_order() -> None:
     driven.ticks(250)
     (ask,) = driven.tick()
     right, _ = driven.unit.drives
-    assert right.input_torque == pytest.approx(0.3)  # the later of two
+    assert right.input_torque_shaft == pytest.approx(0.3)  # the later of two
     ended = ask.stamp_ns + 2 * 90 * US + 200 * US
     assert right.fed_ns == pytest.approx(ended, abs=15 * US)
 
@@ -138,10 +138,10 @@ def test_drives_that_hear_nothing_through_a_babbler_trip_their_watchdog() -> Non
     )
     driven.ticks(20)
     right, _ = driven.unit.drives
-    assert right.torque_demand(0.0) == pytest.approx(0.1)
+    assert right.torque_demand_shaft(0.0) == pytest.approx(0.1)
     driven.bus.wire.attach("babbler", queue=Endless(Frame(0x000, bytes(8))))
     driven.ticks(60)
-    assert right.torque_demand(0.0) == 0.0
+    assert right.torque_demand_shaft(0.0) == 0.0
 
 
 def test_a_client_that_departs_leaves_the_wire() -> None:

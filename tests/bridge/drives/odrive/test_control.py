@@ -24,7 +24,7 @@ def spin(node: OdriveNode, seconds: float, inertia: float = 0.01, dt: float = 0.
     """A flywheel [N·m·s²/rad] on the axis; its speeds [rev/s]."""
     at, speed, speeds = node.position, node.velocity, []
     for _ in range(round(seconds / dt)):
-        speed += node.torque_demand(dt) / inertia * dt / (2 * pi)
+        speed += node.torque_demand_shaft(dt) / inertia * dt / (2 * pi)
         at += speed * dt
         node.feed(at, speed)
         speeds.append(speed)
@@ -37,10 +37,10 @@ def test_velocity_mode_is_proportional_and_integral_with_feed_forward() -> None:
     floats(node, Command.SET_VEL_GAINS, 0.1, 0.5)
     arm(node)
     floats(node, Command.SET_INPUT_VEL, 2.0, 0.05)
-    assert node.torque_demand(0.01) == pytest.approx(0.05 + 0.1 * 2.0)
-    assert node.torque_demand(0.01) == pytest.approx(0.05 + 0.1 * 2.0 + 0.5 * 2.0 * 0.01)
+    assert node.torque_demand_shaft(0.01) == pytest.approx(0.05 + 0.1 * 2.0)
+    assert node.torque_demand_shaft(0.01) == pytest.approx(0.05 + 0.1 * 2.0 + 0.5 * 2.0 * 0.01)
     node.feed(0.0, 3.0)
-    assert node.torque_demand(0.01) == pytest.approx(0.05 - 0.1 + 2 * 0.01)
+    assert node.torque_demand_shaft(0.01) == pytest.approx(0.05 - 0.1 + 2 * 0.01)
 
 
 def test_velocity_mode_reaches_its_velocity() -> None:
@@ -55,7 +55,7 @@ def test_the_velocity_limit_holds_in_velocity_mode_and_the_current_limit_everywh
     modes(node, ControlMode.VELOCITY)
     floats(node, Command.SET_LIMITS, 4.0, 1.0)
     floats(arm(node), Command.SET_INPUT_VEL, 9.0, 0.0)
-    assert node.torque_demand(0.001) == pytest.approx(1.0 * 0.05)
+    assert node.torque_demand_shaft(0.001) == pytest.approx(1.0 * 0.05)
     speeds = spin(node, 20.0)
     assert speeds[-1] == pytest.approx(4.0, abs=0.02)
     assert node.state is AxisState.CLOSED_LOOP_CONTROL
@@ -69,7 +69,7 @@ def test_position_mode_is_a_cascade_over_velocity_mode() -> None:
     floats(node, Command.SET_VEL_GAINS, 0.1, 0.0)
     arm(node)
     position(node, 1.25, vel_ff=250, torque_ff=20)
-    assert node.torque_demand(0.001) == pytest.approx(0.02 + 0.1 * (4.0 * 0.25 + 0.25 - 0.5))
+    assert node.torque_demand_shaft(0.001) == pytest.approx(0.02 + 0.1 * (4.0 * 0.25 + 0.25 - 0.5))
 
 
 def test_position_mode_reaches_its_position() -> None:
@@ -87,25 +87,27 @@ def test_arming_in_position_mode_holds_the_place_where_the_axis_is() -> None:
     modes(node, ControlMode.POSITION)
     position(node, 100.0)
     node.feed(7.0, 0.0)
-    assert arm(node).torque_demand(0.001) == 0.0
+    assert arm(node).torque_demand_shaft(0.001) == 0.0
 
 
 def test_a_velocity_ramp_rises_at_its_rate_and_feeds_inertia_forward() -> None:
-    node = axis(velocity_ramp_rev_s2=2.0, **UNWATCHED)
+    node = axis(velocity_ramp_shaft_rev_s2=2.0, **UNWATCHED)
     modes(node, ControlMode.VELOCITY, InputMode.VEL_RAMP)
     floats(node, Command.SET_VEL_GAINS, 0.1, 0.0)
     floats(node, Command.SET_TRAJ_INERTIA, 0.03)
     floats(arm(node), Command.SET_INPUT_VEL, 1.0, 0.0)
-    demands = [node.torque_demand(0.1) for _ in range(8)]
+    demands = [node.torque_demand_shaft(0.1) for _ in range(8)]
     ramp = [0.1 * 0.2 * n + 0.06 for n in range(1, 6)]
     assert demands == pytest.approx([*ramp, 0.1, 0.1, 0.1])
 
 
 def test_a_torque_ramp_rises_at_its_rate() -> None:
-    node = axis(torque_ramp_N_m_s=0.5, **UNWATCHED)
+    node = axis(torque_ramp_shaft_N_m_s=0.5, **UNWATCHED)
     modes(node, ControlMode.TORQUE, InputMode.TORQUE_RAMP)
     torque(arm(node), 0.12)
-    assert [node.torque_demand(0.1) for _ in range(4)] == pytest.approx([0.05, 0.1, 0.12, 0.12])
+    assert [node.torque_demand_shaft(0.1) for _ in range(4)] == pytest.approx(
+        [0.05, 0.1, 0.12, 0.12]
+    )
 
 
 def test_a_position_filter_is_critically_damped_of_second_order() -> None:
@@ -114,7 +116,7 @@ def test_a_position_filter_is_critically_damped_of_second_order() -> None:
     arm(node)
     position(node, 1.0)
     for _ in range(10_000):
-        node.torque_demand(0.0001)
+        node.torque_demand_shaft(0.0001)
     expected = 1.0 - (1.0 + 2.0) * exp(-2.0)
     assert node.controller.position_setpoint == pytest.approx(expected, abs=1e-3)
 
@@ -160,17 +162,17 @@ def test_gains_that_are_no_numbers_or_negative_change_nothing() -> None:
     floats(node, Command.SET_POS_GAIN, nan)
     floats(node, Command.SET_TRAJ_VEL_LIMIT, -1.0)
     floats(arm(node), Command.SET_INPUT_VEL, 0.6, 0.0)
-    assert node.torque_demand(0.0) == pytest.approx(0.1)
+    assert node.torque_demand_shaft(0.0) == pytest.approx(0.1)
     assert node.ignored == 6
 
 
 def test_torques_are_told_after_limits() -> None:
     node = arm(axis())
     torque(node, 5.0)
-    node.torque_demand(0.001)
+    node.torque_demand_shaft(0.001)
     assert asked(node, Command.GET_TORQUES) == (0.5, 0.5)
     assert asked(node, Command.GET_IQ) == (10.0, 10.0)
-    assert node.input_torque == 5.0
+    assert node.input_torque_shaft == 5.0
 
 
 @given(
@@ -201,4 +203,4 @@ def test_a_trajectory_without_acceleration_is_not_begun() -> None:
     floats(node, Command.SET_TRAJ_ACCEL_LIMITS, 0.0, 0.0)
     arm(node)
     position(node, 2.0)
-    assert node.torque_demand(MS * 1e-9) == 0.0
+    assert node.torque_demand_shaft(MS * 1e-9) == 0.0

@@ -18,14 +18,14 @@ def test_missing_bytes_of_a_set_point_read_as_zero(length: int) -> None:
     torque(node, 0.4)
     tell(node, Command.SET_INPUT_TORQUE, QUARTER[:length])
     (expected,) = f.ONE_FLOAT.unpack(QUARTER[:length].ljust(4, b"\0"))
-    assert node.torque_demand(0.001) == expected
+    assert node.torque_demand_shaft(0.001) == expected
 
 
 @pytest.mark.parametrize("length", range(4, 9))
 def test_extra_bytes_of_a_set_point_are_ignored(length: int) -> None:
     node = arm(axis())
     tell(node, Command.SET_INPUT_TORQUE, (QUARTER + b"\xff" * 4)[:length])
-    assert node.torque_demand(0.001) == 0.25
+    assert node.torque_demand_shaft(0.001) == 0.25
 
 
 @pytest.mark.parametrize("length", [1, 4, 8])
@@ -41,7 +41,7 @@ def test_a_remote_frame_sets_nothing_and_clears_nothing() -> None:
     for command in Command:
         if command not in (Command.ESTOP, Command.ADDRESS):
             node.hear(Frame(f.identifier(NODE, command) | RTR, bytes(8)), 7)
-    assert (node.torque_demand(0.001), node.fed_ns) == (0.25, 5)
+    assert (node.torque_demand_shaft(0.001), node.fed_ns) == (0.25, 5)
     node.estop()
     node.hear(Frame(f.identifier(NODE, Command.CLEAR_ERRORS) | RTR, b""), 8)
     assert beat(node).errors == AxisError.ESTOP_REQUESTED
@@ -52,7 +52,7 @@ def test_a_torque_that_is_no_number_disarms_with_an_error() -> None:
         node = arm(axis(torque_limiters=limiters))
         torque(node, nan)
         assert beat(node)[:3] == (AxisError.BAD_CONFIG, AxisState.IDLE, ProcedureResult.DISARMED)
-        assert node.torque_demand(0.001) == 0.0
+        assert node.torque_demand_shaft(0.001) == 0.0
 
 
 @pytest.mark.parametrize("command", [Command.SET_INPUT_VEL, Command.SET_INPUT_POS])
@@ -69,13 +69,13 @@ def test_a_velocity_or_position_that_is_no_number_disarms_with_an_error(command)
 def test_infinite_huge_and_denormal_torques_are_clamped(value, expected) -> None:
     node = arm(axis())
     torque(node, value)
-    assert node.torque_demand(0.001) == expected
+    assert node.torque_demand_shaft(0.001) == expected
 
 
 def test_torque_over_the_limit_is_clamped_without_an_error() -> None:
     node = arm(axis())
     torque(node, -7.0)
-    assert node.torque_demand(0.001) == -0.5
+    assert node.torque_demand_shaft(0.001) == -0.5
     assert beat(node)[:2] == (AxisError(0), AxisState.CLOSED_LOOP_CONTROL)
 
 
@@ -84,7 +84,7 @@ def test_nonsense_limits_neither_reverse_the_torque_nor_make_it_no_number(limits
     node = arm(axis())
     floats(node, Command.SET_LIMITS, *limits)
     torque(node, 0.3)
-    assert node.torque_demand(0.001) == pytest.approx(0.3)
+    assert node.torque_demand_shaft(0.001) == pytest.approx(0.3)
 
 
 def test_infinite_limits_are_none() -> None:
@@ -92,14 +92,14 @@ def test_infinite_limits_are_none() -> None:
     floats(node, Command.SET_LIMITS, inf, inf)
     node.feed(0.0, 1e4)
     torque(node, 1e6)
-    assert node.torque_demand(0.001) == 1e6
+    assert node.torque_demand_shaft(0.001) == 1e6
 
 
 def test_limits_of_zero_mean_no_torque() -> None:
     node = arm(axis())
     floats(node, Command.SET_LIMITS, 10.0, 0.0)
     torque(node, 0.3)
-    assert node.torque_demand(0.001) == 0.0
+    assert node.torque_demand_shaft(0.001) == 0.0
 
 
 def test_an_unknown_state_is_refused() -> None:
@@ -121,7 +121,7 @@ def test_arming_twice_and_clearing_while_armed_are_harmless() -> None:
     torque(node, 0.25, 5)
     ask_state(node, AxisState.CLOSED_LOOP_CONTROL, 9)
     tell(node, Command.CLEAR_ERRORS, b"\0", 9)
-    assert (node.torque_demand(0.001), node.fed_ns) == (0.25, 5)
+    assert (node.torque_demand_shaft(0.001), node.fed_ns) == (0.25, 5)
     assert beat(node)[:3] == (AxisError(0), AxisState.CLOSED_LOOP_CONTROL, ProcedureResult.SUCCESS)
 
 
@@ -129,25 +129,25 @@ def test_velocity_and_position_set_points_replace_the_torque_by_their_feed_forwa
     node = arm(axis())
     torque(node, 0.4)
     floats(node, Command.SET_INPUT_VEL, 9.0, -0.125, now_ns=7)
-    assert (node.torque_demand(0.001), node.fed_ns) == (-0.125, 7)
+    assert (node.torque_demand_shaft(0.001), node.fed_ns) == (-0.125, 7)
     tell(node, Command.SET_INPUT_POS, f.INPUT_POS.pack(9.0, 1000, -250), 8)
-    assert (node.torque_demand(0.001), node.fed_ns) == (-0.25, 8)
+    assert (node.torque_demand_shaft(0.001), node.fed_ns) == (-0.25, 8)
     tell(node, Command.SET_INPUT_VEL, f.ONE_FLOAT.pack(1.0))
-    assert node.torque_demand(0.001) == 0.0
+    assert node.torque_demand_shaft(0.001) == 0.0
 
 
 def test_a_torque_sent_while_idle_is_stored_and_acts_on_arming() -> None:
     node = axis()
     torque(node, 0.25)
-    assert node.torque_demand(0.001) == 0.0
-    assert arm(node).torque_demand(0.001) == 0.25
+    assert node.torque_demand_shaft(0.001) == 0.0
+    assert arm(node).torque_demand_shaft(0.001) == 0.25
 
 
 def test_idle_takes_the_torque_away_at_once() -> None:
     node = arm(axis())
     torque(node, 0.25)
     ask_state(node, AxisState.IDLE)
-    assert node.torque_demand(0.001) == 0.0
+    assert node.torque_demand_shaft(0.001) == 0.0
     assert beat(node)[:3] == (AxisError(0), AxisState.IDLE, ProcedureResult.SUCCESS)
 
 
@@ -156,7 +156,7 @@ def test_an_emergency_stop_acts_whatever_its_frame_and_latches(can_id: int) -> N
     node = arm(axis())
     torque(node, 0.25)
     node.hear(Frame(can_id, b""), 0)
-    assert node.torque_demand(0.001) == 0.0
+    assert node.torque_demand_shaft(0.001) == 0.0
     ask_state(node, AxisState.CLOSED_LOOP_CONTROL)
     assert beat(node)[:2] == (AxisError.ESTOP_REQUESTED, AxisState.IDLE)
 
@@ -181,16 +181,16 @@ def test_silence_disarms_by_the_watchdog_and_is_due_at_that_time() -> None:
     torque(node, 0.25, 30 * MS)
     assert node.next_due_ns == 130 * MS + 1
     node.due(130 * MS)
-    assert node.torque_demand(0.001) == 0.25
+    assert node.torque_demand_shaft(0.001) == 0.25
     node.due(130 * MS + 1)
-    assert node.torque_demand(0.001) == 0.0
+    assert node.torque_demand_shaft(0.001) == 0.0
     assert beat(node).errors == AxisError.WATCHDOG_TIMER_EXPIRED
 
 
 def test_a_set_point_that_comes_too_late_does_not_save_the_drive() -> None:
     node = arm(axis())
     torque(node, 0.25, 101 * MS)
-    assert node.torque_demand(0.001) == 0.0
+    assert node.torque_demand_shaft(0.001) == 0.0
     assert node.errors == AxisError.WATCHDOG_TIMER_EXPIRED
 
 
@@ -199,13 +199,13 @@ def test_silence_without_a_watchdog_leaves_the_last_torque_for_ever() -> None:
     torque(node, 0.25)
     for hour in range(1, 25):
         node.due(hour * 3600 * 1000 * MS)
-        assert node.torque_demand(0.001) == 0.25
+        assert node.torque_demand_shaft(0.001) == 0.25
 
 
 def test_a_29_bit_identifier_with_our_number_is_ignored() -> None:
     node = arm(axis())
     assert not node.hear(Frame(node.setpoint_id | EFF, QUARTER), 5)
-    assert (node.torque_demand(0.001), node.fed_ns) == (0.0, 0)
+    assert (node.torque_demand_shaft(0.001), node.fed_ns) == (0.0, 0)
 
 
 @pytest.mark.parametrize("other", [0, 1, 2, 4, 62, 63])
@@ -215,7 +215,7 @@ def test_frames_for_other_nodes_are_ignored(other: int) -> None:
     for command in Command:
         if command is not Command.ADDRESS:
             assert not node.hear(Frame(f.identifier(other, command), bytes(8)), 5)
-    assert (node.torque_demand(0.001), node.fed_ns, node.ignored) == (0.25, 0, 0)
+    assert (node.torque_demand_shaft(0.001), node.fed_ns, node.ignored) == (0.25, 0, 0)
 
 
 @pytest.mark.parametrize("command", [0x08, 0x0A, 0x10, 0x1E])
@@ -223,7 +223,7 @@ def test_an_unknown_command_is_ignored_and_counted(command: int) -> None:
     node = arm(axis())
     torque(node, 0.25)
     assert not node.hear(Frame(NODE << f.BITS | command, bytes(8)), 5)
-    assert (node.torque_demand(0.001), node.fed_ns, node.ignored) == (0.25, 0, 1)
+    assert (node.torque_demand_shaft(0.001), node.fed_ns, node.ignored) == (0.25, 0, 1)
 
 
 def test_telemetry_that_somebody_imitates_is_ignored() -> None:
@@ -239,7 +239,7 @@ def test_of_two_drives_with_the_same_address_both_take_and_both_say_everything()
     one, two = axis(), axis()
     for node in (one, two):
         torque(arm(node), 0.25)
-    assert one.torque_demand(0.001) == two.torque_demand(0.001) == 0.25
+    assert one.torque_demand_shaft(0.001) == two.torque_demand_shaft(0.001) == 0.25
     assert [frame.can_id for frame in one.due(0)] == [frame.can_id for frame in two.due(0)]
 
 
@@ -247,5 +247,5 @@ def test_of_a_burst_the_last_set_point_wins() -> None:
     node = arm(axis())
     for n in range(1000):
         torque(node, n * 1e-4, n)
-    assert node.torque_demand(0.001) == pytest.approx(0.0999)
+    assert node.torque_demand_shaft(0.001) == pytest.approx(0.0999)
     assert node.fed_ns == 999

@@ -35,17 +35,17 @@ def driven(**changes) -> OdriveNode:
 def test_the_current_limit_falls_linearly_with_temperature(which, celsius, factor) -> None:
     node = driven()
     node.feel(HEALTHY._replace(**{which: celsius}))
-    assert node.torque_demand(0.001) == pytest.approx(0.5 * factor)
+    assert node.torque_demand_shaft(0.001) == pytest.approx(0.5 * factor)
     assert node.state is AxisState.CLOSED_LOOP_CONTROL
     node.feel(HEALTHY)
-    assert node.torque_demand(0.001) == pytest.approx(0.5)
+    assert node.torque_demand_shaft(0.001) == pytest.approx(0.5)
 
 
 def test_limits_set_while_hot_are_derated() -> None:
     node = driven()
     node.feel(HEALTHY._replace(fet_C=110.0))
     floats(node, Command.SET_LIMITS, 10.0, 4.0)
-    assert node.torque_demand(0.001) == pytest.approx(4.0 * 0.5 * 0.05)
+    assert node.torque_demand_shaft(0.001) == pytest.approx(4.0 * 0.5 * 0.05)
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ def test_limits_set_while_hot_are_derated() -> None:
 def test_what_leaves_its_range_disarms_and_keeps_from_arming_while_it_lasts(changes, error) -> None:
     node = driven()
     node.feel(HEALTHY._replace(**changes))
-    assert node.torque_demand(0.001) == 0.0
+    assert node.torque_demand_shaft(0.001) == 0.0
     assert beat(node)[:3] == (error, AxisState.IDLE, ProcedureResult.DISARMED)
     tell(node, Command.CLEAR_ERRORS)
     ask_state(node, AxisState.CLOSED_LOOP_CONTROL)
@@ -88,8 +88,10 @@ def test_what_is_just_within_its_range_does_not_disarm(changes) -> None:
 def test_measurements_are_told_on_the_bus() -> None:
     node = driven()
     node.feed(0.0, 2.0)
-    node.feel(HEALTHY._replace(torque_N_m=0.4, current_A=8.0, bus_V=23.5, bus_A=2.0, motor_C=41.0))
-    node.torque_demand(0.001)
+    node.feel(
+        HEALTHY._replace(torque_shaft_N_m=0.4, current_A=8.0, bus_V=23.5, bus_A=2.0, motor_C=41.0)
+    )
+    node.torque_demand_shaft(0.001)
     assert asked(node, Command.GET_TEMPERATURE) == pytest.approx((30.0, 41.0))
     assert asked(node, Command.GET_BUS_VOLTAGE_CURRENT) == pytest.approx((23.5, 2.0))
     assert asked(node, Command.GET_IQ) == pytest.approx((10.0, 8.0))
@@ -108,8 +110,8 @@ def felt_for(node: OdriveNode, seconds: float, velocity: float, watts: float) ->
     """Told to push with 0.5 N·m at an encoder that says `velocity`, drawing `watts`."""
     for k in range(round(seconds * 1000)):
         node.feed(velocity * k * 0.001, velocity)
-        node.torque_demand(0.001)
-        node.feel(HEALTHY._replace(torque_N_m=0.5, current_A=10.0, bus_A=watts / 24.0))
+        node.torque_demand_shaft(0.001)
+        node.feel(HEALTHY._replace(torque_shaft_N_m=0.5, current_A=10.0, bus_A=watts / 24.0))
 
 
 def test_an_encoder_whose_sign_flips_is_found_by_spinout_detection() -> None:
@@ -121,7 +123,7 @@ def test_an_encoder_whose_sign_flips_is_found_by_spinout_detection() -> None:
 def test_without_spinout_detection_it_keeps_driving() -> None:
     node = driven(spinout_power_W=0.0)
     felt_for(node, 0.5, -8.0, 30.0)
-    assert node.torque_demand(0.001) == pytest.approx(0.5)
+    assert node.torque_demand_shaft(0.001) == pytest.approx(0.5)
 
 
 def test_neither_driving_nor_braking_is_a_spinout() -> None:
@@ -138,7 +140,7 @@ def test_an_encoder_that_freezes_goes_unnoticed_and_velocity_mode_pushes_on() ->
     for t in range(3000):
         node.feed(1.0, 0.0)
         node.due(t * MS)
-        demand = node.torque_demand(0.001)
+        demand = node.torque_demand_shaft(0.001)
     assert demand == pytest.approx(0.5)
     assert node.state is AxisState.CLOSED_LOOP_CONTROL
 
@@ -148,13 +150,13 @@ def test_an_encoder_that_jumps_goes_unnoticed_in_torque_mode() -> None:
     torque(node, 0.2)
     node.feed(1000.0, 0.0)
     node.due(MS)
-    assert node.torque_demand(0.001) == pytest.approx(0.2)
+    assert node.torque_demand_shaft(0.001) == pytest.approx(0.2)
 
 
 def test_an_encoder_that_jumps_too_fast_is_an_overspeed() -> None:
     node = arm(axis())
     node.feed(1000.0, -12.1)
-    assert node.torque_demand(0.001) == 0.0
+    assert node.torque_demand_shaft(0.001) == 0.0
     assert node.errors == AxisError.VELOCITY_LIMIT_VIOLATION
 
 
@@ -163,5 +165,5 @@ def test_an_encoder_without_a_number_is_a_missing_estimate(motion) -> None:
     node = arm(axis())
     torque(node, 0.2)
     node.feed(*motion)
-    assert node.torque_demand(0.001) == 0.0
+    assert node.torque_demand_shaft(0.001) == 0.0
     assert node.errors == AxisError.MISSING_ESTIMATE

@@ -92,7 +92,7 @@ def test_calibration_makes_no_torque() -> None:
     node = axis()
     torque(node, 0.3)
     ask_state(node, AxisState.FULL_CALIBRATION_SEQUENCE)
-    assert node.torque_demand(0.001) == 0.0
+    assert node.torque_demand_shaft(0.001) == 0.0
 
 
 @pytest.mark.parametrize("state", [5, 9, 10, 12, 13, 14, 15, 0xFFFF_FFFF])
@@ -169,7 +169,7 @@ def test_an_unaddressed_drive_is_silent_but_answers_for_its_address_after_a_whil
     assert node.node_id == f.UNADDRESSED
     assert not node.due(SECOND)
     torque(node, 0.2)
-    assert node.input_torque == 0.0
+    assert node.input_torque_shaft == 0.0
     assert not node.hear(f.request(f.UNADDRESSED, Command.ADDRESS), SECOND)
     at_ns = node.next_due_ns
     assert SECOND < at_ns <= SECOND + ANSWER_WITHIN_NS
@@ -334,11 +334,11 @@ def test_the_integrator_is_held_to_its_limit_and_an_infinite_one_is_none() -> No
     floats(node, Command.SET_INPUT_VEL, 1.0, 0.0)
     write(node, path, 0.1)
     for _ in range(400):
-        torque = node.torque_demand(0.001)
+        torque = node.torque_demand_shaft(0.001)
     assert torque == pytest.approx(0.1)
     write(node, path, float("inf"))
     for _ in range(100):
-        torque = node.torque_demand(0.001)
+        torque = node.torque_demand_shaft(0.001)
     assert torque == pytest.approx(0.2, abs=0.002)
 
 

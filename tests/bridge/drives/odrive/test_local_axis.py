@@ -16,70 +16,70 @@ def test_a_drive_powers_up_idle_without_errors_and_makes_no_torque() -> None:
     node = axis()
     assert beat(node) == (AxisError(0), AxisState.IDLE, 0, True)
     torque(node, 0.2)
-    assert node.torque_demand() == 0.0
+    assert node.torque_demand_shaft() == 0.0
 
 
 def test_an_armed_drive_makes_the_torque_that_it_is_told() -> None:
     node = arm(axis())
     torque(node, 0.25)
-    assert node.torque_demand() == 0.25
+    assert node.torque_demand_shaft() == 0.25
 
 
 def test_torque_is_limited_by_current_and_by_speed() -> None:
     node = arm(axis())
     torque(node, 5.0)
-    assert node.torque_demand() == pytest.approx(0.5)  # 10 A × 0.05 N·m/A
+    assert node.torque_demand_shaft() == pytest.approx(0.5)  # 10 A × 0.05 N·m/A
     node.feed(0.0, 9.4)
-    assert node.torque_demand() == pytest.approx(0.1)  # (10 − 9.4) rev/s × 1/6
+    assert node.torque_demand_shaft() == pytest.approx(0.1)  # (10 − 9.4) rev/s × 1/6
     node.feed(0.0, 10.6)
-    assert node.torque_demand() == pytest.approx(-0.1)
+    assert node.torque_demand_shaft() == pytest.approx(-0.1)
 
 
 def test_set_limits_takes_effect_and_nonsense_limits_do_not() -> None:
     node = arm(axis())
     tell(node, Command.SET_LIMITS, f.TWO_FLOATS.pack(10.0, 2.0))
     torque(node, 5.0)
-    assert node.torque_demand() == pytest.approx(0.1)
+    assert node.torque_demand_shaft() == pytest.approx(0.1)
     for bad in ((nan, 1.0), (1.0, nan), (-1.0, 1.0)):
         tell(node, Command.SET_LIMITS, f.TWO_FLOATS.pack(*bad))
-        assert node.torque_demand() == pytest.approx(0.1)
+        assert node.torque_demand_shaft() == pytest.approx(0.1)
 
 
 def test_an_ideal_drive_limits_nothing() -> None:
     node = arm(axis(torque_limiters=False))
     torque(node, 690.0)
-    assert node.torque_demand() == 690.0
+    assert node.torque_demand_shaft() == 690.0
 
 
 def test_a_stale_torque_acts_at_once_on_re_arming() -> None:
     node = arm(axis())
     torque(node, 0.25)
     tell(node, Command.SET_AXIS_STATE, f.ONE_U32.pack(1))
-    assert node.torque_demand() == 0.0
-    assert arm(node).torque_demand() == 0.25
+    assert node.torque_demand_shaft() == 0.0
+    assert arm(node).torque_demand_shaft() == 0.25
 
 
 def test_the_stale_torque_hazard_can_be_turned_off() -> None:
     node = arm(axis(zero_torque_on_disarm=True))
     torque(node, 0.25)
     tell(node, Command.SET_AXIS_STATE, f.ONE_U32.pack(1))
-    assert arm(node).torque_demand() == 0.0
+    assert arm(node).torque_demand_shaft() == 0.0
 
 
 def test_without_a_watchdog_the_last_torque_acts_for_ever() -> None:
     node = arm(axis(watchdog_ns=0))
     torque(node, 0.25)
     node.due(3600 * 1000 * MS)
-    assert node.torque_demand() == 0.25
+    assert node.torque_demand_shaft() == 0.25
 
 
 def test_the_watchdog_disarms_after_its_time_and_says_so() -> None:
     node = arm(axis())
     torque(node, 0.25, 50 * MS)
     node.due(150 * MS)
-    assert node.torque_demand() == 0.25
+    assert node.torque_demand_shaft() == 0.25
     node.due(151 * MS)
-    assert node.torque_demand() == 0.0
+    assert node.torque_demand_shaft() == 0.0
     heartbeat = beat(node)
     assert heartbeat.errors == AxisError.WATCHDOG_TIMER_EXPIRED
     assert heartbeat.state == AxisState.IDLE
@@ -100,7 +100,7 @@ def test_an_emergency_stop_latches_until_errors_are_cleared() -> None:
     node = arm(axis())
     torque(node, 0.25)
     tell(node, Command.ESTOP)
-    assert node.torque_demand() == 0.0
+    assert node.torque_demand_shaft() == 0.0
     tell(node, Command.SET_AXIS_STATE, f.ONE_U32.pack(8))
     assert beat(node).state == AxisState.IDLE
     assert beat(node).errors == AxisError.ESTOP_REQUESTED
@@ -128,7 +128,7 @@ def test_overspeed_disarms() -> None:
 def test_no_torque_that_is_not_finite_ever_reaches_the_motor(value: float) -> None:
     for node in (arm(axis()), arm(axis(torque_limiters=False))):
         torque(node, value)
-        assert isfinite(node.torque_demand())
+        assert isfinite(node.torque_demand_shaft())
 
 
 def test_motion_beyond_what_the_wire_can_hold_saturates() -> None:
@@ -142,9 +142,9 @@ def test_motion_beyond_what_the_wire_can_hold_saturates() -> None:
 def test_velocity_and_position_set_points_overwrite_torque_by_their_feed_forward() -> None:
     node = arm(axis())
     tell(node, Command.SET_INPUT_VEL, f.TWO_FLOATS.pack(3.0, 0.125))
-    assert node.torque_demand() == 0.125
+    assert node.torque_demand_shaft() == 0.125
     tell(node, Command.SET_INPUT_POS, f.INPUT_POS.pack(1.0, 0, 250))
-    assert node.torque_demand() == 0.25
+    assert node.torque_demand_shaft() == 0.25
 
 
 def test_every_get_is_answered_to_a_remote_and_to_an_empty_frame() -> None:
@@ -184,7 +184,7 @@ def test_address_is_told_and_set_by_serial_number() -> None:
     node.hear(ask, 0)
     assert node.node_id == 9
     torque(arm(node), 0.1)
-    assert node.torque_demand() == pytest.approx(0.1)
+    assert node.torque_demand_shaft() == pytest.approx(0.1)
 
 
 def test_an_address_that_another_serial_number_takes_is_given_up() -> None:
@@ -198,10 +198,10 @@ def test_reboot_goes_back_to_power_up_only_when_idle() -> None:
     node = arm(axis())
     torque(node, 0.25)
     tell(node, Command.REBOOT, b"\0")
-    assert node.torque_demand() == 0.25
+    assert node.torque_demand_shaft() == 0.25
     tell(node, Command.SET_AXIS_STATE, f.ONE_U32.pack(1))
     tell(node, Command.REBOOT, b"\0")
-    assert arm(node).torque_demand() == 0.0
+    assert arm(node).torque_demand_shaft() == 0.0
 
 
 def test_a_state_that_is_no_state_is_answered_as_invalid() -> None:
@@ -216,4 +216,4 @@ def test_extended_and_error_frames_are_ignored(data: bytes, flag: int) -> None:
     torque(node, 0.25)
     for command in Command:
         assert not node.hear(Frame(f.identifier(NODE, command) | flag, data), 0)
-    assert node.torque_demand() == 0.25
+    assert node.torque_demand_shaft() == 0.25

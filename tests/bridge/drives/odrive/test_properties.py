@@ -81,9 +81,9 @@ def test_nothing_raises_or_yields_a_torque_that_is_not_finite_or_not_armed(chang
                 node.feed(revolutions, rev_s)
         sent += node.due(now_ns)
         assert node.next_due_ns > now_ns
-        demand = node.torque_demand(0.001)
+        demand = node.torque_demand_shaft(0.001)
         assert isfinite(demand)
-        assert isfinite(node.input_torque)
+        assert isfinite(node.input_torque_shaft)
         if node.state is not AxisState.CLOSED_LOOP_CONTROL:
             assert demand == 0.0
         assert all(decodes(frame) for frame in sent)

@@ -20,7 +20,7 @@ MS = 1_000_000
 MODEL = replace(
     plant_brief(load("two_robots"), network=NetworkLink("t", "", "", "")).robots[0].drive,
     current_limit_A=10.0,
-    velocity_limit_rev_s=10.0,
+    velocity_limit_shaft_rev_s=10.0,
     torque_limiters=True,
     encoder_period_ns=1 * MS,
     watchdog_ns=100 * MS,
@@ -61,10 +61,10 @@ def robot() -> Robot:
 
 def test_arming_ends_with_both_axes_in_closed_loop_at_zero_torque(robot: Robot) -> None:
     for axis in robot.axes:
-        axis.input_torque = 0.4  # a stale one
+        axis.input_torque_shaft = 0.4  # a stale one
     robot.arm()
     assert [axis.state for axis in robot.axes] == [AxisState.CLOSED_LOOP_CONTROL] * 2
-    assert [axis.torque_demand(0.0) for axis in robot.axes] == [0.0, 0.0]
+    assert [axis.torque_demand_shaft(0.0) for axis in robot.axes] == [0.0, 0.0]
     assert robot.client.fault(robot.now_ns) is None
 
 
@@ -84,7 +84,7 @@ def test_torques_reach_their_own_wheels_and_are_known_as_sent(robot: Robot) -> N
     robot.arm()
     robot.tick(*robot.client.torque(0.1, -0.2))
     assert robot.client.sent == (pytest.approx(0.1), pytest.approx(-0.2))
-    assert tuple(axis.torque_demand(0.0) for axis in robot.axes) == robot.client.sent
+    assert tuple(axis.torque_demand_shaft(0.0) for axis in robot.axes) == robot.client.sent
 
 
 def test_readings_are_radians(robot: Robot) -> None:
@@ -120,7 +120,7 @@ def test_disarming_leaves_both_idle_with_zero_torque_stored(robot: Robot) -> Non
     robot.tick(*robot.client.torque(0.3, 0.3))
     robot.tick(*robot.client.disarm())
     assert [axis.state for axis in robot.axes] == [AxisState.IDLE] * 2
-    assert [axis.input_torque for axis in robot.axes] == [0.0, 0.0]
+    assert [axis.input_torque_shaft for axis in robot.axes] == [0.0, 0.0]
     assert not robot.client.armed
     robot.arm()
 
