@@ -18,8 +18,7 @@ from agents.lockstep import Counters, LockstepLoop, give
 from agents.realtime import Counters as Clock
 from agents.realtime import RealtimeLoop
 from bridge.can_bus.interface import FleetloopBus
-from bridge.can_bus.opening import open_bus
-from bridge.can_bus.pythoncan import to_message
+from bridge.can_bus.pythoncan import open_bus, to_message
 from bridge.launcher import follow_launcher
 from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos

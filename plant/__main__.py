@@ -11,7 +11,7 @@ from contextlib import nullcontext
 from functools import partial
 
 from bridge.awake import Stall
-from bridge.can_bus.drive_port import DriveEnd
+from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
 from bridge.clock import implausible_start, monotonic_of
 from bridge.launcher import follow_launcher
@@ -61,7 +61,7 @@ def run(brief: PlantBrief, stop: Stop) -> str:
             follow_launcher(link, brief.network.run, stop)
         queue = brief.wire.txqueuelen if brief.wire else 0
         hub = Hub(listeners, stop.wake_fd, queue=queue, controllers=_controllers(brief))
-        end: DriveEnd = hub
+        end: DrivePort = hub
         try:
             end = join(hub, brief.attached)
             counters = _run(brief, stop, link, hub, end)
@@ -79,7 +79,7 @@ def _controllers(brief: PlantBrief) -> dict[str, dict[str, str]]:
     return found
 
 
-def join(hub: Hub, attached: Sequence[tuple[str, Settings]]) -> DriveEnd:
+def join(hub: Hub, attached: Sequence[tuple[str, Settings]]) -> DrivePort:
     """The drives' end of all buses: ours on the hub, and those that are attached.
 
     Raises:
@@ -87,14 +87,13 @@ def join(hub: Hub, attached: Sequence[tuple[str, Settings]]) -> DriveEnd:
     """
     if not attached:
         return hub
-    from bridge.can_bus.external import AttachedBuses
-    from bridge.can_bus.joined import JoinedEnds
+    from bridge.can_bus.external import CombinedPort, ExternalBuses
 
     names = [name for name, _ in attached]
-    return JoinedEnds(hub, AttachedBuses(dict(attached)), names)
+    return CombinedPort(hub, ExternalBuses(dict(attached)), names)
 
 
-def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DriveEnd) -> Counters:
+def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) -> Counters:
     name = brief.network.run
     units = [unit_of(robot) for robot in brief.robots]
     others = [Witness(robot, start) for robot, start in brief.witnessed]
@@ -225,7 +224,7 @@ def _await_go(brief: PlantBrief, link: Link, hellos: Hellos, stop: Stop) -> None
 
 
 def _serve_until_go(
-    brief: PlantBrief, end: DriveEnd, link: Link, hellos: Hellos, stop: Stop
+    brief: PlantBrief, end: DrivePort, link: Link, hellos: Hellos, stop: Stop
 ) -> int:
     """Say hello and serve the buses until the launcher says when tick 0 is."""
     limit_s = GO_SHARE * brief.schedule.start_deadline_s

@@ -96,7 +96,7 @@ class _IdealLane(_Lane):
         return next(self._steps)
 
     def go_on(self, hub: Hub) -> Ask | None:
-        return self._steps.send(hub.take(self.bus))
+        return self._steps.send(hub.receive(self.bus))
 
     def put(self, hub: Hub, ask: Ask) -> None:
         hub.deliver(self.bus, ask.stamp_ns, ask.frames)
@@ -122,12 +122,12 @@ class _WireLane(_Lane):
     def go_on(self, hub: Hub) -> Ask | None:
         for key in hub.departed(self.bus):
             self._wire.depart(key)
-        return self._steps.send(hub.say(self.bus))
+        return self._steps.send(hub.submitted(self.bus))
 
     def put(self, hub: Hub, ask: Ask) -> None:
         for key, count in ask.freed:
-            hub.left_queue(self.bus, key, count)
-        hub.pass_on(self.bus, ask.stamp_ns, ask.passed, ask.asked)
+            hub.return_credit(self.bus, key, count)
+        hub.forward(self.bus, ask.stamp_ns, ask.transmitted, ask.asked)
 
     def crossed(self, hub: Hub) -> int:  # noqa: ARG002 - the wire knows better
         return self._wire.crossed

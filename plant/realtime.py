@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 
 from bridge.awake import Lateness
-from bridge.can_bus.drive_port import DriveEnd
+from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
 from bridge.network.link import Publisher
 from bridge.network.messages import PoseFix, Progress
@@ -35,7 +35,7 @@ class RealtimeLoop:
         self,
         brief: PlantBrief,
         units: Sequence[Unit],
-        end: DriveEnd,
+        end: DrivePort,
         hub: Hub,
         poses: Sequence[Publisher],
         rows: Sequence[RowBuffer],
@@ -101,7 +101,7 @@ class RealtimeLoop:
             left_ns = acting.next_ns() + power_up_ns - time.monotonic_ns()
             wait_s = min(wait_s, max(left_ns, 0) * 1e-9)
         self._end.serve(wait_s)
-        for bus in self._end.heard():
+        for bus in self._end.pending():
             self._buses[bus].hear(time.monotonic_ns() - power_up_ns)
         for acting in self._acting:
             acting.advance(time.monotonic_ns() - power_up_ns)

@@ -7,13 +7,49 @@ newest is lost, counted, and the client is told where it is missing and how much
 import contextlib
 import socket
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import Generic, TypeVar
 
 from bridge.can_bus import packet as wire
-from bridge.can_bus.traffic import Key, Said, Spoken, Stamped
+from bridge.can_bus.packet import Key, Stamped, Submitted
 from bridge.frame import Frame
 
 BACKLOG = 100_000
+TURN = 1024
+"""Frames that others than controllers get onto a bus at a time."""
+
+_Item = TypeVar("_Item")
+
+
+class Spoken(Generic[_Item]):
+    """What the clients of a bus sent and nobody has taken yet, in order.
+
+    What a controller says in lockstep is taken at once. The others get `TURN` frames through at a
+    time, so that who says very much makes nobody wait: no bus carries more in a tick.
+    """
+
+    __slots__ = ("_late", "now")
+
+    def __init__(self) -> None:
+        self.now: list[_Item] = []  # what will be taken next
+        self._late: deque[_Item] = deque()
+
+    def __len__(self) -> int:
+        return len(self.now) + len(self._late)
+
+    def put(self, items: Iterable[_Item], *, at_once: bool) -> None:
+        """Add what a client said."""
+        if at_once or (len(self.now) < TURN and not self._late):
+            self.now += items
+        else:
+            self._late.extend(items)
+
+    def take(self) -> list[_Item]:
+        """What is next to take."""
+        now, self.now = self.now, []
+        if late := self._late:
+            self.now = [late.popleft() for _ in range(min(TURN, len(late)))]
+        return now
 
 
 class Counters:
@@ -36,7 +72,7 @@ class Bus:
         name: of the bus.
         listener: its socket.
         queue: frames that may wait at a client; 0: frames take no time.
-        controllers: secrets by robot, of those who may be paced.
+        controllers: secrets by robot, of those who may be synchronous.
     """
 
     __slots__ = (
@@ -62,7 +98,7 @@ class Bus:
         self.listener = listener
         self.queue = queue
         self.controllers = controllers
-        self.said: Spoken[Said] = Spoken()
+        self.said: Spoken[Submitted] = Spoken()
         self.departed: list[Key] = []
         self.stamp_ns = -1  # not powered up yet
         self.clients: list[Connection] = []
@@ -74,7 +110,7 @@ class Bus:
 
     def joined_controllers(self) -> set[str]:
         """Robots whose controllers are there."""
-        return {client.name for client in self.clients if client.paced}
+        return {client.name for client in self.clients if client.synchronous}
 
 
 class Connection:
@@ -82,8 +118,8 @@ class Connection:
 
     __slots__ = (
         "backlog",
+        "batched",
         "bus",
-        "gathered",
         "gone",
         "held",
         "joined",
@@ -93,11 +129,11 @@ class Connection:
         "name",
         "owes",
         "own",
-        "paced",
         "pending",
         "receive",
         "send_now",
         "sock",
+        "synchronous",
     )
 
     def __init__(self, sock: socket.socket, bus: Bus, mask: int) -> None:
@@ -108,8 +144,8 @@ class Connection:
         self.name = ""
         self.key: Key = 0
         self.gone = 0  # frames that left its transmit queue
-        self.pending: list[Stamped] = []  # what a paced client hears with its next question
-        self.joined = self.paced = self.gathered = self.own = self.owes = False
+        self.pending: list[Stamped] = []  # what a synchronous client hears with its next question
+        self.joined = self.synchronous = self.batched = self.own = self.owes = False
         self.held = False  # it isn't read until what its bus said was taken
         self.backlog: deque[bytes] = deque()
         self.missing = 0  # frames that were lost behind the backlog

@@ -1,7 +1,7 @@
-"""The drives' end of buses, whatever carries them: what the plant in real time needs of it.
+"""Port through which the plant's emulated drives receive and send CAN frames, whatever the bus.
 
-`hub.Hub` is the end of our own buses, `attached.AttachedBuses` of any other, `joined.JoinedEnds` of
-both at once.
+`hub.Hub` serves emulated buses, `external.ExternalBuses` serves buses of any python-can interface,
+`external.CombinedPort` serves both.
 """
 
 from collections.abc import Sequence
@@ -10,14 +10,14 @@ from typing import Protocol
 from bridge.frame import Frame
 
 
-class Crossed(Protocol):
+class FrameCounters(Protocol):
     """What went over one bus."""
 
     from_drives: int
     from_clients: int
 
 
-class DriveEnd(Protocol):
+class DrivePort(Protocol):
     """Where emulated drives hear and speak."""
 
     def deliver(self, name: str, stamp_ns: int, frames: Sequence[Frame]) -> None:
@@ -26,16 +26,16 @@ class DriveEnd(Protocol):
     def serve(self, timeout_s: float) -> None:
         """Handle what happens on the buses; waits at most `timeout_s`."""
 
-    def heard(self) -> list[str]:
+    def pending(self) -> list[str]:
         """Buses with something to take."""
 
-    def take(self, name: str) -> list[Frame]:
+    def receive(self, name: str) -> list[Frame]:
         """What others sent on a bus since the last take, in order."""
 
     def clients(self) -> int:
         """How many may be listening."""
 
-    def counters(self, name: str) -> Crossed:
+    def counters(self, name: str) -> FrameCounters:
         """What went over a bus so far."""
 
     def troubles(self) -> dict[str, str]:

@@ -22,9 +22,9 @@ from collections.abc import Mapping, Sequence
 
 import can
 
+from bridge.can_bus.drive_port import DrivePort, FrameCounters
 from bridge.can_bus.echo import Echoes, hands_back
-from bridge.can_bus.opening import open_bus
-from bridge.can_bus.pythoncan import to_frame, to_message
+from bridge.can_bus.pythoncan import open_bus, to_frame, to_message
 from bridge.frame import Frame
 from bridge.waiting import readable
 from configs.brief import Settings
@@ -87,7 +87,7 @@ class _Attachment:
         self.reason = ""
 
 
-class AttachedBuses:
+class ExternalBuses:
     """The drives' end of the buses in `settings`, by name.
 
     Raises:
@@ -145,11 +145,11 @@ class AttachedBuses:
         """How long one may wait for `fileno`, if `timeout_s` at most."""
         return max(min(timeout_s, POLL_S) if self._polled else timeout_s, 0.0)
 
-    def heard(self) -> list[str]:
+    def pending(self) -> list[str]:
         """Buses with something to take."""
         return [name for name, attachment in self._all.items() if attachment.taken]
 
-    def take(self, name: str) -> list[Frame]:
+    def receive(self, name: str) -> list[Frame]:
         """What others sent on a bus since the last take, in order."""
         attachment = self._all[name]
         taken, attachment.taken = attachment.taken, []
@@ -274,3 +274,55 @@ class AttachedBuses:
                 self._open(attachment)
             except InfrastructureError as error:
                 attachment.reason = str(error)
+
+
+class CombinedPort:
+    """Two ends as one; each bus is on one of them."""
+
+    def __init__(self, ours: DrivePort, others: ExternalBuses, names: Sequence[str]) -> None:
+        self._ours = ours
+        self._others = others
+        self._of_others = frozenset(names)
+        self._both: tuple[DrivePort, ...] = (ours, others)
+
+    def _end_of(self, name: str) -> DrivePort:
+        return self._others if name in self._of_others else self._ours
+
+    def deliver(self, name: str, stamp_ns: int, frames: Sequence[Frame]) -> None:
+        """Send frames of the drives, in order, over a bus at bus time `stamp_ns`."""
+        self._end_of(name).deliver(name, stamp_ns, frames)
+
+    def serve(self, timeout_s: float) -> None:
+        """Handle what happens on the buses; waits at most `timeout_s`."""
+        readable(self._both, self._others.patience(timeout_s))
+        for end in self._both:
+            end.serve(0.0)
+
+    def pending(self) -> list[str]:
+        """Buses with something to take."""
+        return [name for end in self._both for name in end.pending()]
+
+    def receive(self, name: str) -> list[Frame]:
+        """What others sent on a bus since the last take, in order."""
+        return self._end_of(name).receive(name)
+
+    def clients(self) -> int:
+        """How many may be listening."""
+        return sum(end.clients() for end in self._both)
+
+    def counters(self, name: str) -> FrameCounters:
+        """What went over a bus so far."""
+        return self._end_of(name).counters(name)
+
+    def troubles(self) -> dict[str, str]:
+        """Buses that failed at times, and how."""
+        return self._ours.troubles() | self._others.troubles()
+
+    def fileno(self) -> int:
+        """The first end's descriptor."""
+        return self._ours.fileno()
+
+    def close(self, reason: str) -> None:
+        """Leave all buses. Idempotent."""
+        for end in self._both:
+            end.close(reason)

@@ -1,26 +1,26 @@
 """The hub: all buses of the plant's process, between the emulated drives and their clients.
 
     deliver    frames of the drives, at one instant, to every client of a bus
-    collect    wait until paced clients have said all they had to say until that instant
+    collect    wait until synchronous clients have said all they had to say until that instant
     take       what the clients of a bus sent since the last take
 
-A *gathered* client takes and sends the frames of one instant together, in one packet or several.
-A *paced* one is gathered, and owes an answer to every question: bus time stands still until it has
-answered. Only a robot's own controller in lockstep can be: it gives its name and a secret that
-nobody else was told. All others (loggers, host code under test) come, go, crash or stop reading as
-they like: what they send is taken at the next instant, what they don't read is kept for them within
-a bound (`connection`). A client's frames go to all other clients of its bus, and back to itself
-only if it asked for that. One thread, one epoll, no clock but for the bound.
+A *batched* client receives and sends the frames of one instant together, in one packet or several.
+A *synchronous* client is batched, and bus time stands still until it has answered every request.
+Only a robot's own controller in lockstep may be synchronous; it shows the secret of its robot.
+All other clients (loggers, host code under test) join, leave, crash or stop reading at any time:
+their frames are taken at the next instant, and packets that they don't read are kept within a bound
+(`connection`). A client's frames go to all other clients of its bus, and back to the sender only on
+request. One thread, one epoll, no clock but for the bound.
 
-What clients say is taken `TURN` frames at a time (`traffic.Spoken`). Who says so much that as many
-as `UNTAKEN` wait is not read until they are taken: its transmit buffer is full then, and nothing is
-lost. What is no packet, and what is no frame of classic CAN, is counted and goes nowhere; the good
-frames of a packet do. Where frames take no time there is nothing on the wire that an error frame
-could destroy: it goes to all other clients, and not to the drives.
+Frames of clients are taken `TURN` at a time (`connection.Spoken`). A client with `UNTAKEN` frames
+waiting is not read until they are taken: its transmit buffer fills, and nothing is lost. Bytes that
+are no packet and frames that violate classic CAN are counted and dropped; the valid frames of a
+packet are kept. Where frames take no time an error frame has nothing to destroy: it goes to all
+other clients, and not to the drives.
 
-A bus with a `queue` has bit timing: the hub then carries and doesn't forward. Who emulates the wire
-takes with `say` who sent what, gives with `pass_on` what ended when and who had sent it, and tells
-with `left_queue` whose transmit queue has room again.
+A bus with a `queue` has bit timing: the hub then carries and doesn't forward. The
+emulation of the wire reads with `submitted` the frames that clients want to send, hands over with
+`forward` the frames that ended on the wire, and gives credit back with `return_credit`.
 """
 
 import contextlib
@@ -34,7 +34,7 @@ from collections.abc import Mapping, Sequence
 
 from bridge.can_bus import packet as wire
 from bridge.can_bus.connection import Bus, Connection, Counters
-from bridge.can_bus.traffic import Key, Passed, Said, Stamped
+from bridge.can_bus.packet import Key, Stamped, Submitted, Transmitted
 from bridge.frame import ERR, Frame
 from bridge.waiting import readable
 
@@ -99,21 +99,21 @@ class Hub:
             return
         if len(clients) == 1 and len(frames) <= wire.MAX_FRAMES:
             (client,) = clients
-            if client.paced and not (client.owes or client.backlog or client.pending):
+            if client.synchronous and not (client.owes or client.backlog or client.pending):
                 client.owes = True
                 bus.owing += 1
                 self._send(client, wire.encode_frames(0, stamp_ns, frames))
                 return
         together = b""
         for client in clients.copy():
-            if client.paced and not client.owes:
+            if client.synchronous and not client.owes:
                 client.owes = True
                 bus.owing += 1
-            if client.pending or (client.gathered and len(frames) > wire.MAX_FRAMES):
+            if client.pending or (client.batched and len(frames) > wire.MAX_FRAMES):
                 heard, client.pending = client.pending, []
                 heard += [Stamped(stamp_ns, frame) for frame in frames]
                 self._send_all(client, stamp_ns, heard)
-            elif client.gathered:
+            elif client.batched:
                 together = together or wire.encode_frames(0, stamp_ns, frames)
                 self._send(client, together)
             else:
@@ -121,8 +121,8 @@ class Hub:
                 for frame in frames:
                     self._send(client, wire.encode_frames(0, stamp_ns, (frame,)))
 
-    def pass_on(
-        self, name: str, stamp_ns: int, frames: Sequence[Passed], asked: str | None = None
+    def forward(
+        self, name: str, stamp_ns: int, frames: Sequence[Transmitted], asked: str | None = None
     ) -> None:
         """Tell the clients of a bus with bit timing what ended on it until `stamp_ns`.
 
@@ -137,7 +137,7 @@ class Hub:
                 for mine in (Stamped(p.end_ns, p.frame) for p in frames if p.key == client.key):
                     own = wire.encode_stamped(wire.OWN, stamp_ns, [mine], client.gone)
                     self._send(client, own)
-            if client.paced:
+            if client.synchronous:
                 for frame in heard:
                     client.pend(frame)
                 if asked is not None and asked in ("", client.name):
@@ -145,13 +145,13 @@ class Hub:
                     bus.owing += not client.owes
                     client.owes = True
                     self._send_all(client, stamp_ns, heard)
-            elif client.gathered and heard:
+            elif client.batched and heard:
                 self._send_all(client, stamp_ns, heard)
             else:
                 for one in heard:
                     self._send(client, wire.encode_stamped(0, stamp_ns, [one], client.gone))
 
-    def say(self, name: str) -> list[Said]:
+    def submitted(self, name: str) -> list[Submitted]:
         """What the clients of a bus with bit timing sent since the last call, in order."""
         bus = self._buses[name]
         said = bus.said.take()
@@ -165,19 +165,19 @@ class Hub:
         departed, bus.departed = bus.departed, []
         return departed
 
-    def left_queue(self, name: str, key: Key, count: int) -> None:
+    def return_credit(self, name: str, key: Key, count: int) -> None:
         """Frames of a client have left its transmit queue; it hears it with the next frames."""
         for client in self._buses[name].clients:
             if client.key == key:
                 client.gone += count
-                if not client.paced:
+                if not client.synchronous:
                     stamp_ns = self._buses[name].stamp_ns
                     self._send(client, wire.encode_stamped(0, stamp_ns, (), client.gone))
 
     def collect(self, timeout_s: float) -> list[str]:
-        """Buses whose paced clients have all answered what was delivered, since the last call.
+        """Buses whose synchronous clients have all answered, since the last call.
 
-        Waits until there is one, at most `timeout_s`; returns with none as well when a paced client
+        Waits at most `timeout_s` for one; returns an empty list also when a synchronous client
         left or the wake-up descriptor is readable. Whatever else happens on the buses is handled.
         """
         if not self._answered:
@@ -201,11 +201,11 @@ class Hub:
         """How many clients all buses have."""
         return sum(len(bus.clients) for bus in self._buses.values())
 
-    def heard(self) -> list[str]:
+    def pending(self) -> list[str]:
         """Buses with something to take."""
         return [name for name, bus in self._buses.items() if bus.taken.now or bus.said.now]
 
-    def take(self, name: str) -> list[Frame]:
+    def receive(self, name: str) -> list[Frame]:
         """What the clients of a bus sent since the last take, in order."""
         bus = self._buses[name]
         taken = bus.taken.take()
@@ -347,13 +347,14 @@ class Hub:
         if frames:
             bus.counters.from_clients += len(frames)
             if bus.queue:
-                bus.said.put([Said(client.key, frame) for frame in frames], at_once=client.paced)
+                submitted = [Submitted(client.key, frame) for frame in frames]
+                bus.said.put(submitted, at_once=client.synchronous)
             else:
                 if client.own or len(bus.clients) > 1:
                     self._forward(client, frames)
-                heard = frames if client.paced else _without_errors(frames)
-                bus.taken.put(heard, at_once=client.paced)
-            if len(bus.taken) + len(bus.said) >= UNTAKEN and not client.paced:
+                heard = frames if client.synchronous else _without_errors(frames)
+                bus.taken.put(heard, at_once=client.synchronous)
+            if len(bus.taken) + len(bus.said) >= UNTAKEN and not client.synchronous:
                 client.held = True
                 bus.held.append(client)
                 self._watch(client)
@@ -380,7 +381,7 @@ class Hub:
         for frame in frames:
             data = wire.encode_frames(0, bus.stamp_ns, (frame,))
             for client in tuple(bus.clients):
-                if client.paced and client is not sender:
+                if client.synchronous and client is not sender:
                     client.pend(Stamped(bus.stamp_ns, frame))
                 elif client is not sender:
                     self._send(client, data)
@@ -411,16 +412,18 @@ class Hub:
     def _welcome(self, client: Connection, hello: wire.Packet) -> None:
         bus = client.bus
         client.name, _, secret = hello.text.partition("\0")
-        paced = bool(hello.flags & wire.PACED)
-        if refusal := self._refusal(bus, hello.number, client.name, secret if paced else None):
+        synchronous = bool(hello.flags & wire.SYNCHRONOUS)
+        if refusal := self._refusal(
+            bus, hello.number, client.name, secret if synchronous else None
+        ):
             self._send(client, wire.encode_text(wire.REFUSED, refusal))
             self._drop(client)
             return
         self._joined += 1
-        client.paced = paced
-        client.gathered = paced or bool(hello.flags & wire.GATHERED)
+        client.synchronous = synchronous
+        client.batched = synchronous or bool(hello.flags & wire.BATCHED)
         client.own = bool(hello.flags & wire.OWN)
-        client.key = client.name if paced else self._joined
+        client.key = client.name if synchronous else self._joined
         client.joined = True
         bus.strangers.remove(client)
         bus.clients.append(client)
@@ -431,7 +434,7 @@ class Hub:
         self._send(client, welcome)
 
     def _refusal(self, bus: Bus, version: int, name: str, secret: str | None) -> str:
-        """Why a client may not join, "" if it may; `secret` None: it isn't paced."""
+        """Why a client may not join, "" if it may; `secret` None: it isn't synchronous."""
         if version != wire.VERSION:
             return f"it speaks version {version} of the bus's packets, not {wire.VERSION}"
         if len(bus.clients) >= MAX_CLIENTS and secret is None:
@@ -439,15 +442,13 @@ class Hub:
         if secret is None:
             return ""
         if not bus.controllers:
-            return (
-                "paced is for a robot's own controller in lockstep, and this bus waits for nobody"
-            )
+            return "synchronous is for a robot's own controller in lockstep: this bus has none"
         known = bus.controllers.get(name)
         if known is None or not hmac.compare_digest(known.encode(), secret.encode()):
             robots = ", ".join(bus.controllers)
             return (
-                f"paced is for the controllers that the run itself started, of {robots}: bus time"
-                " waits for these only; without paced anybody may join"
+                f"synchronous is for the controllers that the run started, of {robots}: bus time"
+                " waits for no other client; join without synchronous"
             )
         if name in bus.joined_controllers():
             return f"the controller of {name} is on it already"
@@ -490,7 +491,7 @@ class Hub:
         if client.owes:
             client.owes = False
             client.bus.owing -= 1
-        if client.paced:
+        if client.synchronous:
             self._left.append(client.name)
 
     def _register(self, fd: int, reader: Connection | Bus | None) -> None:

@@ -10,10 +10,10 @@ Works between processes, without kernel module or root; lossless and in order fo
 of own frames unless asked; classic CAN only. `Message.timestamp` is bus time: seconds since the bus
 was powered up. Linux.
 
-`gathered=True` is for a program that reads until nothing is left and then acts: frames of one
-instant come in one packet, and what it sends goes out with its next look at the bus. `paced` is for
-a robot's own controller in lockstep, which is told its secret by the run: it is gathered, the bus
-waits for it, and its next wait in `recv` with nothing left to read says: that was all until now.
+`batched=True` suits a program that reads until nothing is left and then acts: frames of one instant
+arrive in one packet, and frames that it sends leave with its next `recv`. `synchronous` is for the
+robot's own controller in lockstep, to which the run gives a secret: such a client is batched, bus
+time waits for its answer, and its next blocking `recv` completes the answer.
 
 `send` takes what `can.Message(check=True)` takes, but no FD frames, and refuses the rest before
 anything goes out. An error frame (`is_error_frame`) on a bus with bit timing is an error flag on
@@ -38,7 +38,7 @@ from bridge.can_bus import options, sockets
 from bridge.can_bus import packet as wire
 from bridge.can_bus.credentials import OPTIONS, as_option, network_of
 from bridge.can_bus.pythoncan import to_frame, to_message
-from bridge.can_bus.transport import Line, UnixLine
+from bridge.can_bus.transport import Line, UnixTransport
 from bridge.frame import Frame
 from configs.errors import ScenarioError
 
@@ -60,9 +60,9 @@ class FleetloopBus(can.BusABC):
     Args:
         channel: bus name ("r1"), run and bus ("<run>/r1"), or the path of the bus's socket.
         can_filters: see `can.BusABC.set_filters`.
-        paced: the robot whose controller this is, and for which bus time then waits.
+        synchronous: the robot whose controller this is, and for which bus time then waits.
         secret: what the run told that controller and nobody else.
-        gathered: frames of one instant travel together; a descriptor is readable once for all.
+        batched: frames of one instant travel together; a descriptor is readable once for all.
         receive_own_messages: frames sent come back, with `is_rx` False.
         connect_timeout: how long to wait for the bus to answer [s], above 0.
         fd: must be False; the bus is classic CAN.
@@ -82,9 +82,9 @@ class FleetloopBus(can.BusABC):
         channel: str | int | None = None,
         can_filters: CanFilters | None = None,
         *,
-        paced: str | bool = "",
+        synchronous: str | bool = "",
         secret: str = "",
-        gathered: bool = False,
+        batched: bool = False,
         receive_own_messages: bool = False,
         connect_timeout: float = 10.0,
         fd: bool = False,
@@ -96,9 +96,9 @@ class FleetloopBus(can.BusABC):
         self.channel = options.channel_name(channel)
         if options.truth("fd", fd):
             raise can.CanInitializationError(f"bus {channel!r} is classic CAN: fd must be False")
-        self._name, self._secret = options.controller(paced, secret)
-        self._paced = bool(self._name)
-        self._gathered = options.truth("gathered", gathered) or self._paced
+        self._name, self._secret = options.controller(synchronous, secret)
+        self._synchronous = bool(self._name)
+        self._batched = options.truth("batched", batched) or self._synchronous
         own = options.truth("receive_own_messages", receive_own_messages)
         timeout_s = options.seconds("connect_timeout", connect_timeout)
         self.lost = 0
@@ -117,16 +117,16 @@ class FleetloopBus(can.BusABC):
 
     def _open_line(self, hello: bytes, timeout_s: float, remote: dict[str, str]) -> Line:
         if not remote:
-            return UnixLine(sockets.find(self.channel), hello, timeout_s)
+            return UnixTransport(sockets.find(self.channel), hello, timeout_s)
         # Zenoh costs nobody anything who doesn't need it.
-        from bridge.can_bus.zenoh_transport import RemoteLine
+        from bridge.can_bus.zenoh_transport import ZenohTransport
 
-        return RemoteLine(network_of(remote), self.channel, hello, timeout_s)
+        return ZenohTransport(network_of(remote), self.channel, hello, timeout_s)
 
     def _connect(self, own: bool, timeout_s: float, remote: dict[str, str]) -> Line:
-        flags = wire.PACED if self._paced else wire.GATHERED if self._gathered else 0
+        flags = wire.SYNCHRONOUS if self._synchronous else wire.BATCHED if self._batched else 0
         flags |= wire.OWN if own else 0
-        name = f"{self._name}\0{self._secret}" if self._paced else socket.gethostname()
+        name = f"{self._name}\0{self._secret}" if self._synchronous else socket.gethostname()
         hello = wire.encode_text(wire.HELLO, name, flags=flags, count=wire.VERSION)
         line = None
         try:
@@ -154,7 +154,7 @@ class FleetloopBus(can.BusABC):
     def recv(self, timeout: float | None = None) -> can.Message | None:
         """The next message, None if none came within `timeout` seconds (None: wait for ever).
 
-        A paced client's time is the bus's: None as well when a tick passed without a frame.
+        A synchronous client's time is the bus's: None as well when a tick passed without a frame.
 
         Raises:
             can.CanOperationError: the bus is gone; everything received before was handed out.
@@ -197,7 +197,7 @@ class FleetloopBus(can.BusABC):
             raise can.CanOperationError(f"bus {self.channel!r}: not sent: {error}") from error
         if self._queue:
             self._await_room(timeout)
-        if self._gathered:
+        if self._batched:
             if self._is_shutdown:
                 raise self._gone_with(None)
             if len(self._outbox) == wire.MAX_FRAMES:
@@ -214,7 +214,7 @@ class FleetloopBus(can.BusABC):
 
     @property
     def asked(self) -> bool:
-        """Of a paced client: whether the bus waits for its answer, to a tick or to frames."""
+        """Of a synchronous client: whether the bus waits for its answer, to a tick or to frames."""
         return self._owes
 
     def fileno(self) -> int:
@@ -267,7 +267,7 @@ class FleetloopBus(can.BusABC):
         if packet is not None and packet[0] == wire.FRAMES:
             _, flags, _, stamp_ns, frames, _, self._gone, before_ns, _ = packet
             self._stamp_ns = stamp_ns
-            self._owes = self._paced and not flags & wire.MORE
+            self._owes = self._synchronous and not flags & wire.MORE
             timestamp, channel, is_rx = stamp_ns / 1e9, self.channel, not flags & wire.OWN
             put = self._inbox.append
             if before_ns:
@@ -320,8 +320,8 @@ class FleetloopBus(can.BusABC):
         while (self._said - self._gone) & 0xFFFF_FFFF >= self._queue:
             left_s = max(deadline - time.monotonic(), 0.0)
             # That a frame has left is told by what is there to read, also for who only sends. A
-            # paced client holds the bus's time: waiting would be for ever.
-            if self._paced or not self._receive(left_s):
+            # synchronous client holds the bus's time: waiting would be for ever.
+            if self._synchronous or not self._receive(left_s):
                 raise can.CanOperationError(
                     f"bus {self.channel!r}: transmit queue full, {self._queue} frames wait",
                     errno.ENOBUFS,
@@ -341,7 +341,7 @@ class FleetloopBus(can.BusABC):
 
     def _send_late(self, data: bytes, timeout: float | None) -> None:
         deadline = time.monotonic() + (PATIENCE_S if timeout is None else timeout)
-        while (left_s := deadline - time.monotonic()) > 0.0 and self._line.await_room(left_s):
+        while (left_s := deadline - time.monotonic()) > 0.0 and self._line.await_writable(left_s):
             try:
                 self._send_now(data)
             except BlockingIOError:

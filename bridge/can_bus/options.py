@@ -51,12 +51,12 @@ def channel_name(value: object) -> str:
 
 
 def controller(value: object, secret: object) -> tuple[str, str]:
-    """The robot whose controller a paced client is, and its secret; "" if it isn't paced."""
+    """Robot and secret of a synchronous client; both "" for any other client."""
     if value is None or value is False or value == "":
         return "", ""
     if not isinstance(value, str) or not isinstance(secret, str):
         raise _wrong(
-            "paced", value, "must name the robot whose controller this is, with its secret"
+            "synchronous", value, "must name the robot whose controller this is, with its secret"
         )
     return value, secret
 

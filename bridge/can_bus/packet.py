@@ -1,39 +1,39 @@
-"""Packets between a bus's hub and its clients: frames of one instant travel together.
+"""Packets between the hub of a bus and its clients, and the frames that they carry.
 
-    header   kind u8, flags u8, count u16, room u32, stamp i64         little endian, 16 bytes
+    header   kind u8, flags u8, count u16, credit u32, stamp i64       little endian, 16 bytes
     frame    can_id u32, length u8, 3 bytes padding, data 8 bytes      as Linux struct can_frame
     before   u32 for each frame, after all frames; absent if all are 0
 
     kind         from     flags, count and body
-    1 HELLO      client   flags PACED, GATHERED, OWN; count = version; body = the client's name,
-                          of a paced one also a zero byte and its secret
-    2 WELCOME    hub      stamp = bus time; count = version; room = the client's transmit queue
+    1 HELLO      client   flags SYNCHRONOUS, BATCHED, OWN; count = version; body = the client's
+                          name; a synchronous client adds a zero byte and its secret
+    2 WELCOME    hub      stamp = bus time; count = version; credit = length of the transmit queue
     3 REFUSED    hub      body = reason
-    4 FRAMES     both     count frames, at most 1024; from the hub OWN: the client's own come back;
-                          MORE: what it has to say of this instant goes on in the next packet;
-                          from a paced client DONE: all it had to say until `stamp`, which it echoes
+    4 FRAMES     both     count frames, at most 1024; from the hub OWN: the client's own frames;
+                          MORE: the next packet continues the same instant; from a synchronous
+                          client DONE: its complete answer to the packet with this `stamp`
     5 BYE        hub      body = reason
-    6 LOST       hub      room = frames that are missing here: the client did not read in time
+    6 LOST       hub      credit = number of frames lost here: the client did not read in time
 
-    flag         PACED 1, OWN 2, DONE 4, GATHERED 8, MORE 16
+    flag         SYNCHRONOUS 1, OWN 2, DONE 4, BATCHED 8, MORE 16
 
-`stamp` is bus time: nanoseconds since the bus was powered up; a frame ended `before` nanoseconds
-earlier. `room` in WELCOME is how many frames may wait at the client's node, 0 for a bus on which
-frames take no time; in FRAMES from the hub it says how many of the client's frames have left its
-queue since it came, modulo 2³². What isn't a packet decodes to None. What isn't a frame of classic
-CAN (`frame.flaw`) is left out of its packet, and counted; the data of remote frames is zero.
+`stamp` is bus time: nanoseconds since power-up of the bus; a frame ended `before` nanoseconds
+earlier. Credits bound the transmit queue of a client: WELCOME grants a credit for each place in it
+(0: frames take no time, the queue has no bound), and FRAMES from the hub carries the number of
+credits returned since then, modulo 2³². Bytes that are no packet decode to
+None. A frame that violates classic CAN (`bridge.frame.flaw`) is left out of its packet and counted.
+The data of remote frames is zero.
 """
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from bridge.can_bus.traffic import Stamped
-from bridge.frame import ID_MASK_11, MAX_DATA, RTR, Frame, flaw
+from bridge.frame import ERR, ID_MASK_11, MAX_DATA, RTR, Frame, flaw
 
 VERSION = 3
 HELLO, WELCOME, REFUSED, FRAMES, BYE, LOST = 1, 2, 3, 4, 5, 6
-PACED, OWN, DONE, GATHERED, MORE = 1, 2, 4, 8, 16
+SYNCHRONOUS, OWN, DONE, BATCHED, MORE = 1, 2, 4, 8, 16
 MAX_FRAMES = 1024
 MAX_BYTES = 16 + 20 * MAX_FRAMES
 LONGEST_BEFORE_NS = 2**32 - 1
@@ -43,6 +43,51 @@ _HEADER = struct.Struct("<BBHIq")
 _FRAME = struct.Struct("<IB3x8s")
 _ONE = struct.Struct("<BBHIqIB3x8s")
 _TWO = struct.Struct("<BBHIqIB3x8sIB3x8s")
+
+Key = str | int
+"""A client of a bus: the name of the robot that it controls in lockstep, else a number."""
+_NOBODY: Mapping[Key, Frame] = {}
+
+
+class Stamped(NamedTuple):
+    """A frame and the bus time at which it ended."""
+
+    end_ns: int
+    frame: Frame
+
+
+class Submitted(NamedTuple):
+    """A frame that a client wants to send."""
+
+    key: Key
+    frame: Frame
+
+
+class Transmitted(NamedTuple):
+    """A frame that ended on the bus; the key of the client that had sent it, None for a drive.
+
+    An error frame is what a client's node tells it: `apart` has those of the nodes, `frame` is for
+    clients without one. With `to` it concerns one client only.
+    """
+
+    end_ns: int
+    frame: Frame
+    key: Key | None = None
+    to: Key | None = None
+    apart: Mapping[Key, Frame] = _NOBODY
+
+    @property
+    def of_drive(self) -> bool:
+        """Whether it is a frame that a drive sent."""
+        return self.key is None and not self.frame.can_id & ERR
+
+    def heard_by(self, key: Key) -> bool:
+        """Whether a client hears it from the bus; its own frames it doesn't."""
+        return key != self.key and self.to in (None, key)
+
+    def as_heard_by(self, key: Key) -> Stamped:
+        """What it hears, and when that ended."""
+        return Stamped(self.end_ns, self.apart.get(key, self.frame) if self.apart else self.frame)
 
 
 class Packet(NamedTuple):

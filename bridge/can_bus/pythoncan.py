@@ -5,14 +5,33 @@ would cost a good part of a control period.
 """
 
 from operator import index
+from typing import Any
 
 import can
 
 from bridge.frame import EFF, ERR, ID_MASK_11, ID_MASK_29, MAX_DATA, RTR, Frame, flaw
+from configs.brief import Settings
+from configs.errors import InfrastructureError
 
 _Message = can.Message
 _new = object.__new__
 _new_frame = tuple.__new__
+
+
+def open_bus(who: str, settings: Settings) -> can.BusABC:
+    """`can.Bus(**settings)`, verbatim: python-can checks what its interface takes.
+
+    Raises:
+        InfrastructureError: naming who wanted it, the interface, the channel and the reason.
+    """
+    options: dict[str, Any] = dict(settings)
+    try:
+        return can.Bus(**options)
+    # Interfaces raise what their libraries raise: a missing device is an OSError on SocketCAN and
+    # a serial.SerialException on slcan, a wrong option a TypeError.
+    except (can.CanError, OSError, TypeError, ValueError, ImportError) as error:
+        named = f"{options.get('interface')} channel {options.get('channel')!r}"
+        raise InfrastructureError(f"{who}: no CAN bus: {named}: {error}") from error
 
 
 def to_message(

@@ -1,7 +1,7 @@
-"""How a client of an emulated bus reaches its hub: packets both ways, whole and in order.
+"""Transports between a client of an emulated bus and its hub: whole packets, both ways, in order.
 
-`UnixLine` is a Unix socket on the bus's own machine; `remote.RemoteLine` reaches the same hub over
-Zenoh.
+`UnixTransport` is a Unix socket on the machine of the bus; `zenoh_transport.ZenohTransport` reaches
+the same hub from another machine.
 """
 
 import contextlib
@@ -25,7 +25,7 @@ class Line(Protocol):
     def send(self, packet: bytes) -> None:
         """Send at once. Raises `BlockingIOError` without room, `OSError` when it is broken."""
 
-    def await_room(self, timeout_s: float) -> bool:
+    def await_writable(self, timeout_s: float) -> bool:
         """Wait until there is room to send; whether there is."""
 
     def receive(self, wait_s: float | None) -> bytes | None:
@@ -38,7 +38,7 @@ class Line(Protocol):
         """Leave; what was sent arrives, and who waits in another thread wakes. Idempotent."""
 
 
-class UnixLine:
+class UnixTransport:
     """A line over a Unix socket that keeps packets."""
 
     __slots__ = ("_bound_s", "_recv", "_send", "_socket")
@@ -70,7 +70,7 @@ class UnixLine:
         """Send at once."""
         self._send(packet, socket.MSG_DONTWAIT)
 
-    def await_room(self, timeout_s: float) -> bool:
+    def await_writable(self, timeout_s: float) -> bool:
         """Wait until there is room to send."""
         poller = select.poll()
         try:

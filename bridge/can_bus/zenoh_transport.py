@@ -35,7 +35,7 @@ _FIRST_HELLO_S, _LAST_HELLO_S = 0.01, 0.2
 _ENDS = frozenset({wire.BYE, wire.REFUSED})
 
 
-class RemoteLine:
+class ZenohTransport:
     """One guest's line to a bus behind a router."""
 
     def __init__(self, network: NetworkLink, channel: str, hello: bytes, timeout_s: float) -> None:
@@ -146,7 +146,7 @@ class RemoteLine:
             self._room.send(packet)
         self._say(packet)
 
-    def await_room(self, timeout_s: float) -> bool:
+    def await_writable(self, timeout_s: float) -> bool:
         """Wait until there is room to send, or the line is broken."""
         with self._news:
             return self._news.wait_for(

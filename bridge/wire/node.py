@@ -1,11 +1,27 @@
-"""A node of an emulated wire, and what the wire reports."""
+"""A node of an emulated wire, its recovery from bus-off, and the events that a wire reports.
+
+A node that is bus-off recovers after 128 sequences of 11 recessive bits (ISO 11898-1):
+
+    idle wire       every 11 bits are a sequence
+    end of a frame  one sequence: delimiter, end of frame, intermission; of an error frame as well
+    any frame       ends an incomplete sequence
+
+So recovery takes 1408 bits on an idle wire and 128 frames on a full one.
+"""
 
 from enum import Enum
 from typing import NamedTuple
 
 from bridge.frame import Frame
-from bridge.wire.confinement import Confinement, NodeState
+from bridge.wire.confinement import (
+    RECESSIVE_BITS,
+    RECOVERY_SEQUENCES,
+    Confinement,
+    NodeState,
+)
 from bridge.wire.queues import Queue
+
+_SECOND_NS = 1_000_000_000
 
 
 class ErrorKind(Enum):
@@ -26,7 +42,7 @@ class Counters:
         self.accepted = 0  # taken by `submit`, a duplicate counts as well
         self.refused = 0  # not taken: no room, or off the bus
         self.sent = 0
-        self.dropped = 0  # lost with a node that left or went off the bus, or by a disturbance
+        self.dropped = 0  # lost with a node that left or went off the bus, or by a fault
         self.errors = 0  # attempts to send that failed
 
 
@@ -64,6 +80,52 @@ class Node:
 
     def __repr__(self) -> str:
         return f"Node({self.name!r})"
+
+
+class Recovery:
+    """The nodes of a segment that are on their way back."""
+
+    __slots__ = ("_bit_rate", "nodes")
+
+    def __init__(self, bit_rate: int) -> None:
+        self._bit_rate = bit_rate
+        self.nodes: list[Node] = []
+
+    def start(self, node: Node, from_ns: int) -> None:
+        """Let a node count from this instant on."""
+        node.sequences_left = RECOVERY_SEQUENCES
+        node.recessive_from_ns = from_ns
+        if node not in self.nodes:
+            self.nodes.append(node)
+
+    def back_ns(self, node: Node) -> int:
+        """When a node is back if the wire stays idle."""
+        return node.recessive_from_ns + self._span(node.sequences_left * RECESSIVE_BITS)
+
+    def next(self, before_ns: int | None) -> Node | None:
+        """The node that is back first, if that is before the next frame begins."""
+        if not self.nodes:
+            return None
+        node = min(self.nodes, key=self.back_ns)
+        return node if before_ns is None or self.back_ns(node) <= before_ns else None
+
+    def finish(self, node: Node) -> int:
+        """A node is back; return when."""
+        at_ns = self.back_ns(node)
+        self.nodes.remove(node)
+        node.sequences_left = 0
+        node.confinement.restart()
+        return at_ns
+
+    def count(self, start_ns: int, free_ns: int) -> None:
+        """A transmission has passed: count what was recessive before it, and begin in its end."""
+        span = self._span(RECESSIVE_BITS)
+        for node in self.nodes:
+            node.sequences_left -= max(0, start_ns - node.recessive_from_ns) // span
+            node.recessive_from_ns = max(node.recessive_from_ns, free_ns - span)
+
+    def _span(self, bits: int) -> int:
+        return bits * _SECOND_NS // self._bit_rate
 
 
 class Delivered(NamedTuple):

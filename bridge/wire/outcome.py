@@ -8,7 +8,7 @@ In order, the first that applies:
     senders of one identifier, different bits     at the first bit that differs, who sends recessive
                                                   sees a bit error: an active one destroys the frame
                                                   for all, passive ones drop out and the rest go on
-    a disturbance that corrupts it                form error at the delimiter of the CRC
+    a fault that corrupts it                form error at the delimiter of the CRC
     nobody else to hear it                        acknowledge error after the acknowledge slot
     else                                          it passes
 
@@ -35,7 +35,7 @@ from bridge.wire.bits import (
     stuffed_bits,
 )
 from bridge.wire.confinement import NodeState
-from bridge.wire.faults import Disturbance, Disturbances
+from bridge.wire.faults import Fault, Faults
 from bridge.wire.node import ErrorKind, Node
 from bridge.wire.queues import Entry
 
@@ -60,7 +60,7 @@ class Outcome(NamedTuple):
     error_bit: int = 0  # where the error flag begins
     fallen: Sequence[Sending] = ()  # passive senders that saw a bit error and dropped out
     first: Node | None = None  # a listener that destroyed it
-    disturbance: Disturbance | None = None
+    fault: Fault | None = None
     orders: Sequence[Sending] = ()  # error flags on order that destroyed it
 
 
@@ -111,14 +111,12 @@ def cut_short(plan: Plan, order: Sending, bit: int) -> Outcome:
         error=ErrorKind.STUFF,
         error_bit=bit,
         first=None,
-        disturbance=None,
+        fault=None,
         orders=(*before.orders, order),
     )
 
 
-def outcome(
-    senders: Sequence[Sending], nodes: Sequence[Node], disturbances: Disturbances
-) -> Outcome:
+def outcome(senders: Sequence[Sending], nodes: Sequence[Node], faults: Faults) -> Outcome:
     """What becomes of the frame of `senders`, who have won the arbitration, among all `nodes`."""
     frame = senders[0].entry.frame
     listeners = [node for node in nodes if node.state is not NodeState.BUS_OFF]
@@ -137,13 +135,13 @@ def outcome(
             return clash
         senders = [sender for sender in senders if sender not in fallen]
     entry = senders[0].entry
-    disturbance = None
-    if disturbances:
-        disturbance = disturbances.match(senders[0].node.name, entry.frame, on_wire=True)
-    if disturbance is not None:
+    fault = None
+    if faults:
+        fault = faults.match(senders[0].node.name, entry.frame, on_wire=True)
+    if fault is not None:
         at = entry.bits - _AFTER_ACKNOWLEDGE - 1
         found = _destroyed(senders, ErrorKind.FORM, at, ERROR_FLAG_BITS)
-        return found._replace(fallen=fallen, disturbance=disturbance)
+        return found._replace(fallen=fallen, fault=fault)
     if not any(node not in sending and not node.wrong_bit_rate for node in listeners):
         at = entry.bits - _AFTER_ACKNOWLEDGE
         found = _destroyed(senders, ErrorKind.ACK, at, ERROR_FLAG_BITS)

@@ -10,11 +10,18 @@ the segment needs no clock and gives the same events however it is asked.
 
 from bridge.wire.bits import SUSPEND_BITS
 from bridge.wire.confinement import NodeState
-from bridge.wire.faults import Disturbances
-from bridge.wire.node import Delivered, ErrorFrame, ErrorKind, Event, Node, StateChanged
+from bridge.wire.faults import Faults
+from bridge.wire.node import (
+    Delivered,
+    ErrorFrame,
+    ErrorKind,
+    Event,
+    Node,
+    Recovery,
+    StateChanged,
+)
 from bridge.wire.outcome import Outcome, Plan, Sending, cut_short, ordered, outcome
 from bridge.wire.queues import ERROR_KEY, Entry
-from bridge.wire.recovery import Recovery
 
 _SECOND_NS = 1_000_000_000
 _PASSIVE, _OFF = NodeState.ERROR_PASSIVE, NodeState.BUS_OFF
@@ -25,7 +32,7 @@ class Segment:
 
     __slots__ = (
         "_bit_rate",
-        "_disturbances",
+        "_faults",
         "_first_ns",
         "_listeners",
         "_moves",
@@ -41,9 +48,9 @@ class Segment:
         "recovery",
     )
 
-    def __init__(self, bit_rate: int, disturbances: Disturbances) -> None:
+    def __init__(self, bit_rate: int, faults: Faults) -> None:
         self._bit_rate = bit_rate
-        self._disturbances = disturbances
+        self._faults = faults
         self.nodes: list[Node] = []
         self.free_ns = 0
         self.busy_ns = 0
@@ -128,7 +135,7 @@ class Segment:
         self._plan.heard_by = tuple(other for other in plan.heard_by if other is not node)
 
     def revise(self, at_ns: int) -> None:
-        """Who is there, or what they may do, has changed; or a disturbance was ordered."""
+        """Who is there, or what they may do, has changed; or a fault was ordered."""
         self._listeners = tuple(
             node for node in self.nodes if node.state is not _OFF and not node.wrong_bit_rate
         )
@@ -188,7 +195,7 @@ class Segment:
             return self._arbitrate(self._first_ns)
         if entry.key == ERROR_KEY:
             return self._plan_error(start_ns, entry)
-        if self._plain and not tied and not self._disturbances:
+        if self._plain and not tied and not self._faults:
             plan = Plan(best, entry, start_ns, None, self._bit_rate)
             others = self._others.get(best)
             if others is None:
@@ -196,7 +203,7 @@ class Segment:
                 self._others[best] = others
             plan.heard_by = others
             return plan
-        what = outcome(self._tied(start_ns, entry), self.nodes, self._disturbances)
+        what = outcome(self._tied(start_ns, entry), self.nodes, self._faults)
         plan = Plan(*what.senders[0], start_ns, what, self._bit_rate)
         plan.heard_by = tuple(node for node in self._listeners if not plan.involves(node))
         return plan
@@ -238,7 +245,7 @@ class Segment:
             self._sent(plan.sender, plan.entry, plan, events)
             self._heard(plan, events)
         elif what.error is None:
-            self._passed(plan, what, events)
+            self._transmitted(plan, what, events)
         else:
             self._failed(plan, what, what.error, events)
         self._first_ns = free_ns if self._ready else None
@@ -273,7 +280,7 @@ class Segment:
                 self._note(node, plan.done_ns, events)
             self._troubled = any(node.confinement.rec for node in self.nodes)
 
-    def _passed(self, plan: Plan, what: Outcome, events: list[Event]) -> None:
+    def _transmitted(self, plan: Plan, what: Outcome, events: list[Event]) -> None:
         merged = tuple(sending.node for sending in what.senders[1:])
         frame = plan.entry.frame
         events.append(
@@ -291,8 +298,8 @@ class Segment:
         orders = tuple(order.node for order in what.orders)
         at_ns, frame = plan.done_ns, plan.entry.frame
         events.append(ErrorFrame(at_ns, plan.start_ns, plan.free_ns, kind, senders, frame, orders))
-        if what.disturbance is not None:
-            self._disturbances.struck(what.disturbance)
+        if what.fault is not None:
+            self._faults.applied(what.fault)
         for node, entry in what.orders:
             node.counters.sent += 1
             if node.attached:

@@ -28,7 +28,7 @@ from heapq import heappop, heappush
 from bridge.frame import ERR, Frame
 from bridge.wire.bits import ERROR_FRAME_BITS, arbitration_key, frame_bits
 from bridge.wire.confinement import NodeState
-from bridge.wire.faults import Disturbance, Disturbances, Kind
+from bridge.wire.faults import Fault, FaultKind, Faults
 from bridge.wire.node import Event, Node
 from bridge.wire.queues import ERROR_KEY, Entry, Fifo, Queue
 from bridge.wire.segment import Segment
@@ -46,8 +46,8 @@ class Wire:
             )
         self.bitrate_bit_s = bitrate_bit_s
         self.now_ns = 0
-        self._disturbances = Disturbances()
-        self._main = Segment(bitrate_bit_s, self._disturbances)
+        self._faults = Faults()
+        self._main = Segment(bitrate_bit_s, self._faults)
         self._apart: list[Segment] = []  # an open line leaves a node on a wire of its own
         self._events: list[Event] = []
         self._withheld: list[tuple[int, int, Node, Entry]] = []
@@ -98,7 +98,7 @@ class Wire:
     def disconnect(self, node: Node) -> None:
         """Open the line to a node: it hears and reaches nobody. Its frame on the wire goes on."""
         if node.attached and self._segment(node) is self._main:
-            segment = Segment(self.bitrate_bit_s, self._disturbances)
+            segment = Segment(self.bitrate_bit_s, self._faults)
             self._apart.append(segment)
             self._main.move(node, segment, self.now_ns)
             self._forget_empty()
@@ -118,7 +118,7 @@ class Wire:
     def submit(self, node: Node, frame: Frame, at_ns: int) -> bool:
         """Queue a frame at a node; False: no room (ENOBUFS), or the node is bus-off.
 
-        Disturbances don't concern error frames.
+        Faults don't concern error frames.
 
         Raises:
             ValueError: no classic frame, a node that has left, or an instant in the past.
@@ -132,10 +132,10 @@ class Wire:
         bits = frame_bits(frame)
         self._number += 1
         entry = Entry(arbitration_key(frame.can_id), self._number, frame, bits)
-        if self._disturbances:
-            found = self._disturbances.match(node.name, frame, on_wire=False)
+        if self._faults:
+            found = self._faults.match(node.name, frame, on_wire=False)
             if found is not None:
-                return self._disturbed(found, node, entry)
+                return self._apply(found, node, entry)
         return self._queue(node, entry)
 
     def advance(self, to_ns: int) -> list[Event]:
@@ -156,16 +156,16 @@ class Wire:
             return self._events[0][0]
         return self._next_ns()
 
-    # --- disturbances and figures ----------------------------------------------------------------
+    # --- faults and figures ----------------------------------------------------------------
 
-    def disturb(self, disturbance: Disturbance) -> None:
+    def inject(self, fault: Fault) -> None:
         """Let something happen to frames from now on."""
-        self._disturbances.add(disturbance)
+        self._faults.add(fault)
         self._revise()
 
-    def calm(self) -> None:
-        """Let no more ordered disturbance happen."""
-        self._disturbances.clear()
+    def clear_faults(self) -> None:
+        """Let no more ordered fault happen."""
+        self._faults.clear()
         self._revise()
 
     @property
@@ -215,15 +215,15 @@ class Wire:
             self._segment(node).interrupt(node, self.now_ns)
         return True
 
-    def _disturbed(self, found: Disturbance, node: Node, entry: Entry) -> bool:
-        """Let a disturbance happen to a frame on its way to the controller."""
-        self._disturbances.struck(found)
+    def _apply(self, found: Fault, node: Node, entry: Entry) -> bool:
+        """Let a fault happen to a frame on its way to the controller."""
+        self._faults.applied(found)
         match found.kind:
-            case Kind.DROP:
+            case FaultKind.DROP:
                 node.counters.accepted += 1
                 node.counters.dropped += 1
                 return True
-            case Kind.DELAY:
+            case FaultKind.DELAY:
                 node.counters.accepted += 1
                 held = (self.now_ns + found.delay_ns, entry.number, node, entry)
                 heappush(self._withheld, held)

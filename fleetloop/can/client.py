@@ -27,18 +27,18 @@ class Heard(NamedTuple):
     stamp_ns: int
 
 
-def open_bus(channel: str, *, gathered: bool = False) -> FleetloopBus:
+def open_bus(channel: str, *, batched: bool = False) -> FleetloopBus:
     """Join a bus as a client like any other.
 
     Args:
         channel: bus, run/bus or the path of its socket.
-        gathered: for who only listens; spares the bus work.
+        batched: for who only listens; spares the bus work.
 
     Raises:
         InfrastructureError: no such bus, or it doesn't answer in `CONNECT_S`.
     """
     try:
-        return FleetloopBus(channel, gathered=gathered, connect_timeout=CONNECT_S)
+        return FleetloopBus(channel, batched=batched, connect_timeout=CONNECT_S)
     except can.CanInitializationError as error:
         if isinstance(error.__cause__, FleetloopError):
             raise error.__cause__ from error

@@ -132,7 +132,7 @@ def dump(targets: Sequence[str], options: Options) -> int:
     wanted = _wanted(targets)
     with contextlib.ExitStack() as opened:
         buses = {
-            name: opened.enter_context(open_bus(channel, gathered=True))
+            name: opened.enter_context(open_bus(channel, batched=True))
             for name, (channel, _) in wanted.items()
         }
         with Listener(buses, _descriptor(sys.stdout)) as listener:

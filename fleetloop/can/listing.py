@@ -67,7 +67,7 @@ def survey(seconds: float, bit_rate: int) -> list[BusReport]:
         buses = {}
         for path in paths:
             try:
-                buses[str(path)] = opened.enter_context(open_bus(str(path), gathered=True))
+                buses[str(path)] = opened.enter_context(open_bus(str(path), batched=True))
             except InfrastructureError as error:
                 problems[str(path)] = str(error)
         census = {name: Census(bit_rate) for name in buses}

@@ -12,7 +12,7 @@ from typing import Protocol
 
 from agents.agent import Agent
 from agents.bus_clock import BusClock
-from bridge.can_bus.traffic import Said
+from bridge.can_bus.packet import Submitted
 from bridge.frame import Frame
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix, Progress
 from bridge.process import Stop, settled_memory
@@ -129,11 +129,11 @@ class _WireLane(_Lane):
         ask = next(steps)
         while ask is not None:
             for robot, heard in pending.items():
-                heard += [p.as_heard_by(robot) for p in ask.passed if p.heard_by(robot)]
+                heard += [p.as_heard_by(robot) for p in ask.transmitted if p.heard_by(robot)]
             robot = ask.asked
             heard, pending[robot] = pending[robot], []
             said = _think(self.minds[robot], heard)
-            ask = steps.send([Said(robot, frame) for frame in said[: self._wire.room(robot)]])
+            ask = steps.send([Submitted(robot, frame) for frame in said[: self._wire.room(robot)]])
 
 
 def _lane(name: str, bus: Emulation, minds: Mapping[str, _Mind]) -> _Lane:

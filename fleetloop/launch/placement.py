@@ -36,8 +36,8 @@ def agent_bus(
     settings = deployment.bus_of(robot)
     if not deployment.is_ours(robot):
         return settings
-    pace: dict[str, str | bool] = {"paced": robot, "secret": secret} if secret else {}
-    ours = dict(settings) | (pace or {"gathered": True})
+    pace: dict[str, str | bool] = {"synchronous": robot, "secret": secret} if secret else {}
+    ours = dict(settings) | (pace or {"batched": True})
     if socket:
         ours["channel"] = socket
     return tuple(sorted(ours.items()))

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from bridge.can_bus import sockets
-from bridge.can_bus.drive_port import DriveEnd
+from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
 from bridge.network.messages import Progress
 from bridge.process import Stop, go_realtime, keep_to_itself, name_process, settled_memory
@@ -110,7 +110,7 @@ def run_plant(source: str, options: Options) -> int:
         sockets.run_folder(f"{scenario.name}-{os.getpid()}") as folder,
     ):
         hub = Hub(sockets.listen(folder, ours), stop.wake_fd, queue=queue)
-        end: DriveEnd = hub
+        end: DrivePort = hub
         try:
             end = join(hub, brief.attached)
             _run(brief, hub, end, _buses(brief, folder), options, stop)
@@ -172,7 +172,7 @@ def _buses(brief: PlantBrief, folder: Path) -> dict[str, Settings]:
 def _run(
     brief: PlantBrief,
     hub: Hub,
-    end: DriveEnd,
+    end: DrivePort,
     buses: dict[str, Settings],
     options: Options,
     stop: Stop,

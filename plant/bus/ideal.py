@@ -13,7 +13,7 @@ over. Who drives it, over sockets or by calls, changes nothing of what happens.
 from collections.abc import Callable, Generator, Sequence
 from typing import NamedTuple, TypeVar
 
-from bridge.can_bus.traffic import Key, Passed
+from bridge.can_bus.packet import Key, Transmitted
 from bridge.frame import Frame
 from bridge.telemetry import FROM_DRIVE, Tap
 from configs.brief import Schedule
@@ -25,7 +25,7 @@ class Ask(NamedTuple):
 
     stamp_ns: int
     frames: Sequence[Frame]  # on an ideal bus: all of this instant
-    passed: Sequence[Passed] = ()  # on a bus with bit timing
+    transmitted: Sequence[Transmitted] = ()  # on a bus with bit timing
     asked: str = ""  # a robot; "": all of the bus
     freed: Sequence[tuple[Key, int]] = ()  # frames that left the transmit queues of clients
 

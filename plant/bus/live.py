@@ -8,7 +8,7 @@ WireLive    a bus of ours with bit timing: frames end when the wire says, drives
 
 from collections.abc import Mapping, Sequence
 
-from bridge.can_bus.drive_port import DriveEnd
+from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
 from bridge.frame import Frame
 from bridge.telemetry import FROM_DRIVE, Tap, no_tap
@@ -22,7 +22,7 @@ class IdealLive:
     """The robots of a bus on which frames take no time."""
 
     def __init__(
-        self, name: str, units: Sequence[Unit], end: DriveEnd, zero_ns: int, step_ns: int, tap: Tap
+        self, name: str, units: Sequence[Unit], end: DrivePort, zero_ns: int, step_ns: int, tap: Tap
     ) -> None:
         self._tap = tap
         self.units = units
@@ -45,7 +45,7 @@ class IdealLive:
     def hear(self, now_ns: int) -> None:
         """Take what others sent, and answer."""
         self._move(now_ns)
-        said = self._end.take(self._name)
+        said = self._end.receive(self._name)
         self._tap(now_ns, said, 0)
         replies: list[Frame] = []
         for unit in self.units:
@@ -101,15 +101,15 @@ class WireLive:
         self.advance(now_ns)
         for key in self._hub.departed(self._name):
             self._bus.depart(key)
-        self._bus.take(self._hub.say(self._name))
+        self._bus.take(self._hub.submitted(self._name))
 
     def advance(self, now_ns: int) -> None:
         """Let everything happen through this instant."""
         ask = self._bus.advance(now_ns)
         for key, count in ask.freed:
-            self._hub.left_queue(self._name, key, count)
-        if ask.passed:
-            self._hub.pass_on(self._name, ask.stamp_ns, ask.passed)
+            self._hub.return_credit(self._name, key, count)
+        if ask.transmitted:
+            self._hub.forward(self._name, ask.stamp_ns, ask.transmitted)
 
     def tick(self, bus_ns: int) -> None:
         """Be where a tick is."""
@@ -125,7 +125,7 @@ Live = IdealLive | WireLive
 def live_buses(
     brief: PlantBrief,
     units: Sequence[Unit],
-    end: DriveEnd,
+    end: DrivePort,
     hub: Hub,
     taps: Mapping[str, Tap],
 ) -> dict[str, Live]:

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from heapq import heappop, heappush
 from random import Random
 
-from bridge.can_bus.traffic import Key, Passed, Said
+from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.drives import DriveNode
 from bridge.frame import Frame
 from bridge.telemetry import FROM_DRIVE, Tap
@@ -91,7 +91,7 @@ class WireBus:
         self._mail: list[tuple[int, int, _Drive, Frame]] = []
         self._number = 0
         self._now_ns = 0
-        self._passed: list[Passed] = []
+        self._transmitted: list[Transmitted] = []
         self._freed: list[tuple[Key, int]] = []
         self.refused = 0
         """Frames of clients that found no room."""
@@ -100,7 +100,7 @@ class WireBus:
 
     # --- lockstep --------------------------------------------------------------------------------
 
-    def steps(self) -> Steps[Said]:
+    def steps(self) -> Steps[Submitted]:
         """The ticks from the first of the countdown to the closing one."""
         schedule = self._schedule
         for tick in range(-schedule.countdown_ticks, schedule.ticks + 1):
@@ -115,7 +115,7 @@ class WireBus:
                 robot = self._run_to_question(end_ns, waiting)
                 if robot is None:
                     for starved in waiting:
-                        if self._passed:
+                        if self._transmitted:
                             self.take((yield self._ask(starved)))
                         self.take((yield self._ask(starved)))
                     break
@@ -124,7 +124,7 @@ class WireBus:
             self._run(end_ns)
             yield None
 
-    def take(self, said: Sequence[Said]) -> None:
+    def take(self, said: Sequence[Submitted]) -> None:
         """What clients said goes to their transmit queues now."""
         refused: dict[Key, int] = {}
         for key, frame in said:
@@ -162,9 +162,9 @@ class WireBus:
     # --- both ------------------------------------------------------------------------------------
 
     def _ask(self, robot: str) -> Ask:
-        passed, self._passed = self._passed, []
+        transmitted, self._transmitted = self._transmitted, []
         freed, self._freed = self._freed, []
-        return Ask(self._now_ns, (), passed, robot, freed)
+        return Ask(self._now_ns, (), transmitted, robot, freed)
 
     def _run_to_question(self, end_ns: int, waiting: Sequence[str]) -> str | None:
         """Run until the drives of a robot have said the tick; None at its end."""
@@ -225,7 +225,7 @@ class WireBus:
         end_ns, sender, frame = event.end_ns, event.sender, event.frame
         self.crossed += 1
         key = self._key_of.get(sender)
-        self._passed.append(Passed(end_ns, frame, key))
+        self._transmitted.append(Transmitted(end_ns, frame, key))
         self._tap(end_ns, (frame,), FROM_DRIVE if key is None else 0)
         drive = self._of_node.get(sender)
         if drive is not None:
@@ -252,7 +252,7 @@ class WireBus:
 
     def _note_error(self, event: ErrorFrame) -> None:
         apart = {key: of_error(event, node) for key, node in self._hosts.items()}
-        self._passed.append(Passed(event.at_ns, of_error(event, None), apart=apart))
+        self._transmitted.append(Transmitted(event.at_ns, of_error(event, None), apart=apart))
         self._freed += [(self._key_of[n], 1) for n in event.ordered_by if n in self._key_of]
 
     def _note_state(self, event: StateChanged) -> None:
@@ -261,7 +261,7 @@ class WireBus:
         if key is not None:
             before = self._states.get(node, NodeState.ERROR_ACTIVE)
             self._states[node] = event.state
-            self._passed.append(Passed(event.at_ns, of_state(event, before), to=key))
+            self._transmitted.append(Transmitted(event.at_ns, of_state(event, before), to=key))
 
     def _submit(self, drive: _Drive, frames: Sequence[Frame]) -> None:
         for frame in frames:

@@ -99,7 +99,7 @@ def test_a_controller_is_told_its_bus_verbatim_and_the_pace_only_on_ours() -> No
     assert dict(placement.agent_bus(deployment, "r2", socket="/x/r2.can")) == {
         "interface": "fleetloop",
         "channel": "/x/r2.can",
-        "gathered": True,
+        "batched": True,
     }
 
 

@@ -77,7 +77,7 @@ class Running:
         frames: list[Frame] = []
         for _ in range(5000):
             with self.lock:
-                frames += self.hub.take(bus)
+                frames += self.hub.receive(bus)
             if len(frames) >= count:
                 break
             self._over.wait(0.001)

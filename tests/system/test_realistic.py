@@ -45,11 +45,11 @@ def test_who_only_listens_changes_nothing_and_who_says_paced_is_not_waited_for(
     heard = 0
     with running(a, *args, "--speed", "2", bus_time_s=0.1) as run, ExitStack() as listeners:
         path = next(sockets.base_folder().glob("*/r1.can"))
-        for options in ({}, {"gathered": True}, {"receive_own_messages": True}):
+        for options in ({}, {"batched": True}, {"receive_own_messages": True}):
             listener = can.Bus(interface="fleetloop", channel=str(path), **options)
             listeners.enter_context(listener)
         with pytest.raises(can.CanInitializationError, match="controllers that the run itself"):
-            can.Bus(interface="fleetloop", channel=str(path), paced="r1")
+            can.Bus(interface="fleetloop", channel=str(path), synchronous="r1")
         with pytest.raises(can.CanOperationError, match="end of the run"):
             while listener.recv(10.0) is not None:
                 heard += 1

@@ -9,9 +9,8 @@ import can
 import pytest
 
 from bridge.can_bus import external, sockets
-from bridge.can_bus.external import AttachedBuses
+from bridge.can_bus.external import CombinedPort, ExternalBuses
 from bridge.can_bus.hub import Hub
-from bridge.can_bus.joined import JoinedEnds
 from bridge.frame import RTR, Frame
 from configs.errors import InfrastructureError
 
@@ -72,13 +71,13 @@ def breakable(monkeypatch) -> Iterator[Callable[[], BreakableBus]]:
 
 
 @pytest.fixture
-def broken(breakable) -> Iterator[AttachedBuses]:
-    end = AttachedBuses({"r1": (("channel", "x"), ("interface", "breakable"))})
+def broken(breakable) -> Iterator[ExternalBuses]:
+    end = ExternalBuses({"r1": (("channel", "x"), ("interface", "breakable"))})
     yield end
     end.close("")
 
 
-def serve_until(end: AttachedBuses, holds: Callable[[], bool]) -> None:
+def serve_until(end: ExternalBuses, holds: Callable[[], bool]) -> None:
     deadline = time.monotonic() + 5.0
     while not holds():
         assert time.monotonic() < deadline
@@ -86,7 +85,7 @@ def serve_until(end: AttachedBuses, holds: Callable[[], bool]) -> None:
 
 
 def test_frames_of_drives_and_of_others_cross_an_interface_without_descriptor() -> None:
-    end = AttachedBuses({"r1": VIRTUAL})
+    end = ExternalBuses({"r1": VIRTUAL})
     try:
         with can.Bus(interface="virtual", channel="attached") as other:
             end.deliver("r1", 5, FRAMES)
@@ -96,9 +95,9 @@ def test_frames_of_drives_and_of_others_cross_an_interface_without_descriptor() 
                 can.Message(arbitration_id=0x17, is_remote_frame=True, dlc=8, is_extended_id=False)
             )
             serve_until(end, lambda: end.counters("r1").from_clients == 2)
-            assert end.heard() == ["r1"]
-            assert end.take("r1") == [Frame(0x0E, b"abcd"), Frame(0x17 | RTR, bytes(8))]
-            assert end.heard() == []
+            assert end.pending() == ["r1"]
+            assert end.receive("r1") == [Frame(0x0E, b"abcd"), Frame(0x17 | RTR, bytes(8))]
+            assert end.pending() == []
         assert end.counters("r1").from_drives == 2
         assert end.troubles() == {}
     finally:
@@ -107,16 +106,16 @@ def test_frames_of_drives_and_of_others_cross_an_interface_without_descriptor() 
 
 
 def test_error_frames_and_fd_frames_are_counted_and_not_heard() -> None:
-    end = AttachedBuses({"r1": VIRTUAL})
+    end = ExternalBuses({"r1": VIRTUAL})
     try:
         with can.Bus(interface="virtual", channel="attached") as other:
             other.send(can.Message(arbitration_id=0x20, is_error_frame=True, dlc=8, data=bytes(8)))
             other.send(can.Message(arbitration_id=0x0E, is_fd=True, data=bytes(12)))
             other.send(can.Message(arbitration_id=0x01, is_extended_id=False))
-            serve_until(end, lambda: bool(end.heard()))
+            serve_until(end, lambda: bool(end.pending()))
         counters = end.counters("r1")
         assert (counters.error_frames, counters.garbage, counters.from_clients) == (1, 1, 1)
-        assert end.take("r1") == [Frame(0x01, b"")]
+        assert end.receive("r1") == [Frame(0x01, b"")]
     finally:
         end.close("")
 
@@ -125,7 +124,7 @@ def test_an_interface_that_can_not_be_opened_is_named() -> None:
     with pytest.raises(
         InfrastructureError, match=r"drives of r1: no CAN bus: nonsense channel 'x'"
     ):
-        AttachedBuses({"r1": (("channel", "x"), ("interface", "nonsense"))})
+        ExternalBuses({"r1": (("channel", "x"), ("interface", "nonsense"))})
 
 
 def test_a_link_that_goes_down_and_up_is_one_outage_and_works_again(broken, breakable) -> None:
@@ -141,7 +140,7 @@ def test_a_link_that_goes_down_and_up_is_one_outage_and_works_again(broken, brea
     assert [message.arbitration_id for message in bus.sent] == [0x001, 0x009]
     bus.theirs.send(b"\x0eabcd")
     broken.serve(1.0)
-    assert broken.take("r1") == [Frame(0x0E, b"abcd")]
+    assert broken.receive("r1") == [Frame(0x0E, b"abcd")]
     assert broken.counters("r1").outages == 1
     assert BreakableBus.opened == 1
     assert "1 × failed for 0.0 s in all, 4 frames not sent; last: " in broken.troubles()["r1"]
@@ -167,23 +166,23 @@ def test_what_nobody_takes_is_kept_up_to_a_bound(broken, breakable, monkeypatch)
     for n in range(5):
         breakable().theirs.send(bytes((n,)))
     serve_until(broken, lambda: broken.counters("r1").from_clients == 5)
-    assert len(broken.take("r1")) == 3
+    assert len(broken.receive("r1")) == 3
     assert broken.counters("r1").dropped == 2
 
 
 def test_both_ends_are_one_for_the_plant(breakable) -> None:
     folder = sockets.create_run_folder("joined")
     hub = Hub(sockets.listen(folder, ["r2"]))
-    others = AttachedBuses({"r1": (("channel", "x"), ("interface", "breakable"))})
-    end = JoinedEnds(hub, others, ["r1"])
+    others = ExternalBuses({"r1": (("channel", "x"), ("interface", "breakable"))})
+    end = CombinedPort(hub, others, ["r1"])
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as waiting:
             waiting.connect(str(sockets.socket_path(folder, "r2")))
             end.serve(0.0)
         breakable().theirs.send(b"\x0eabcd")
         end.serve(1.0)
-        assert end.heard() == ["r1"]
-        assert end.take("r1") == [Frame(0x0E, b"abcd")]
+        assert end.pending() == ["r1"]
+        assert end.receive("r1") == [Frame(0x0E, b"abcd")]
         end.deliver("r1", 0, FRAMES)
         end.deliver("r2", 0, FRAMES[:1])
         assert end.counters("r1").from_drives == 2
@@ -197,13 +196,13 @@ def test_both_ends_are_one_for_the_plant(breakable) -> None:
 
 def test_what_the_interface_hands_back_of_the_drives_own_frames_is_not_heard() -> None:
     settings = (*VIRTUAL, ("receive_own_messages", True))
-    end = AttachedBuses({"r1": settings})
+    end = ExternalBuses({"r1": settings})
     try:
         with can.Bus(interface="virtual", channel="attached") as host:
             end.deliver("r1", 0, FRAMES)
             host.send(can.Message(arbitration_id=0x00E, data=bytes(4), is_extended_id=False))
             end.serve(0.5)
-        assert end.take("r1") == [Frame(0x00E, bytes(4))]
+        assert end.receive("r1") == [Frame(0x00E, bytes(4))]
         assert end.counters("r1").from_clients == 1
     finally:
         end.close("")

@@ -15,8 +15,9 @@ import pytest
 from bridge.can_bus import hub as hub_module
 from bridge.can_bus import packet as wire
 from bridge.can_bus import sockets
+from bridge.can_bus.connection import TURN
 from bridge.can_bus.hub import Hub
-from bridge.can_bus.traffic import TURN, Passed
+from bridge.can_bus.packet import Transmitted
 from bridge.frame import ERR, RTR, Frame
 
 SECRET = "told to nobody else"
@@ -93,17 +94,17 @@ def serving(runtime_folder) -> Iterator[Serving]:
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("", "that the run itself started, of r1, r2"),
-        ("r1", "that the run itself started"),
-        ("r1\0wrong", "that the run itself started"),
-        ("r1\0", "that the run itself started"),
-        ("r2\0" + SECRET, "that the run itself started"),  # another's
-        ("r9\0" + SECRET, "that the run itself started"),
-        ("r1\0ü", "that the run itself started"),
+        ("", "that the run started, of r1, r2"),
+        ("r1", "that the run started"),
+        ("r1\0wrong", "that the run started"),
+        ("r1\0", "that the run started"),
+        ("r2\0" + SECRET, "that the run started"),  # another's
+        ("r9\0" + SECRET, "that the run started"),
+        ("r1\0ü", "that the run started"),
     ],
 )
 def test_nobody_but_a_robots_own_controller_is_waited_for(serving, name: str, why: str) -> None:
-    refused = serving.join(name, wire.PACED).hear()
+    refused = serving.join(name, wire.SYNCHRONOUS).hear()
     assert refused.kind == wire.REFUSED
     assert why in refused.text
     assert (serving.hub.clients(), serving.hub.left()) == (0, ())
@@ -112,19 +113,19 @@ def test_nobody_but_a_robots_own_controller_is_waited_for(serving, name: str, wh
 
 def test_a_bus_in_real_time_waits_for_nobody(runtime_folder) -> None:
     hub = Hub(sockets.listen(sockets.create_run_folder("hub"), ("r1",)))
-    refused = Stranger("r1\0" + SECRET, wire.PACED)
+    refused = Stranger("r1\0" + SECRET, wire.SYNCHRONOUS)
     for _ in range(3):
         hub.serve(0.0)
-    assert "waits for nobody" in refused.hear().text
+    assert "this bus has none" in refused.hear().text
     refused.socket.close()
     hub.close("")
     sockets.remove_run_folder(sockets.base_folder() / "hub")
 
 
 def test_a_second_controller_of_a_robot_is_refused_while_the_first_is_there(serving) -> None:
-    first = serving.join(f"r1\0{SECRET}", wire.PACED)
+    first = serving.join(f"r1\0{SECRET}", wire.SYNCHRONOUS)
     assert first.hear().kind == wire.WELCOME
-    second = serving.join(f"r1\0{SECRET}", wire.PACED)
+    second = serving.join(f"r1\0{SECRET}", wire.SYNCHRONOUS)
     assert "the controller of r1 is on it already" in second.hear().text
     assert serving.hub.await_controllers(0.0) == ("r2",)
     assert serving.hub.left() == ()
@@ -158,10 +159,12 @@ def test_the_bus_interface_says_why_it_was_refused(serving) -> None:
             serving.hub.serve(0.01)
         return caught[0]
 
-    assert "refused: paced is for the controllers" in refusal(paced="r1", secret="guessed")
-    assert "refused: paced is for the controllers" in refusal(paced="r1")
-    assert "must name the robot" in refusal(paced=True)
-    assert "must name the robot" in refusal(paced=3)
+    assert "refused: synchronous is for the controllers" in refusal(
+        synchronous="r1", secret="guessed"
+    )
+    assert "refused: synchronous is for the controllers" in refusal(synchronous="r1")
+    assert "must name the robot" in refusal(synchronous=True)
+    assert "must name the robot" in refusal(synchronous=3)
 
 
 # --- who connects and says nothing ----------------------------------------------------------------
@@ -174,7 +177,7 @@ def test_any_number_of_connections_that_say_nothing_keep_nobody_out(serving) -> 
         silent[-1].connect(str(sockets.socket_path(sockets.base_folder() / "hub", "r1")))
         serving.serve()
     assert serving.join().hear().kind == wire.WELCOME
-    assert serving.join(f"r1\0{SECRET}", wire.PACED).hear().kind == wire.WELCOME
+    assert serving.join(f"r1\0{SECRET}", wire.SYNCHRONOUS).hear().kind == wire.WELCOME
     ended = [select.select([one], [], [], 0.0)[0] and not one.recv(1) for one in silent]
     assert sum(map(bool, ended)) >= 2 * hub_module.MAX_STRANGERS
     for one in silent:
@@ -215,7 +218,7 @@ def test_a_controller_is_asked_whatever_others_said_between_two_questions(
     runtime_folder, queue: int, count: int
 ) -> None:
     serving = Serving(queue)
-    controller = serving.join(f"r1\0{SECRET}", wire.PACED)
+    controller = serving.join(f"r1\0{SECRET}", wire.SYNCHRONOUS)
     stranger = serving.join()
     for packet in (controller, stranger):
         assert packet.hear().kind == wire.WELCOME
@@ -228,7 +231,7 @@ def test_a_controller_is_asked_whatever_others_said_between_two_questions(
     if queue:
         reader = threading.Thread(target=read)
         reader.start()
-        serving.hub.pass_on("r1", 9, [Passed(9, frame, key=2) for frame in said], "r1")
+        serving.hub.forward("r1", 9, [Transmitted(9, frame, key=2) for frame in said], "r1")
     else:
         for first in range(0, count, wire.MAX_FRAMES):
             stranger.frames(*said[first : first + wire.MAX_FRAMES])
@@ -246,7 +249,7 @@ def test_a_controller_is_asked_whatever_others_said_between_two_questions(
 
 
 def test_replies_of_drives_to_very_many_requests_reach_the_controller(serving) -> None:
-    controller = serving.join(f"r1\0{SECRET}", wire.PACED)
+    controller = serving.join(f"r1\0{SECRET}", wire.SYNCHRONOUS)
     assert controller.hear().kind == wire.WELCOME
     replies = [Frame(n % 0x800, n.to_bytes(4, "big")) for n in range(66_000)]
     heard: list[Frame] = []
@@ -261,7 +264,7 @@ def test_replies_of_drives_to_very_many_requests_reach_the_controller(serving) -
 def test_what_a_controller_says_is_taken_at_once_and_what_others_say_a_turn_at_a_time(
     serving,
 ) -> None:
-    controller = serving.join(f"r1\0{SECRET}", wire.PACED)
+    controller = serving.join(f"r1\0{SECRET}", wire.SYNCHRONOUS)
     stranger = serving.join()
     said = [Frame(n % 0x700, n.to_bytes(4, "big")) for n in range(10_000)]
     for first in range(0, len(said), 1000):
@@ -269,13 +272,13 @@ def test_what_a_controller_says_is_taken_at_once_and_what_others_say_a_turn_at_a
         serving.serve()
     controller.frames(Frame(0x70E, b""))
     serving.serve()
-    first = serving.hub.take("r1")
+    first = serving.hub.receive("r1")
     assert Frame(0x70E, b"") in first
     first.remove(Frame(0x70E, b""))
     assert len(first) < 2 * TURN
     taken = first
-    while serving.hub.heard():
-        more = serving.hub.take("r1")
+    while serving.hub.pending():
+        more = serving.hub.receive("r1")
         assert len(more) <= TURN
         taken += more
     assert taken == said
@@ -298,7 +301,7 @@ def test_who_says_more_than_is_taken_is_not_read_until_it_is(
     taken: list[Frame] = []
     for _ in range(sent):
         serving.hub.serve(0.0)
-        taken += serving.hub.take("r1")
+        taken += serving.hub.receive("r1")
     ours = [int.from_bytes(data, "big") for can_id, data in taken if can_id == 1]
     assert ours == list(range(sent))
     assert Frame(2, b"") in taken
@@ -322,9 +325,9 @@ def test_what_is_no_classic_frame_is_counted_and_goes_nowhere(
     serving.serve()
     good = [Frame(1, b"a"), Frame(3, b"c")]
     if queue:
-        assert [frame for _, frame in serving.hub.say("r1")] == good
+        assert [frame for _, frame in serving.hub.submitted("r1")] == good
     else:
-        assert serving.hub.take("r1") == good
+        assert serving.hub.receive("r1") == good
         assert other.hear().kind == wire.WELCOME
         assert [other.hear().frames for _ in good] == [(frame,) for frame in good]
     assert serving.hub.counters("r1").garbage == 1
@@ -337,7 +340,7 @@ def test_with_bit_timing_an_error_frame_is_for_the_wire(runtime_folder) -> None:
     serving = Serving(10)
     serving.join().frames(Frame(ERR | 4, bytes(8)))
     serving.serve()
-    assert [frame for _, frame in serving.hub.say("r1")] == [Frame(ERR | 4, bytes(8))]
+    assert [frame for _, frame in serving.hub.submitted("r1")] == [Frame(ERR | 4, bytes(8))]
     serving.close()
 
 
@@ -348,13 +351,13 @@ def test_with_bit_timing_what_drives_sent_is_counted_and_error_frames_are_not(
     serving.join().frames(Frame(0x00E, bytes(4)))
     serving.serve()
     passed = [
-        Passed(1, Frame(0x009, bytes(8))),
-        Passed(2, Frame(0x029, bytes(8))),
-        Passed(3, Frame(0x00E, bytes(4)), key="r1"),
-        Passed(4, Frame(ERR | 4, bytes(8))),
-        Passed(5, Frame(ERR | 4, bytes(8)), to="r1"),
+        Transmitted(1, Frame(0x009, bytes(8))),
+        Transmitted(2, Frame(0x029, bytes(8))),
+        Transmitted(3, Frame(0x00E, bytes(4)), key="r1"),
+        Transmitted(4, Frame(ERR | 4, bytes(8))),
+        Transmitted(5, Frame(ERR | 4, bytes(8)), to="r1"),
     ]
-    serving.hub.pass_on("r1", 6, passed)
+    serving.hub.forward("r1", 6, passed)
     counters = serving.hub.counters("r1")
     assert (counters.from_drives, counters.from_clients) == (2, 1)
     serving.close()

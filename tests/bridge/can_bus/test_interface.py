@@ -15,7 +15,7 @@ from support.hub_running import Remote, Running
 from bridge.can_bus import connection, sockets, zenoh_transport
 from bridge.can_bus.hub import Hub
 from bridge.can_bus.interface import FleetloopBus
-from bridge.can_bus.traffic import Passed
+from bridge.can_bus.packet import Transmitted
 from bridge.frame import EFF, RTR, Frame
 
 LOCAL_ONLY = pytest.mark.parametrize("where", ["local"], indirect=True)
@@ -138,15 +138,15 @@ def test_a_descriptor_is_readable_once_per_frame(running, join) -> None:
 def test_a_gathered_client_sends_with_its_next_look_and_takes_an_instant_in_one_packet(
     running, join
 ) -> None:
-    gathered, other = join(gathered=True), join()
-    gathered.send(can.Message(arbitration_id=1, is_extended_id=False))
-    gathered.send(can.Message(arbitration_id=2, is_extended_id=False))
+    batched, other = join(batched=True), join()
+    batched.send(can.Message(arbitration_id=1, is_extended_id=False))
+    batched.send(can.Message(arbitration_id=2, is_extended_id=False))
     assert other.recv(0.05) is None
-    assert gathered.recv(0.0) is None
+    assert batched.recv(0.0) is None
     assert [other.recv(5.0).arbitration_id for _ in range(2)] == [1, 2]
     running.deliver(Frame(3, b""), Frame(4, b""))
-    assert gathered.recv(5.0).arbitration_id == 3
-    assert gathered.recv(0.0).arbitration_id == 4  # it is here already
+    assert batched.recv(5.0).arbitration_id == 3
+    assert batched.recv(0.0).arbitration_id == 4  # it is here already
 
 
 @pytest.mark.wall_clock
@@ -195,11 +195,11 @@ NO_FRAMES = {
 }
 
 
-@pytest.mark.parametrize("gathered", [False, True])
+@pytest.mark.parametrize("batched", [False, True])
 def test_what_is_no_classic_frame_is_refused_and_takes_no_neighbour_with_it(
-    running, join, gathered: bool
+    running, join, batched: bool
 ) -> None:
-    sender, hearer = join(gathered=gathered), join()
+    sender, hearer = join(batched=batched), join()
     sender.send(message(arbitration_id=1))
     for name, wrong in NO_FRAMES.items():
         with pytest.raises(can.CanOperationError, match="not sent"):
@@ -366,8 +366,8 @@ def test_shutdown_wakes_who_waits_for_room_to_send(running, join) -> None:
 
 
 def test_after_shutdown_nothing_can_be_sent_or_received(running, join) -> None:
-    for gathered in (False, True):
-        bus = join(gathered=gathered)
+    for batched in (False, True):
+        bus = join(batched=batched)
         bus.shutdown()
         for _ in range(2):
             with pytest.raises(can.CanOperationError, match="was shut down"):
@@ -427,7 +427,7 @@ def test_shutdown_twice_is_once(running, join) -> None:
 
 LEAVE = 0x7FF
 CONTROLLERS = {"r1": {"r1": "told to nobody else"}}
-OWN: dict[str, Any] = {"paced": "r1", "secret": "told to nobody else"}
+OWN: dict[str, Any] = {"synchronous": "r1", "secret": "told to nobody else"}
 
 
 def answered(hub: Hub) -> bool:
@@ -439,8 +439,8 @@ def answered(hub: Hub) -> bool:
 
 
 @pytest.fixture
-def paced(where: str, runtime_folder, tmp_path: Path) -> Iterator[Hub]:
-    """A hub driven by the test, and a paced client in a thread that answers like a controller."""
+def synchronous(where: str, runtime_folder, tmp_path: Path) -> Iterator[Hub]:
+    """A hub driven by the test, and a synchronous client in a thread, as a controller."""
     folder = sockets.create_run_folder("test")
     hub = Hub(sockets.listen(folder, ("r1",)), controllers=CONTROLLERS)
     remote = Remote(tmp_path) if where == "remote" else None
@@ -471,26 +471,26 @@ def paced(where: str, runtime_folder, tmp_path: Path) -> Iterator[Hub]:
     sockets.remove_run_folder(folder)
 
 
-def test_collect_returns_with_all_that_a_paced_client_had_to_say(paced) -> None:
-    hub = paced
+def test_collect_returns_with_all_that_a_synchronous_client_had_to_say(synchronous) -> None:
+    hub = synchronous
     for k in range(200):
         data = k.to_bytes(4, "little") + bytes(4)
         hub.deliver("r1", k, (Frame(0x009, data),))
         assert answered(hub)
-        frames = hub.take("r1")
+        frames = hub.receive("r1")
         assert [frame.can_id & 0x7FF for frame in frames] == [0x00E, 0x02E]
         assert frames[0].data == k.to_bytes(4, "little")
 
 
-def test_a_paced_client_with_nothing_to_say_still_answers(paced) -> None:
-    hub = paced
+def test_a_synchronous_client_with_nothing_to_say_still_answers(synchronous) -> None:
+    hub = synchronous
     hub.deliver("r1", 0, (Frame(0x001, bytes(8)),))
     assert answered(hub)
-    assert hub.take("r1") == []
+    assert hub.receive("r1") == []
 
 
-def test_a_listener_beside_a_paced_client_changes_nothing(paced) -> None:
-    hub = paced
+def test_a_listener_beside_a_synchronous_client_changes_nothing(synchronous) -> None:
+    hub = synchronous
     listener: list[can.BusABC] = []
     opener = threading.Thread(
         target=lambda: listener.append(can.Bus(interface="fleetloop", channel="r1"))
@@ -501,14 +501,14 @@ def test_a_listener_beside_a_paced_client_changes_nothing(paced) -> None:
     for k in range(50):
         hub.deliver("r1", k, (Frame(0x009, bytes(8)),))
         assert answered(hub)
-        assert len(hub.take("r1")) == 2
+        assert len(hub.receive("r1")) == 2
     heard = [listener[0].recv(5.0).arbitration_id & 0x7FF for _ in range(150)]
     assert heard == [0x009, 0x00E, 0x02E] * 50
     listener[0].shutdown()
 
 
-def test_a_paced_client_that_leaves_is_named_and_waited_for_no_longer(paced) -> None:
-    hub = paced
+def test_a_synchronous_client_that_leaves_is_named_and_waited_for_no_longer(synchronous) -> None:
+    hub = synchronous
     hub.deliver("r1", 0, (Frame(LEAVE, b""),))
     hub.collect(10.0)
     while not hub.left():
@@ -536,7 +536,7 @@ def test_garbage_from_a_client_is_counted_and_harms_nobody(garbage: list[bytes])
             for _ in range(len(garbage) + 2):
                 hub.collect(0.0)
         hub.collect(0.0)
-        assert hub.take("r1") == []
+        assert hub.receive("r1") == []
         hub.close("")
 
 
@@ -573,8 +573,11 @@ def timed(runtime_folder) -> Iterator[Timed]:
 
 def test_on_a_bus_with_bit_timing_each_frame_has_the_time_at_which_it_ended(timed) -> None:
     with timed.join(**OWN) as bus:
-        passed = [Passed(1_108_000, Frame(0x009, b"1")), Passed(1_233_000, Frame(0x029, b"2"))]
-        timed.hub.pass_on("r1", 1_233_000, passed, "r1")
+        passed = [
+            Transmitted(1_108_000, Frame(0x009, b"1")),
+            Transmitted(1_233_000, Frame(0x029, b"2")),
+        ]
+        timed.hub.forward("r1", 1_233_000, passed, "r1")
         first, second = bus.recv(1.0), bus.recv(1.0)
         assert (first.timestamp, second.timestamp) == (0.001108, 0.001233)
 
@@ -589,9 +592,9 @@ def test_a_full_transmit_queue_raises_enobufs_until_frames_have_left_it(timed) -
         assert caught.value.error_code == errno.ENOBUFS
         for _ in range(10):
             timed.hub.serve(0.5)
-        (key, _), *_ = said = timed.hub.say("r1")
+        (key, _), *_ = said = timed.hub.submitted("r1")
         assert len(said) == 10
-        timed.hub.left_queue("r1", key, 3)
+        timed.hub.return_credit("r1", key, 3)
         for _ in range(3):
             bus.send(message, timeout=1.0)
         with pytest.raises(can.CanOperationError):
@@ -603,9 +606,9 @@ def test_who_only_sends_finds_room_again_when_its_frames_have_left(timed) -> Non
         for n in range(50):  # of a queue of 10
             bus.send(can.Message(arbitration_id=0x123, is_extended_id=False, data=[n]))
             timed.hub.serve(0.5)
-            ((key, frame),) = timed.hub.say("r1")
+            ((key, frame),) = timed.hub.submitted("r1")
             assert frame.data == bytes([n])
-            timed.hub.left_queue("r1", key, 1)
+            timed.hub.return_credit("r1", key, 1)
 
 
 def test_with_bit_timing_what_a_client_says_reaches_nobody_before_the_wire_carried_it(
@@ -615,15 +618,15 @@ def test_with_bit_timing_what_a_client_says_reaches_nobody_before_the_wire_carri
         speaker.send(can.Message(arbitration_id=0x123, is_extended_id=False))
         timed.hub.serve(0.5)
         assert other.recv(0.05) is None
-        ((key, frame),) = timed.hub.say("r1")
-        timed.hub.pass_on("r1", 5_000_000, [Passed(5_000_000, frame, key)])
+        ((key, frame),) = timed.hub.submitted("r1")
+        timed.hub.forward("r1", 5_000_000, [Transmitted(5_000_000, frame, key)])
         assert other.recv(1.0).arbitration_id == 0x123
         assert speaker.recv(0.05) is None  # no echo of its own
 
 
-def test_a_paced_client_is_told_of_a_tick_without_frames_by_none(timed) -> None:
+def test_a_synchronous_client_is_told_of_a_tick_without_frames_by_none(timed) -> None:
     with timed.join(**OWN) as bus:
-        timed.hub.pass_on("r1", 999_999, [], "r1")
+        timed.hub.forward("r1", 999_999, [], "r1")
         assert bus.recv(5.0) is None
 
 
@@ -676,7 +679,7 @@ def test_several_threads_may_share_a_thread_safe_bus(running) -> None:
 
 
 def test_what_gathers_waits_for_a_busy_hub_and_loses_nothing(running, join) -> None:
-    bus = join(gathered=True)
+    bus = join(batched=True)
     sent = list(range(3000))
     done = threading.Event()
 

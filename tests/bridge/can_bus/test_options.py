@@ -18,11 +18,14 @@ from bridge.can_bus import options
         ({"channel": b"r1"}, "channel = "),
         ({"channel": "/a\0b"}, "bus '/a"),
         ({"channel": "/" + "x" * 200}, "AF_UNIX path too long"),
-        ({"channel": "r1", "paced": 3}, "paced = 3: must name the robot"),
-        ({"channel": "r1", "paced": True}, "paced = True: must name the robot"),
-        ({"channel": "r1", "paced": "r1", "secret": 5}, "paced = 'r1': must name the robot"),
-        ({"channel": "r1", "gathered": 3}, "gathered = 3: must be true or false"),
-        ({"channel": "r1", "gathered": "maybe"}, "gathered = 'maybe': must be true or false"),
+        ({"channel": "r1", "synchronous": 3}, "synchronous = 3: must name the robot"),
+        ({"channel": "r1", "synchronous": True}, "synchronous = True: must name the robot"),
+        (
+            {"channel": "r1", "synchronous": "r1", "secret": 5},
+            "synchronous = 'r1': must name the robot",
+        ),
+        ({"channel": "r1", "batched": 3}, "batched = 3: must be true or false"),
+        ({"channel": "r1", "batched": "maybe"}, "batched = 'maybe': must be true or false"),
         ({"channel": "r1", "receive_own_messages": []}, "receive_own_messages = "),
         ({"channel": "r1", "fd": "true"}, "is classic CAN: fd must be False"),
         *(
@@ -49,7 +52,7 @@ def test_an_unknown_option_is_named(runtime_folder) -> None:
     [("True", True), ("no", False), ("1", True), (0, False), (None, False), ("", False)],
 )
 def test_truths_may_be_texts_of_a_configuration_file(said: object, meant: bool) -> None:
-    assert options.truth("gathered", said) is meant
+    assert options.truth("batched", said) is meant
 
 
 def test_times_may_be_texts_and_are_cut_to_what_a_kernel_can_wait() -> None:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.can_bus import packet as wire
-from bridge.can_bus.traffic import Stamped
+from bridge.can_bus.packet import Stamped
 from bridge.frame import EFF, ERR, ID_MASK_11, ID_MASK_29, RTR, Frame
 
 identifiers = st.one_of(

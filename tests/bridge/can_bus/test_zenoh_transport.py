@@ -18,7 +18,6 @@ from support.cut_proxy import CutProxy
 from support.hub_running import Running
 
 from bridge.can_bus import connection, flow_control, relay, zenoh_transport
-from bridge.can_bus import guest as guest_module
 from bridge.can_bus import packet as wire
 from bridge.frame import Frame
 from bridge.network import keys
@@ -217,12 +216,12 @@ def test_a_line_that_fails_by_an_error_of_ours_is_the_only_one_that_ends(
 ) -> None:
     with running.open() as guest, running.open("r2", "boss") as other:
 
-        def fails(self: guest_module.Guest) -> bool:
+        def fails(self: relay.Guest) -> bool:
             if "/bench/" in self.place:
                 raise RuntimeError("a bug")
             return True
 
-        monkeypatch.setattr(guest_module.Guest, "push", fails)
+        monkeypatch.setattr(relay.Guest, "push", fails)
         guest.send(frame(1))
         assert running.until(lambda: running.hub.clients() == 1)
         running.deliver(Frame(3, b""), bus="r2")

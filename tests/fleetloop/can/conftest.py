@@ -40,7 +40,7 @@ class Buses:
 
         def enough() -> bool:
             with self._lock:
-                frames.extend(self.hub.take(bus))
+                frames.extend(self.hub.receive(bus))
             return len(frames) >= count
 
         self.until(enough)

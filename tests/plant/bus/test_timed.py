@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from bridge.can_bus.traffic import Said
+from bridge.can_bus.packet import Submitted
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisState, Command, identifier
 from bridge.frame import Frame
@@ -53,7 +53,7 @@ class Driven:
         unit = unit_of(plant.robots[0])
         self.unit = unit
         self.bus: WireBus = wire_bus(plant, "r1", [unit], self.began.append, no_tap)
-        self._steps: Steps[Said] = self.bus.steps()
+        self._steps: Steps[Submitted] = self.bus.steps()
         self._answer = answer
         self.tick_number = -plant.schedule.countdown_ticks
 
@@ -64,7 +64,7 @@ class Driven:
         while ask is not None:
             asks.append(ask)
             said = self._answer(self.tick_number) if len(asks) == 1 else []
-            ask = self._steps.send([Said("r1", frame) for frame in said])
+            ask = self._steps.send([Submitted("r1", frame) for frame in said])
         self.tick_number += 1
         return asks
 
@@ -77,8 +77,8 @@ def test_the_controller_is_asked_when_the_last_frame_of_its_drives_has_ended() -
     driven.tick()
     start_ns = driven.schedule.bus_time_ns(driven.tick_number)
     (ask,) = driven.tick()
-    assert [passed.frame.can_id for passed in ask.passed] == [0x009, 0x029]
-    first, second = (passed.end_ns for passed in ask.passed)
+    assert [passed.frame.can_id for passed in ask.transmitted] == [0x009, 0x029]
+    first, second = (passed.end_ns for passed in ask.transmitted)
     # Two frames of 8 bytes at 1 Mbit/s: 108 to 132 bits each, and three between them.
     assert start_ns + 105 * US < first < start_ns + 132 * US
     assert first + 105 * US < second < first + 135 * US
@@ -128,7 +128,7 @@ def test_a_starved_bus_tells_the_controller_that_the_tick_has_passed() -> None:
     driven.bus.wire.attach("babbler", queue=Endless(Frame(0x000, bytes(8))))
     asks = driven.ticks(3)
     ends = [driven.schedule.bus_time_ns(driven.tick_number - n) - 1 for n in (2, 1, 0)]
-    empty = [ask.stamp_ns for ask in asks if not ask.passed]
+    empty = [ask.stamp_ns for ask in asks if not ask.transmitted]
     assert empty == ends
 
 
@@ -147,11 +147,11 @@ def test_drives_that_hear_nothing_through_a_babbler_trip_their_watchdog() -> Non
 def test_a_client_that_departs_leaves_the_wire() -> None:
     driven = Driven(lambda _: [])
     driven.tick()
-    driven.bus.take([Said(7, Frame(0x700, b""))] * 3)
+    driven.bus.take([Submitted(7, Frame(0x700, b""))] * 3)
     driven.bus.depart(7)
     asks = driven.ticks(2)
     # The frame that was on the wire is completed, the others have gone.
-    assert sum(p.frame.can_id == 0x700 for ask in asks for p in ask.passed) <= 1
+    assert sum(p.frame.can_id == 0x700 for ask in asks for p in ask.transmitted) <= 1
 
 
 def test_the_load_of_a_robot_at_1_khz_is_forty_percent() -> None:
@@ -168,7 +168,7 @@ def test_the_load_of_a_robot_at_1_khz_is_forty_percent() -> None:
 def test_what_crossed_the_wire_is_counted_whoever_sent_it() -> None:
     driven = Driven(lambda _: torques(0.0, 0.0))
     asks = driven.ticks(20)
-    ended = [passed for ask in asks for passed in ask.passed]
+    ended = [passed for ask in asks for passed in ask.transmitted]
     assert driven.bus.crossed >= len(ended) > 20 * 4 - 4
     assert driven.bus.crossed <= 20 * 4 + 2 * 2  # encoders, torques; heartbeats
 
@@ -178,21 +178,21 @@ def test_encoder_frames_have_a_period_of_their_own() -> None:
         lambda _: torques(0.0, 0.0), "clock.control_period_s=0.005", "drive.encoder_period_s=0.001"
     )
     asks = driven.ticks(4)
-    ended = [passed.frame.can_id for ask in asks for passed in ask.passed]
+    ended = [passed.frame.can_id for ask in asks for passed in ask.transmitted]
     assert ended.count(identifier(0, Command.GET_ENCODER_ESTIMATES)) == 3 * 5 + 1
     assert driven.tick_number == -driven.schedule.countdown_ticks + 4
 
 
 def test_error_frames_reach_the_clients_and_the_frame_is_sent_again() -> None:
     from bridge.frame import ERR
-    from bridge.wire.faults import Disturbance, Kind
+    from bridge.wire.faults import Fault, FaultKind
 
     driven = Driven(lambda _: [])
     driven.tick()
-    driven.bus.wire.disturb(Disturbance(Kind.CORRUPT, can_id=0x009))
+    driven.bus.wire.inject(Fault(FaultKind.CORRUPT, can_id=0x009))
     (ask,) = driven.tick()
-    kinds = [passed.frame.can_id for passed in ask.passed]
-    errors = [passed for passed in ask.passed if passed.frame.can_id & ERR]
+    kinds = [passed.frame.can_id for passed in ask.transmitted]
+    errors = [passed for passed in ask.transmitted if passed.frame.can_id & ERR]
     assert [passed.frame.can_id & ~ERR for passed in errors] == [0x08]
     assert errors[0].as_heard_by("r1").frame.data[7] > 0  # the receive error counter of its node
     assert errors[0].as_heard_by(7).frame.data[6:] == bytes(2)  # who only listens has none
@@ -206,10 +206,10 @@ def test_an_error_frame_from_a_client_destroys_what_starts_with_it_and_leaves_it
     driven.ticks(3)
     steps = driven._steps
     ask = next(steps)
-    said = [Said("r1", torques(0.1, 0.1)[0]), Said(7, Frame(ERR, b""))]
+    said = [Submitted("r1", torques(0.1, 0.1)[0]), Submitted(7, Frame(ERR, b""))]
     steps.send(said)
     after = driven.ticks(1)
-    passed = [p for a in (ask, *after) if a is not None for p in a.passed]
+    passed = [p for a in (ask, *after) if a is not None for p in a.transmitted]
     assert [p.frame.can_id & ~ERR for p in passed if p.frame.can_id & ERR] == [0x08]
     assert [p.frame.can_id for p in passed].count(torques(0.1, 0.1)[0].can_id) == 2
     assert driven.bus._hosts["r1"].confinement.tec == 8 - 3  # three frames have been sent since
@@ -223,19 +223,19 @@ def test_who_only_listens_is_no_node_on_the_wire() -> None:
     driven.bus.depart(7)  # who has said nothing
     driven.ticks(3)
     assert len(driven.bus.wire._main.nodes) == nodes
-    driven.bus.take([Said(7, Frame(0x700, b""))])
+    driven.bus.take([Submitted(7, Frame(0x700, b""))])
     assert len(driven.bus.wire._main.nodes) == nodes + 1
 
 
 def test_a_drive_that_goes_bus_off_falls_silent_and_the_controller_hears_the_other() -> None:
-    from bridge.wire.faults import Disturbance, Kind
+    from bridge.wire.faults import Fault, FaultKind
 
     driven = Driven(lambda _: [])
     driven.tick()
-    driven.bus.wire.disturb(Disturbance(Kind.CORRUPT, node="r1 right", count=32))
+    driven.bus.wire.inject(Fault(FaultKind.CORRUPT, node="r1 right", count=32))
     driven.ticks(20)
     (ask, *_) = driven.tick()
-    assert [passed.frame.can_id for passed in ask.passed] == [0x029]
+    assert [passed.frame.can_id for passed in ask.transmitted] == [0x029]
     assert driven.bus._drives[0].node.state is NodeState.BUS_OFF
 
 
@@ -245,7 +245,7 @@ def test_a_host_that_nobody_acknowledges_hears_of_it_and_finds_its_queue_full() 
     driven = Driven(lambda tick: [Frame(0x700, b"")] if tick < 0 else [])
     host = driven.bus._hosts["r1"]
     driven.bus.wire.disconnect(host)
-    heard = [passed.frame for ask in driven.ticks(40) for passed in ask.passed]
+    heard = [passed.frame for ask in driven.ticks(40) for passed in ask.transmitted]
     kinds = {frame.can_id & ~ERR for frame in heard if frame.can_id & ERR}
     assert {0x04, 0x20} <= kinds
     assert driven.bus.room("r1") == 0

@@ -8,7 +8,7 @@ import pytest
 from bridge.frame import EFF, Frame
 from bridge.wire.bits import frame_bits, least_bits
 from bridge.wire.confinement import NodeState
-from bridge.wire.faults import Disturbance, Kind
+from bridge.wire.faults import Fault, FaultKind
 from bridge.wire.node import Delivered, ErrorFrame, ErrorKind, Event, Node, StateChanged
 from bridge.wire.queues import Endless, Fifo, Mailboxes, ReceiveFifo
 from bridge.wire.wire import Wire
@@ -31,21 +31,21 @@ def states(events: list[Event], node: Node) -> list[NodeState]:
     return [e.state for e in events if isinstance(e, StateChanged) and e.node is node]
 
 
-def corrupt(count: int | None = 1, **match: object) -> Disturbance:
-    return Disturbance(Kind.CORRUPT, count=count, **match)  # type: ignore[arg-type]
+def corrupt(count: int | None = 1, **match: object) -> Fault:
+    return Fault(FaultKind.CORRUPT, count=count, **match)  # type: ignore[arg-type]
 
 
 def off_the_bus(restart_ns: int | None) -> tuple[Wire, Node, Node, int]:
     """A wire of which one node has just gone bus-off, and when."""
     wire = Wire(1_000_000)
     node, other = wire.attach("node", restart_ns=restart_ns), wire.attach("other")
-    wire.disturb(corrupt(None, node="node"))
+    wire.inject(corrupt(None, node="node"))
     wire.submit(node, SYNC, 0)
     while node.state is not NodeState.BUS_OFF:
         due = wire.next_ns()
         assert due is not None
         wire.advance(due)
-    wire.calm()
+    wire.clear_faults()
     return wire, node, other, wire.now_ns
 
 
@@ -142,7 +142,7 @@ def test_a_corrupted_frame_is_sent_again_after_an_error_frame_of_17_to_23_bits(
 ) -> None:
     wire = Wire(1_000_000)
     node, other = wire.attach("node"), wire.attach("other")
-    wire.disturb(corrupt())
+    wire.inject(corrupt())
     wire.submit(node, frame, 0)
     events = wire.advance(MS)
     (error,) = errors(events)
@@ -167,7 +167,7 @@ def test_the_error_frame_of_a_clash_has_17_to_23_bits(data: tuple[bytes, bytes])
 def test_a_passive_sender_keeps_running_with_a_pause_of_8_bits_after_each_frame() -> None:
     wire = Wire(1_000_000)
     node, _ = wire.attach("node", queue=Fifo(100)), wire.attach("other")
-    wire.disturb(corrupt(20, node="node"))
+    wire.inject(corrupt(20, node="node"))
     for _ in range(40):
         wire.submit(node, SYNC, 0)
     events = wire.advance(20 * MS)
@@ -183,7 +183,7 @@ def test_a_passive_sender_keeps_running_with_a_pause_of_8_bits_after_each_frame(
 def test_only_the_frames_asked_for_are_corrupted() -> None:
     wire = Wire(1_000_000)
     a, b = wire.attach("a"), wire.attach("b")
-    wire.disturb(corrupt(2, can_id=0x101))
+    wire.inject(corrupt(2, can_id=0x101))
     for can_id in (0x100, 0x101, 0x102):
         wire.submit(a, Frame(can_id, b""), 0)
         wire.submit(b, Frame(can_id + 8, b""), 0)
@@ -358,7 +358,7 @@ def test_a_frame_that_only_can_fd_could_carry_is_refused_and_leaves_no_trace() -
 def test_a_dropped_frame_is_accepted_and_never_sent() -> None:
     wire = Wire(1_000_000)
     node, _ = wire.attach("node"), wire.attach("other")
-    wire.disturb(Disturbance(Kind.DROP, can_id=0x80))
+    wire.inject(Fault(FaultKind.DROP, can_id=0x80))
     taken = [wire.submit(node, SYNC, 0) for _ in range(3)]
     assert taken == [True] * 3
     assert len(delivered(wire.advance(MS))) == 2
@@ -369,7 +369,7 @@ def test_a_dropped_frame_is_accepted_and_never_sent() -> None:
 def test_a_duplicated_frame_comes_twice() -> None:
     wire = Wire(1_000_000)
     node, _ = wire.attach("node"), wire.attach("other")
-    wire.disturb(Disturbance(Kind.DUPLICATE))
+    wire.inject(Fault(FaultKind.DUPLICATE))
     for _ in range(2):
         wire.submit(node, SYNC, 0)
     assert len(delivered(wire.advance(MS))) == 3
@@ -379,7 +379,7 @@ def test_a_duplicated_frame_comes_twice() -> None:
 def test_a_delayed_frame_goes_to_arbitration_later_by_exactly_that() -> None:
     wire = Wire(1_000_000)
     node, _ = wire.attach("node"), wire.attach("other")
-    wire.disturb(Disturbance(Kind.DELAY, delay_ns=5 * MS))
+    wire.inject(Fault(FaultKind.DELAY, delay_ns=5 * MS))
     wire.submit(node, Frame(0x100, b""), 0)
     wire.submit(node, Frame(0x101, b""), 0)
     assert wire.queued(node) == 2
@@ -391,9 +391,9 @@ def test_a_delayed_frame_goes_to_arbitration_later_by_exactly_that() -> None:
 
 def test_disturbances_that_make_no_sense_are_refused() -> None:
     with pytest.raises(ValueError, match="count = 0"):
-        Disturbance(Kind.DROP, count=0)
+        Fault(FaultKind.DROP, count=0)
     with pytest.raises(ValueError, match="delay_ns = 0"):
-        Disturbance(Kind.DELAY)
+        Fault(FaultKind.DELAY)
 
 
 # --- everything at once ---------------------------------------------------------------------------
@@ -405,7 +405,13 @@ def test_whatever_goes_wrong_every_frame_is_accounted_for_and_none_overlap(seed:
     wire = Wire(500_000)
     nodes = [wire.attach(f"n{n}", restart_ns=rng.choice([None, 0, MS])) for n in range(4)]
     events: list[Event] = []
-    kinds = (Kind.DROP, Kind.DUPLICATE, Kind.DELAY, Kind.CORRUPT, Kind.CORRUPT)
+    kinds = (
+        FaultKind.DROP,
+        FaultKind.DUPLICATE,
+        FaultKind.DELAY,
+        FaultKind.CORRUPT,
+        FaultKind.CORRUPT,
+    )
     for _ in range(400):
         now = wire.now_ns + rng.randrange(400 * US)
         node = rng.choice(nodes)
@@ -413,8 +419,8 @@ def test_whatever_goes_wrong_every_frame_is_accounted_for_and_none_overlap(seed:
         match rng.randrange(20):
             case 0:
                 kind = rng.choice(kinds)
-                delay_ns = 300 * US if kind is Kind.DELAY else 0
-                wire.disturb(Disturbance(kind, count=rng.randrange(1, 40), delay_ns=delay_ns))
+                delay_ns = 300 * US if kind is FaultKind.DELAY else 0
+                wire.inject(Fault(kind, count=rng.randrange(1, 40), delay_ns=delay_ns))
             case 1:
                 wire.disconnect(node)
             case 2 | 3:
