@@ -10,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from configs.checks import Problem
 from configs.errors import Complaint, ScenarioError
+from configs.parameters import as_tuples
 from configs.patterns import WORDS
 from configs.scenario import Scenario
 
@@ -42,7 +43,9 @@ _WORDS = {
     "dict_type": "must be a table",
     "model_type": "must be a table",
     "model_attributes_type": "must be a table",
+    "dataclass_type": "must be a table",
 }
+_UNKNOWN_KEY = {"extra_forbidden", "unexpected_keyword_argument"}
 _ROUNDS = 8
 _STAND_INS: dict[object, object] = {
     "schema": 1,
@@ -102,7 +105,7 @@ def salvage(error: ValidationError, data: dict[str, Any]) -> Salvage | None:
         for item in _errors(found):
             lost |= _repair(rest, item)
         try:
-            scenario = Scenario.model_validate(rest)
+            scenario = Scenario.model_validate(as_tuples(rest))
             return Salvage(scenario, tuple(lost - {"name"}))  # nothing depends on its name
         except ValidationError as more:
             found = more
@@ -168,10 +171,10 @@ def _problem(item: dict[str, Any], data: dict[str, Any], model: type[BaseModel])
         elif part not in ("schema_", _KEY):
             names.append(str(part))
         holder = inner
-    if item["type"] == "extra_forbidden":
+    if item["type"] in _UNKNOWN_KEY:
         return Problem(".".join(names), item["input"], _unknown(loc, model))
     if item["type"].startswith("union_tag"):
-        tag = item["ctx"].get("tag", MISSING)
+        tag = holder.get("kind", MISSING)
         tags = item["ctx"].get("expected_tags", "")
         right = f"must be one of {tags}" if tags else "must be given"
         return Problem(".".join([*names, "kind"]), tag, right)

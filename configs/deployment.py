@@ -21,8 +21,8 @@ from configs.checks import Problem
 from configs.complaints import MISSING, complaints, refusal
 from configs.errors import Complaint, ScenarioError
 from configs.files import expanded
+from configs.parameters import Name, as_tuples
 from configs.scenario import Scenario
-from configs.sections import Name, Section
 from configs.users import read_users
 
 PLANT, RECORDER = "plant", "recorder"
@@ -32,6 +32,12 @@ Endpoint = Annotated[str, Field(pattern=patterns.ENDPOINT)]
 def agent_role(robot: str) -> str:
     """The role of a robot's controller."""
     return f"agent/{robot}"
+
+
+class Section(BaseModel):
+    """One table of the file: unknown keys are errors, values don't change type or later."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
 class BusSection(BaseModel):
@@ -83,7 +89,7 @@ class NetworkSection(Section):
         description="lines identity:password, all of them at the router, its own on a robot",
     )
     tls: TlsSection | None = Field(None, description="certificates instead of passwords")
-    guests: dict[Name, Annotated[tuple[str, ...], Field(strict=False)]] = Field(
+    guests: dict[Name, tuple[str, ...]] = Field(
         default_factory=dict,
         description="who may open which buses with can.Bus(endpoint=...) from another machine;"
         ' "*" for all',
@@ -95,7 +101,7 @@ class Deployment(Section):
 
     schema_: Literal[1] = Field(1, alias="schema", description="version of this format")
     description: str = ""
-    roles: Annotated[tuple[str, ...], Field(strict=False)] | None = Field(
+    roles: tuple[str, ...] | None = Field(
         None, description='"plant", "recorder", "agent/<robot>"; all if not given'
     )
     network: NetworkSection | None = None
@@ -161,7 +167,7 @@ def check_deployment(
         ScenarioError: all that is wrong with it, a line each.
     """
     try:
-        deployment = Deployment.model_validate(data)
+        deployment = Deployment.model_validate(as_tuples(data))
     except ValidationError as error:
         found = complaints(error, data, Deployment)
         raise refusal([Complaint(name, *problem) for problem in found]) from error

@@ -4,54 +4,49 @@ The limits on ages hold in every run. Torque limit, slew limit and plausibility 
 given, so that the paper's law is the paper's; a robot wants all of them.
 """
 
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import Field
+from annotated_types import Ge, Le
 
-from configs.sections import Positive, Seconds, SecondsOrZero, Section
+from configs.parameters import Parameters, Positive, Seconds, SecondsOrZero, parameter
 
 
-class Host(Section):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Host(Parameters):
     """Supervision of drives, bus and pose; own limits; what follows a fault, and the end."""
 
-    heartbeat_age_limit_s: Seconds = Field(
-        0.5, description="a drive silent for longer has dropped out"
+    heartbeat_age_limit_s: Seconds = parameter(0.5, "a drive silent for longer has dropped out")
+    encoder_age_limit_s: Seconds | None = parameter(
+        None, "ten control periods, at least 0.05 s, if not given"
     )
-    encoder_age_limit_s: Seconds | None = Field(
-        None, description="ten control periods, at least 0.05 s, if not given"
-    )
-    pose_age_limit_s: Seconds | None = Field(
+    pose_age_limit_s: Seconds | None = parameter(
         None,
-        description="the delay and five localisation periods, at least 0.5 s, if not given; counts"
+        "the delay and five localisation periods, at least 0.5 s, if not given; counts"
         " where fixes do: not with localisation.source odometry",
     )
-    torque_limit_wheel_N_m: Positive | None = Field(
-        None, description="per wheel; none if not given"
+    torque_limit_wheel_N_m: Positive | None = parameter(None, "per wheel; none if not given")
+    torque_slew_limit_wheel_N_m_s: Positive | None = parameter(
+        None, "per wheel, but a stop is at once; none if not given"
     )
-    torque_slew_limit_wheel_N_m_s: Positive | None = Field(
-        None, description="per wheel, but a stop is at once; none if not given"
-    )
-    encoder_mismatch_limit_wheel_rad: Positive | None = Field(
+    encoder_mismatch_limit_wheel_rad: Positive | None = parameter(
         None,
-        description="wheel angle against its own speed, integrated and forgotten in 0.2 s: jumps,"
+        "wheel angle against its own speed, integrated and forgotten in 0.2 s: jumps,"
         " freezes and flipped signs; not looked at if not given",
     )
-    pose_mismatch_limit_m: Positive | None = Field(
+    pose_mismatch_limit_m: Positive | None = parameter(
         None,
-        description="a fix against the last one carried on by odometry; not looked at if not given",
+        "a fix against the last one carried on by odometry; not looked at if not given",
     )
-    dry_run: bool = Field(False, description="everything but torque: the drives stay disarmed")
-    on_exit: Literal["idle", "estop"] = Field(
-        "idle", description="estop: latched at the drives until somebody clears their errors"
+    dry_run: bool = parameter(False, "everything but torque: the drives stay disarmed")
+    on_exit: Literal["idle", "estop"] = parameter(
+        "idle", "estop: latched at the drives until somebody clears their errors"
     )
-    rearm: bool = Field(
-        False, description="a robot that stopped itself arms again once the fault is gone"
-    )
-    rearm_after_s: SecondsOrZero = Field(0.5, description="all must have been well for this long")
-    rearm_attempts: Annotated[int, Field(ge=1, le=1000)] = Field(3, description="in a run")
-    rearm_limit_s: Seconds = Field(1.0, description="longest wait for closed loop then")
-    bus_error_limit_s: SecondsOrZero = Field(
+    rearm: bool = parameter(False, "a robot that stopped itself arms again once the fault is gone")
+    rearm_after_s: SecondsOrZero = parameter(0.5, "all must have been well for this long")
+    rearm_attempts: Annotated[int, Ge(1), Le(1000)] = parameter(3, "in a run")
+    rearm_limit_s: Seconds = parameter(1.0, "longest wait for closed loop then")
+    bus_error_limit_s: SecondsOrZero = parameter(
         5.0,
-        description="errors of a bus that isn't ours are borne for this long, then the controller"
-        " gives up",
+        "errors of a bus that isn't ours are borne for this long, then the controller gives up",
     )

@@ -18,6 +18,7 @@ from configs.checks import Problem, cross_problems
 from configs.complaints import complaints, refusal, salvage
 from configs.errors import Complaint, ScenarioError
 from configs.overrides import Override
+from configs.parameters import as_tuples
 from configs.scenario import Scenario
 
 _NOT_SCENARIOS = {"starter"}
@@ -101,7 +102,7 @@ def _check(
 ) -> Scenario:
     scenario: Scenario | None = None
     try:
-        scenario = Scenario.model_validate(data)
+        scenario = Scenario.model_validate(as_tuples(data))
         problems = cross_problems(scenario)
     except ValidationError as error:
         problems = complaints(error, data)

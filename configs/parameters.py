@@ -7,12 +7,16 @@
 The name holds the unit, the annotation the type and its bounds (`annotated_types`), the field the
 default and the description. The launcher validates files against these classes with pydantic,
 which makes the JSON Schema of them as well. Processes receive the same objects, without pydantic.
+
+pydantic is imported by the methods that it calls itself: in a process nothing does.
 """
 
-from dataclasses import field
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
+from dataclasses import dataclass, field, fields, make_dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Optional, TypeVar
 
 from annotated_types import Ge, Gt, Le
+
+from configs import patterns
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler
@@ -24,14 +28,44 @@ MOST_S = 1e9
 MOST_INTEGER = (1 << 53) - 1
 """What every reader of TOML and JSON takes exactly."""
 
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """Annotation of a text: the regular expression that it matches, its largest length."""
+
+    regex: str
+    max_length: int | None = None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: "GetCoreSchemaHandler") -> Any:
+        from pydantic import Field
+
+        text = Field(pattern=self.regex, max_length=self.max_length)
+        return handler(Annotated[source, text])
+
+
+@dataclass(frozen=True, slots=True)
+class Tagged:
+    """Annotation of a union of tables: the key whose value tells which one a table is."""
+
+    key: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: "GetCoreSchemaHandler") -> Any:
+        from pydantic import Field
+
+        return handler(Annotated[source, Field(discriminator=self.key)])
+
+
 Finite = Annotated[float, Ge(-MOST), Le(MOST)]
 Positive = Annotated[float, Gt(0), Le(MOST)]
 NotNegative = Annotated[float, Ge(0), Le(MOST)]
 Seconds = Annotated[float, Gt(0), Le(MOST_S)]
 SecondsOrZero = Annotated[float, Ge(0), Le(MOST_S)]
 Seed = Annotated[int, Ge(0), Le(MOST_INTEGER)]
-
-_T = TypeVar("_T")
+Name = Annotated[str, Pattern(patterns.NAME, max_length=32)]
+Node = Annotated[int, Ge(0), Le(62)]
+Point = tuple[Finite, Finite]
 
 
 def parameter(default: _T, description: str) -> _T:
@@ -59,3 +93,32 @@ class Parameters:
         table: Any = handler.resolve_ref_schema(schema)
         table["strict"] = False
         return schema
+
+
+_P = TypeVar("_P", bound=Parameters)
+
+
+def changes_of(name: str, section: type[Parameters]) -> type[Any]:
+    """A table of the same keys as `section`, none required: what one robot has differently."""
+    keys = [
+        (key.name, Optional[key.type], field(default=None, metadata=key.metadata))  # noqa: UP045
+        for key in fields(section)  # type: ignore[arg-type]
+    ]
+    options = {"frozen": True, "slots": True, "kw_only": True}
+    namespace = {"__doc__": section.__doc__, "__module__": section.__module__}
+    return make_dataclass(name, keys, bases=(Parameters,), namespace=namespace, **options)
+
+
+def changed(section: _P, changes: Parameters) -> _P:
+    """The section with those keys of `changes` that are given."""
+    given = {key.name: getattr(changes, key.name) for key in fields(changes)}  # type: ignore[arg-type]
+    return replace(section, **{k: v for k, v in given.items() if v is not None})  # type: ignore[type-var]
+
+
+def as_tuples(value: Any) -> Any:
+    """Parsed TOML with its arrays as tuples, as `Parameters` have them."""
+    if isinstance(value, dict):
+        return {key: as_tuples(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return tuple(as_tuples(inner) for inner in value)
+    return value

@@ -4,64 +4,73 @@ The defaults are those of a small hub motor on an ODrive. Its rated torque is ha
 at half the current limit the windings settle 75 K above ambient, where derating begins.
 """
 
+from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import Field
+from annotated_types import Ge, Gt, Le
 
-from configs.sections import NotNegative, Positive, Seconds, SecondsOrZero, Section
+from configs.parameters import (
+    NotNegative,
+    Parameters,
+    Positive,
+    Seconds,
+    SecondsOrZero,
+    parameter,
+)
 
-AboveZeroKelvin = Annotated[float, Field(gt=-273.15, allow_inf_nan=False)]
+AboveZeroKelvin = Annotated[float, Gt(-273.15)]
 
 
-class Motor(Section):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motor(Parameters):
     """The motors with their power stages, one per wheel; torques at the motor's shaft."""
 
-    torque_constant_N_m_A: Positive | None = Field(
-        None, description="of the motor; the drive's, drive.torque_constant_N_m_A, if not given"
+    torque_constant_N_m_A: Positive | None = parameter(
+        None, "of the motor; the drive's, drive.torque_constant_N_m_A, if not given"
     )
-    current_limit_A: Positive | None = Field(
-        None, description="of the power stage; the drive's, drive.current_limit_A, if not given"
+    current_limit_A: Positive | None = parameter(
+        None, "of the power stage; the drive's, drive.current_limit_A, if not given"
     )
-    current_loop_s: Seconds = Field(0.001, description="time constant of the current loop")
-    compute_delay_s: SecondsOrZero = Field(0.000_125, description="from demand to current loop")
-    winding_resistance_ohm: Positive = Field(
-        0.2, description="the heat is R i²: 1.5 times the phase resistance for amplitudes"
+    current_loop_s: Seconds = parameter(0.001, "time constant of the current loop")
+    compute_delay_s: SecondsOrZero = parameter(0.000_125, "from demand to current loop")
+    winding_resistance_ohm: Positive = parameter(
+        0.2, "the heat is R i²: 1.5 times the phase resistance for amplitudes"
     )
-    fet_resistance_ohm: NotNegative = Field(0.02, description="of the power stage, same sense")
+    fet_resistance_ohm: NotNegative = parameter(0.02, "of the power stage, same sense")
     viscous_friction_shaft_N_m_s: NotNegative = 2e-4
     coulomb_friction_shaft_N_m: NotNegative = 5e-3
     ambient_C: AboveZeroKelvin = 25.0
-    motor_thermal_resistance_K_W: NotNegative = Field(15.0, description="windings to ambient")
+    motor_thermal_resistance_K_W: NotNegative = parameter(15.0, "windings to ambient")
     motor_thermal_time_s: Seconds = 60.0
-    fet_thermal_resistance_K_W: NotNegative = Field(30.0, description="FETs to ambient")
+    fet_thermal_resistance_K_W: NotNegative = parameter(30.0, "FETs to ambient")
     fet_thermal_time_s: Seconds = 60.0
-    torque_noise_shaft_N_m: NotNegative = Field(1e-3, description="rms, of the drive's estimate")
-    current_quantum_A: NotNegative = Field(0.01, description="of the drive's measurement; 0: none")
+    torque_noise_shaft_N_m: NotNegative = parameter(1e-3, "rms, of the drive's estimate")
+    current_quantum_A: NotNegative = parameter(0.01, "of the drive's measurement; 0: none")
 
 
-class Encoder(Section):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Encoder(Parameters):
     """The encoders, one on each motor's shaft, and the drives' velocity estimators."""
 
-    counts_per_shaft_rev: Annotated[int, Field(ge=4, le=1 << 24)] = 8192
-    index: bool = Field(False, description="a mark each turn, at which lost counts are found again")
-    noise_counts: Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)] = Field(
-        0.0, description="rms, of the angle before it is counted"
+    counts_per_shaft_rev: Annotated[int, Ge(4), Le(1 << 24)] = 8192
+    index: bool = parameter(False, "a mark each turn, at which lost counts are found again")
+    noise_counts: Annotated[float, Ge(0), Le(1e6)] = parameter(
+        0.0, "rms, of the angle before it is counted"
     )
-    pll_bandwidth_rad_s: Annotated[float, Field(ge=1, le=1e6, allow_inf_nan=False)] = 1000.0
-    pll_rate_Hz: Annotated[float, Field(ge=100, le=100_000, allow_inf_nan=False)] = Field(
-        8000.0, description="rate of the drive's control loop"
+    pll_bandwidth_rad_s: Annotated[float, Ge(1), Le(1e6)] = 1000.0
+    pll_rate_Hz: Annotated[float, Ge(100), Le(100_000)] = parameter(
+        8000.0, "rate of the drive's control loop"
     )
 
 
-class Supply(Section):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Supply(Parameters):
     """The source of one robot, which feeds both drives."""
 
-    voltage_V: Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)] = Field(
-        24.0, description="open circuit"
-    )
+    voltage_V: Annotated[float, Gt(0), Le(1000)] = parameter(24.0, "open circuit")
     resistance_ohm: NotNegative = 0.1
-    absorbs: bool = Field(
-        True, description="True: a battery; False: braking charges the bus capacitor instead"
+    absorbs: bool = parameter(
+        True, "True: a battery; False: braking charges the bus capacitor instead"
     )
-    capacitance_F: Positive = Field(1e-3, description="of the bus, both drives together")
-    standby_W: NotNegative = Field(1.0, description="of each drive's electronics")
+    capacitance_F: Positive = parameter(1e-3, "of the bus, both drives together")
+    standby_W: NotNegative = parameter(1.0, "of each drive's electronics")

@@ -1,5 +1,6 @@
 """Scenario → briefs: what each process of a run is told at its start."""
 
+from dataclasses import asdict
 from math import inf
 
 from configs import sections
@@ -96,7 +97,7 @@ def agent_brief(
         robot=name,
         law=control.law,
         wheels=Wheels(body.wheel_radius_m, body.half_track_m),
-        gains=Gains(**control.model_dump(exclude={"law"})),
+        gains=gains_of(control),
         coordination=Coordination(
             p=coordination.p,
             q=coordination.q,
@@ -120,6 +121,11 @@ def agent_brief(
         bus=bus,
         network=network,
     )
+
+
+def gains_of(control: sections.Control) -> Gains:
+    """The gains as the law has them."""
+    return Gains(**{k: v for k, v in asdict(control).items() if k != "law"})
 
 
 def reach(scenario: Scenario) -> Reach:
@@ -150,7 +156,7 @@ def _drive_link(scenario: Scenario, robot: sections.Robot, drive: DriveModel) ->
         heartbeat_period_ns=drive.heartbeat_period_ns,
         encoder_age_limit_ns=round(encoder_age_s * 1e9),
         heartbeat_age_limit_ns=round(host.heartbeat_age_limit_s * 1e9),
-        mounting=Mounting(**scenario.mounting_of(robot).model_dump()),
+        mounting=Mounting(**asdict(scenario.mounting_of(robot))),
     )
 
 
@@ -267,7 +273,7 @@ def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief
     return RobotBrief(
         robot=robot.name,
         bus=scenario.bus_of(robot.name),
-        body=Body(**scenario.body_of(robot).model_dump()),
+        body=Body(**asdict(scenario.body_of(robot))),
         disturbance=Disturbance(
             disturbance.amplitude_wheel_N_m, disturbance.rate_rad_s, float(number)
         ),
@@ -278,7 +284,7 @@ def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief
         pose=Pose(robot.pose.x_m, robot.pose.y_m, robot.pose.theta_rad),
         v_m_s=robot.v_m_s,
         omega_rad_s=robot.omega_rad_s,
-        mounting=Mounting(**scenario.mounting_of(robot).model_dump()),
+        mounting=Mounting(**asdict(scenario.mounting_of(robot))),
     )
 
 
@@ -343,9 +349,9 @@ def _powertrain_model(scenario: Scenario, number: int) -> PowertrainModel | None
             torque_constant_N_m_A=drive.torque_constant_N_m_A if constant is None else constant,
             assumed_torque_constant_N_m_A=drive.torque_constant_N_m_A,
             current_limit_A=drive.current_limit_A if limit is None else limit,
-            **motor.model_dump(exclude=inherited),
+            **{k: v for k, v in asdict(motor).items() if k not in inherited},
         ),
-        encoder=EncoderModel(**scenario.encoder.model_dump()),
-        supply=SupplyModel(**scenario.supply.model_dump()),
+        encoder=EncoderModel(**asdict(scenario.encoder)),
+        supply=SupplyModel(**asdict(scenario.supply)),
         seed=(scenario.seed << 9) + number,  # at most 256 robots
     )

@@ -7,10 +7,12 @@ is; where its processes and buses are is another file's business.
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import Field
+from annotated_types import Len
+from pydantic import BaseModel, ConfigDict, Field
 
 from configs.graph import Graph, generated, parse_edge, random_rooted
 from configs.host import Host
+from configs.parameters import Name, Seconds, Seed, changed
 from configs.powertrain import Encoder, Motor, Supply
 from configs.sections import (
     Body,
@@ -26,21 +28,19 @@ from configs.sections import (
     Leader,
     Localisation,
     Mounting,
-    Name,
     Network,
     PathShape,
     Robot,
-    Seconds,
-    Section,
-    Seed,
 )
 
 ETSRO = "etsro"
 """The robot type that every scenario knows: the paper's."""
 
 
-class Scenario(Section):
+class Scenario(BaseModel):
     """One experiment."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     schema_: Literal[1] = Field(alias="schema", description="version of this format")
     name: Name
@@ -69,8 +69,8 @@ class Scenario(Section):
     disturbance: Disturbance = Disturbance()
     network: Network = Network()
     robot_types: dict[Name, Body] = Field(default_factory=dict)
-    robot: Annotated[tuple[Robot, ...], Field(min_length=1, max_length=256, strict=False)]
-    expect: Annotated[tuple[Expect, ...], Field(strict=False)] = ()
+    robot: Annotated[tuple[Robot, ...], Len(1, 256)]
+    expect: tuple[Expect, ...] = ()
 
     @property
     def ends_at_s(self) -> float:
@@ -113,17 +113,15 @@ class Scenario(Section):
     def body_of(self, robot: Robot) -> Body:
         """The body of a robot: its type's, with what the robot says differently."""
         kind = self.robot_types.get(robot.type, Body())
-        return Body(**{**kind.model_dump(), **robot.body.model_dump(exclude_none=True)})
+        return changed(kind, robot.body)
 
     def control_of(self, robot: Robot) -> Control:
         """The law and gains of a robot: the fleet's, with what the robot says differently."""
-        changes = robot.control.model_dump(exclude_none=True)
-        return Control(**{**self.control.model_dump(), **changes})
+        return changed(self.control, robot.control)
 
     def mounting_of(self, robot: Robot) -> Mounting:
         """How a robot's drives are mounted: the fleet's, with what the robot says differently."""
-        changes = robot.mounting.model_dump(exclude_none=True)
-        return Mounting(**{**self.mounting.model_dump(), **changes})
+        return changed(self.mounting, robot.mounting)
 
     def _edges(self) -> Sequence[tuple[str, str]]:
         graph = self.graph

@@ -1,5 +1,7 @@
 """The inertias of a robot as its wheels feel them, as `plant.body` has them."""
 
+from dataclasses import asdict
+
 from configs.brief import Body as BodyModel
 from configs.brief import Disturbance
 from configs.sections import Body
@@ -8,7 +10,7 @@ from plant.body import Robot
 
 def robot_body(body: Body) -> Robot:
     """The rigid body of (2)-(4), undisturbed."""
-    return Robot(BodyModel(**body.model_dump()), Disturbance(0.0, 0.0, 0.0))
+    return Robot(BodyModel(**asdict(body)), Disturbance(0.0, 0.0, 0.0))
 
 
 def inertias(body: Body) -> tuple[float, float]:

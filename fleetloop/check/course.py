@@ -7,7 +7,7 @@ between two places Γ' may come near 0 only where the chord of its hodograph doe
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import cos, hypot, inf, sin
 
 import numpy as np
@@ -127,12 +127,12 @@ def _irregular(scenario: Scenario, robot: Robot, at: float) -> Problem:
         if scenario.path.kind == "spline":
             value: object = scenario.path.points_m
             return Problem("path.points_m", value, f"{right}: don't turn back on a point")
-        return Problem("path", scenario.path.model_dump(), right)
+        return Problem("path", asdict(scenario.path), right)
     turn = abs(centre(at).omega_bar)
     right = f"{robot.name}'s path stands still at s = {at:.4g} m; {law}"
     if turn > 0.0:
         right += f": keep the offset off the path's centre of curvature, {speed / turn:.4g} m away"
-    offset = robot.offset.model_dump()
+    offset = asdict(robot.offset)
     kind = offset.pop("kind")
     if kind == "structure":
         key = f"robot.{robot.name}.offset.left_m"

@@ -6,7 +6,7 @@ short scenarios are rehearsed to their end.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -102,8 +102,8 @@ def _affordable_s(scenario: Scenario) -> float:
 
 
 def _part(scenario: Scenario, until_s: float) -> Scenario:
-    clock = scenario.clock.model_copy(update={"mode": "lockstep"})
-    bus = scenario.bus.model_copy(update={"record": ()})
+    clock = replace(scenario.clock, mode="lockstep")
+    bus = replace(scenario.bus, record=())
     return scenario.model_copy(update={"clock": clock, "bus": bus, "until_s": until_s})
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from bridge.frame import Frame
 from bridge.wire.bits import frame_bits
-from configs.brief import Gains, Wheels
-from configs.resolve import schedule
+from configs.brief import Wheels
+from configs.resolve import gains_of, schedule
 from configs.scenario import Scenario
 from configs.sections import Robot
 from fleetloop.check.body import inertias, robot_body
@@ -78,7 +78,7 @@ def loop_of(scenario: Scenario, robot: Robot) -> Loop:
     ticks = schedule(scenario)
     external = scenario.localisation.source == "external"
     # Limits aside: the channel is what happens close to the path.
-    gains = Gains(**control.model_dump(exclude={"law"}) | {"torque_limit_wheel_N_m": inf})
+    gains = replace(gains_of(control), torque_limit_wheel_N_m=inf)
     return Loop(
         control.law,
         gains,

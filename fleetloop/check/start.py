@@ -17,6 +17,7 @@ import numpy as np
 from agents.laws import LAWS, LawState, Sense
 from agents.path_following import path_errors, smoothing
 from configs.brief import Gains, Wheels
+from configs.resolve import gains_of
 from configs.scenario import Scenario
 from configs.sections import Robot
 from fleetloop.check.body import robot_body
@@ -60,7 +61,7 @@ def start_findings(scenario: Scenario, ahead: Forecast) -> Iterator[Finding]:
 def _start(scenario: Scenario, robot: Robot, ahead: Forecast, number: int, ticks: int) -> _Start:
     """Integrate law and body over the first ticks."""
     control, section = scenario.control_of(robot), scenario.body_of(robot)
-    gains = Gains(**control.model_dump(exclude={"law"}))
+    gains = gains_of(control)
     body, h = robot_body(section), scenario.clock.control_period_s
     law = LAWS[control.law](gains, Wheels(section.wheel_radius_m, section.half_track_m), h)
     path = path_of(scenario, robot)

@@ -11,6 +11,7 @@ held         else
 """
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,7 @@ def judge(expect: Expect, record: Record, scenario: Scenario) -> Judged:
     seen_to_s = min(float(t[-1]) if len(t) else 0.0 for t, _ in series)
     # The last tick of a window may be up to a period before its end.
     whole = all(map(len, parts)) and seen_to_s > end_s - 1.01 * scenario.clock.control_period_s
-    judged: Judged = expect.model_dump(mode="json", exclude_none=True)
+    judged: Judged = {k: v for k, v in asdict(expect).items() if v is not None}
     judged |= {"held": None, "found": None}
     if len(values):
         found = {"max_abs": float(np.max(np.abs(values)))}

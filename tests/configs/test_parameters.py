@@ -4,11 +4,21 @@ import pickle
 import subprocess
 import sys
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from configs.parameters import Parameters, Positive, parameter
+from configs.parameters import (
+    Parameters,
+    Pattern,
+    Positive,
+    Tagged,
+    as_tuples,
+    changed,
+    changes_of,
+    parameter,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +37,27 @@ class Outer(Parameters):
     inner: Inner = Inner(length_m=1.0)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Round(Parameters):
+    """One of two shapes."""
+
+    kind: Literal["round"]
+    radius_m: Positive
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Square(Parameters):
+    """The other one."""
+
+    kind: Literal["square"]
+    corners_m: tuple[Positive, ...]
+
+
 FILE = TypeAdapter(Outer)
+SHAPE = TypeAdapter(Annotated[Round | Square, Tagged("kind")])
+TEXT = TypeAdapter(Annotated[str, Pattern("^r[0-9]+$", max_length=3)])
+OuterChanges = changes_of("OuterChanges", Outer)
+CHANGES = TypeAdapter(OuterChanges)
 
 
 def test_a_table_becomes_the_object_that_processes_receive() -> None:
@@ -62,6 +92,35 @@ def test_the_schema_has_bounds_default_and_description() -> None:
     assert mass["description"] == "of the body"
 
 
+def test_a_tag_chooses_the_table_and_arrays_become_tuples() -> None:
+    table = {"kind": "square", "corners_m": [1.0, 2]}
+    assert SHAPE.validate_python(as_tuples(table)) == Square(kind="square", corners_m=(1.0, 2.0))
+    with pytest.raises(ValidationError) as refused:
+        SHAPE.validate_python({"kind": "oval"})
+    assert refused.value.errors()[0]["type"] == "union_tag_invalid"
+
+
+@pytest.mark.parametrize(
+    ("text", "kind"), [("x1", "string_pattern_mismatch"), ("r100", "string_too_long")]
+)
+def test_a_text_matches_its_pattern(text: str, kind: str) -> None:
+    assert TEXT.validate_python("r10") == "r10"
+    with pytest.raises(ValidationError) as refused:
+        TEXT.validate_python(text)
+    assert refused.value.errors()[0]["type"] == kind
+
+
+def test_changes_have_the_same_keys_bounds_and_words_and_no_defaults() -> None:
+    assert CHANGES.validate_python({}) == OuterChanges()
+    assert CHANGES.json_schema()["properties"]["mass_kg"]["description"] == "of the body"
+    with pytest.raises(ValidationError):
+        CHANGES.validate_python({"mass_kg": -1.0})
+    heavier = CHANGES.validate_python({"mass_kg": 9.0})
+    assert changed(Outer(mass_kg=1.0, count=7), heavier) == Outer(mass_kg=9.0, count=7)
+    assert pickle.loads(pickle.dumps(heavier)) == heavier
+
+
 def test_a_process_needs_no_pydantic() -> None:
-    code = "import sys, configs.parameters; assert 'pydantic' not in sys.modules"
+    modules = "configs.sections, configs.host, configs.powertrain"
+    code = f"import sys, {modules}; assert 'pydantic' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=30)
