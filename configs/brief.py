@@ -519,7 +519,7 @@ class PlantBrief:
     network: NetworkLink
     listeners: tuple[tuple[str, int], ...] = ()  # bus, inherited file descriptor of its socket
     attached: tuple[tuple[str, Settings], ...] = ()  # bus, keyword arguments of can.Bus: not ours
-    witnessed: tuple[tuple[str, Pose], ...] = ()  # robots that aren't emulated; where they start
+    real_robots: tuple[tuple[str, Pose], ...] = ()  # robots that aren't emulated; where they start
     detached: bool = False  # as an agent's
     controllers: tuple[tuple[str, str], ...] = ()  # robot, secret: whom lockstep's buses wait for
 

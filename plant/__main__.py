@@ -34,9 +34,9 @@ from configs.brief import PlantBrief, Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError
 from plant.herald import Herald
 from plant.lockstep import Counters, LockstepLoop, bus_frames
-from plant.real_robot import Witness
+from plant.real_robot import RealRobot
 from plant.realtime import RealtimeLoop
-from plant.robot import diverged_robots, unit_of
+from plant.robot import diverged_robots, emulated_robot
 
 PLANT_PRIORITY = 45
 """SCHED_FIFO, above the controllers'."""
@@ -95,12 +95,12 @@ def join(hub: Hub, attached: Sequence[tuple[str, Settings]]) -> DrivePort:
 
 def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) -> Counters:
     name = brief.network.run
-    units = [unit_of(robot) for robot in brief.robots]
-    others = [Witness(robot, start) for robot, start in brief.witnessed]
+    emulated = [emulated_robot(robot) for robot in brief.robots]
+    others = [RealRobot(robot, start) for robot, start in brief.real_robots]
     # In real time all poses are of one instant: they travel together.
     express = not brief.schedule.realtime
-    poses = [link.publisher(keys.pose(name, u.brief.robot), express=express) for u in units]
-    robots = [*(unit.brief.robot for unit in units), *(other.robot for other in others)]
+    poses = [link.publisher(keys.pose(name, r.brief.robot), express=express) for r in emulated]
+    robots = [*(robot.brief.robot for robot in emulated), *(other.robot for other in others)]
     truths = [link.publisher(keys.truth(name, robot)) for robot in robots]
     rows = [RowBuffer(PLANT_ROW, partial(_put_rows, truth)) for truth in truths]
     logs: dict[str, FrameBuffer] = {}
@@ -117,8 +117,8 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
         link.subscribe(keys.pose(name, other.robot), other.robot)
 
     hellos = Hellos(brief.schedule.hello_every_s)
-    for unit, pose in zip(units, poses, strict=True):
-        start = unit.brief.pose
+    for robot, pose in zip(emulated, poses, strict=True):
+        start = robot.brief.pose
         hellos.add(pose, PoseFix(EARLY, 0, start.x_m, start.y_m, start.theta_rad).encode())
     for truth in truths:
         hellos.add(truth, Rows(0, 0, b"", False).encode())
@@ -132,7 +132,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
             f" {stall.lasted_s:.2f} s"
             for stall in stalls
         }
-        return troubles | late | diverged_robots(units, brief.schedule.period_ns)
+        return troubles | late | diverged_robots(emulated, brief.schedule.period_ns)
 
     notice = link.publisher(keys.notice(name, "plant"))
     herald = Herald(news, lambda text: notice.put(Notice(text).encode()))
@@ -148,8 +148,10 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
         epoch_ns = _serve_until_go(brief, end, link, hellos, stop)
         settle_memory()
         refused = go_realtime(PLANT_PRIORITY)
-        record = partial(_record, link, others, rows[len(units) :], brief.schedule.period_s)
-        wall = RealtimeLoop(brief, units, end, hub, poses, rows[: len(units)], say, taps, record)
+        record = partial(_record, link, others, rows[len(emulated) :], brief.schedule.period_s)
+        wall = RealtimeLoop(
+            brief, emulated, end, hub, poses, rows[: len(emulated)], say, taps, record
+        )
         counters, progress_of, stalls = wall.counters, wall.progress, wall.lateness.stalls
         body = partial(wall.run, epoch_ns)
     else:
@@ -157,7 +159,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
         link.declare_live(keys.live(name, "plant"))
         _await_go(brief, link, hellos, stop)
         settle_memory()
-        loop = LockstepLoop(brief, units, hub, poses, rows, say, taps)
+        loop = LockstepLoop(brief, emulated, hub, poses, rows, say, taps)
         counters, progress_of, body = loop.counters, loop.progress, loop.run
     sampler = Sampler()
     began_ns, waited_ns = cpu_ns(), processor_wait_ns()
@@ -186,7 +188,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
             **bus_frames(counters),
             **{
                 f"stopped.{robot}": why
-                for robot, why in diverged_robots(units, brief.schedule.period_ns).items()
+                for robot, why in diverged_robots(emulated, brief.schedule.period_ns).items()
             },
             **{f"stall.{stall.tick}": stall.lasted_s for stall in stalls},
             **{f"trouble.{bus}": text for bus, text in end.troubles().items()},
@@ -249,7 +251,7 @@ def _serve_until_go(
 
 
 def _record(
-    link: Link, others: Sequence[Witness], rows: Sequence[RowBuffer], period_s: float, tick: int
+    link: Link, others: Sequence[RealRobot], rows: Sequence[RowBuffer], period_s: float, tick: int
 ) -> None:
     """A row of each robot that isn't emulated."""
     if not others:
@@ -257,7 +259,7 @@ def _record(
     robots = {other.robot: other for other in others}
     for arrival in waiting(link, ARRIVALS_PER_ROBOT * len(others)):
         if (other := robots.get(arrival.tag)) is not None:
-            other.take(PoseFix.decode(arrival.payload))
+            other.take_pose(PoseFix.decode(arrival.payload))
     for other, buffer in zip(others, rows, strict=True):
         buffer.add(tick, other.row(tick * period_s))
 

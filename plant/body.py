@@ -36,7 +36,7 @@ class State(NamedTuple):
     left_wheel_rad: float
 
 
-class Robot:
+class RigidBody:
     """Constants of (4) for one robot."""
 
     def __init__(self, body: Body, disturbance: Disturbance) -> None:

@@ -6,14 +6,14 @@ that are linear in (v, ω), so they come from the same stages.
 
 from math import cos, sin
 
-from plant.body import Robot, State
+from plant.body import RigidBody, State
 from plant.divergence import FARTHEST
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
 def rk4(
-    robot: Robot, state: State, tau_right: float, tau_left: float, t_s: float, step_s: float
+    body: RigidBody, state: State, tau_right: float, tau_left: float, t_s: float, step_s: float
 ) -> State | None:
     """State after `step_s` from scenario time `t_s`, under held torques [N·m].
 
@@ -21,12 +21,12 @@ def rk4(
     """
     try:
         x, y, theta, v, omega, right_wheel_rad, left_wheel_rad = state
-        accelerations = robot.accelerations
+        accelerations = body.accelerations
         half = 0.5 * step_s
-        if robot.disturbed:
-            right_1, left_1 = robot.net(tau_right, tau_left, t_s)
-            right_2, left_2 = robot.net(tau_right, tau_left, t_s + half)
-            right_4, left_4 = robot.net(tau_right, tau_left, t_s + step_s)
+        if body.disturbed:
+            right_1, left_1 = body.net(tau_right, tau_left, t_s)
+            right_2, left_2 = body.net(tau_right, tau_left, t_s + half)
+            right_4, left_4 = body.net(tau_right, tau_left, t_s + step_s)
         else:
             right_1 = right_2 = right_4 = tau_right
             left_1 = left_2 = left_4 = tau_left
@@ -41,7 +41,7 @@ def rk4(
         sixth = step_s / 6.0
         travel = sixth * (v + 2.0 * (v2 + v3) + v4)
         turn = sixth * (omega + 2.0 * (omega2 + omega3) + omega4)
-        rolled, turned = travel * robot.inv_r, turn * robot.b * robot.inv_r
+        rolled, turned = travel * body.inv_r, turn * body.b * body.inv_r
         x += sixth * (
             v * cos(theta) + 2.0 * (v2 * cos(theta2) + v3 * cos(theta3)) + v4 * cos(theta4)
         )
@@ -55,7 +55,7 @@ def rk4(
         left_wheel_rad = left_wheel_rad + rolled - turned
     except ValueError:  # the sine of infinity
         return None
-    if not abs(v) + robot.b * abs(omega) <= robot.fastest_m_s:
+    if not abs(v) + body.b * abs(omega) <= body.fastest_m_s:
         return None
     if not abs(x) + abs(y) + abs(theta) + abs(right_wheel_rad) + abs(left_wheel_rad) <= FARTHEST:
         return None

@@ -28,10 +28,10 @@ from bridge.process import Stop, launcher_stopped
 from bridge.telemetry import RowBuffer, Tap
 from configs.brief import LEAD_TICKS, PlantBrief
 from configs.errors import InfrastructureError, PeerLostError
-from plant.bus.build import Emulation, emulations
-from plant.bus.ideal import Ask, IdealBus
-from plant.bus.timed import WireBus
-from plant.robot import Unit
+from plant.bus.build import build_buses
+from plant.bus.port import ALL, Bus
+from plant.bus.sockets import SocketPort
+from plant.robot import EmulatedRobot
 
 REPORT_EVERY_NS = 100_000_000
 WAIT_S = LOOK_S
@@ -56,87 +56,16 @@ class Counters:
 class _Lane:
     """One bus on its way through the ticks."""
 
-    __slots__ = ("asked", "asked_ns", "bus", "done", "robots", "tick")
+    __slots__ = ("asked", "asked_ns", "bus", "done", "robots", "steps", "tick")
 
-    def __init__(self, bus: str, units: Sequence[Unit], tick: int) -> None:
+    def __init__(self, bus: Bus, tick: int) -> None:
         self.bus = bus
-        self.robots = [unit.brief.robot for unit in units]
+        self.steps = bus.steps()
+        self.robots = [robot.brief.robot for robot in bus.robots]
         self.tick = tick
-        self.asked = ""  # the robot that was asked; "": all
+        self.asked = ALL
         self.asked_ns = 0  # when it was asked to answer; 0: nobody was
         self.done = False
-
-    def begin(self) -> Ask | None:
-        """Begin the next tick."""
-        raise NotImplementedError
-
-    def go_on(self, hub: Hub) -> Ask | None:
-        """Hand on what the clients had to say, up to the next question; None: the tick is over."""
-        raise NotImplementedError
-
-    def put(self, hub: Hub, ask: Ask) -> None:
-        """Put a question to the clients."""
-        raise NotImplementedError
-
-    def crossed(self, hub: Hub) -> int:
-        """How many frames crossed the bus."""
-        raise NotImplementedError
-
-
-class _IdealLane(_Lane):
-    """A bus on which frames take no time."""
-
-    __slots__ = ("_steps",)
-
-    def __init__(self, bus: str, emulation: IdealBus, tick: int) -> None:
-        super().__init__(bus, emulation.units, tick)
-        self._steps = emulation.steps()
-
-    def begin(self) -> Ask | None:
-        return next(self._steps)
-
-    def go_on(self, hub: Hub) -> Ask | None:
-        return self._steps.send(hub.receive(self.bus))
-
-    def put(self, hub: Hub, ask: Ask) -> None:
-        hub.deliver(self.bus, ask.stamp_ns, ask.frames)
-
-    def crossed(self, hub: Hub) -> int:
-        counters = hub.counters(self.bus)
-        return counters.from_drives + counters.from_clients
-
-
-class _WireLane(_Lane):
-    """A bus with bit timing."""
-
-    __slots__ = ("_steps", "_wire")
-
-    def __init__(self, bus: str, emulation: WireBus, tick: int) -> None:
-        super().__init__(bus, emulation.units, tick)
-        self._wire = emulation
-        self._steps = emulation.steps()
-
-    def begin(self) -> Ask | None:
-        return next(self._steps)
-
-    def go_on(self, hub: Hub) -> Ask | None:
-        for key in hub.departed(self.bus):
-            self._wire.depart(key)
-        return self._steps.send(hub.submitted(self.bus))
-
-    def put(self, hub: Hub, ask: Ask) -> None:
-        for key, count in ask.freed:
-            hub.return_credit(self.bus, key, count)
-        hub.forward(self.bus, ask.stamp_ns, ask.transmitted, ask.asked)
-
-    def crossed(self, hub: Hub) -> int:  # noqa: ARG002 - the wire knows better
-        return self._wire.crossed
-
-
-def _lane(bus: str, emulation: Emulation, tick: int) -> _Lane:
-    if isinstance(emulation, WireBus):
-        return _WireLane(bus, emulation, tick)
-    return _IdealLane(bus, emulation, tick)
 
 
 class _Ends(NamedTuple):
@@ -147,12 +76,12 @@ class _Ends(NamedTuple):
 
 
 class LockstepLoop:
-    """Runs all units of a plant against the controllers on the hub's buses."""
+    """Runs all robots of a plant against the controllers on the hub's buses."""
 
     def __init__(
         self,
         brief: PlantBrief,
-        units: Sequence[Unit],
+        robots: Sequence[EmulatedRobot],
         hub: Hub,
         poses: Sequence[Publisher],
         rows: Sequence[RowBuffer],
@@ -168,14 +97,15 @@ class LockstepLoop:
         self._report = report
         first = -schedule.countdown_ticks
         ends = {
-            unit: _Ends(pose, truth) for unit, pose, truth in zip(units, poses, rows, strict=True)
+            robot: _Ends(pose, truth)
+            for robot, pose, truth in zip(robots, poses, rows, strict=True)
         }
 
-        def begin(group: Sequence[Unit]) -> Callable[[int], None]:
-            return partial(self._begin, [(unit, ends[unit]) for unit in group])
+        def begin(group: Sequence[EmulatedRobot]) -> Callable[[int], None]:
+            return partial(self._begin, [(robot, ends[robot]) for robot in group])
 
-        buses = emulations(brief, units, begin, taps)
-        self._lanes = {name: _lane(name, bus, first) for name, bus in buses.items()}
+        buses = build_buses(brief, robots, lambda name, _: SocketPort(name, hub, hub), begin, taps)
+        self._lanes = {name: _Lane(bus, first) for name, bus in buses.items()}
         self._slowest = first
         self._at_slowest = len(self._lanes)
         self._held: list[_Lane] = []
@@ -192,7 +122,7 @@ class LockstepLoop:
         self._start_ns = now_ns = next_report_ns = time.monotonic_ns()
         hub = self._hub
         for lane in self._lanes.values():
-            self._ask(lane, now_ns)
+            self._go_on(lane, now_ns)
         while self._at_slowest and not stop.requested:
             answered = hub.collect(WAIT_S)
             after_ns = time.monotonic_ns()
@@ -211,7 +141,7 @@ class LockstepLoop:
                 self._report(self.progress())
         self.counters.wall_ns = time.monotonic_ns() - self._start_ns
         for bus, lane in self._lanes.items():
-            self.counters.frames[bus] = lane.crossed(hub)
+            self.counters.frames[bus] = lane.bus.crossed
 
     def progress(self) -> Progress:
         """How far the slowest robot is."""
@@ -221,32 +151,23 @@ class LockstepLoop:
 
     # --- one bus -------------------------------------------------------------------------------
 
-    def _begin(self, robots: Sequence[tuple[Unit, _Ends]], tick: int) -> None:
+    def _begin(self, robots: Sequence[tuple[EmulatedRobot, _Ends]], tick: int) -> None:
         """A tick begins: what is true now goes to the record, where a robot is to the robot."""
         t_ns = tick * self._period_ns
-        for unit, ends in robots:
+        for robot, ends in robots:
             if 0 <= tick < self._ticks:
-                ends.rows.add(tick, unit.row(t_ns * 1e-9))
+                ends.rows.add(tick, robot.row(t_ns * 1e-9))
             if self._schedule.localises(tick):
-                state = unit.state
+                state = robot.state
                 ends.pose.put(PoseFix(tick, t_ns, state.x, state.y, state.theta).encode())
 
-    def _ask(self, lane: _Lane, now_ns: int) -> None:
-        """Begin the next tick of a bus."""
-        ask = lane.begin()
-        if ask is not None:
-            self._put(lane, ask, now_ns)
-
     def _go_on(self, lane: _Lane, now_ns: int) -> None:
-        ask = lane.go_on(self._hub)
-        if ask is not None:
-            self._put(lane, ask, now_ns)
-        else:
+        """Take a bus to its next question, or through the end of its tick."""
+        asked = next(lane.steps)
+        if asked is None:
             self._take_on(lane, now_ns)
-
-    def _put(self, lane: _Lane, ask: Ask, now_ns: int) -> None:
-        lane.asked_ns, lane.asked = now_ns, ask.asked
-        lane.put(self._hub, ask)
+        else:
+            lane.asked_ns, lane.asked = now_ns, asked
 
     def _take_on(self, lane: _Lane, now_ns: int) -> None:
         """A bus from its tick to the next, and on as far as the slowest allows."""
@@ -262,7 +183,7 @@ class LockstepLoop:
         if lane.done:
             return
         if lane.tick <= self._slowest + self._window:
-            self._ask(lane, now_ns)
+            self._go_on(lane, now_ns)
         else:
             self._held.append(lane)
 
@@ -288,7 +209,7 @@ class LockstepLoop:
         if going:
             self._held = [lane for lane in self._held if lane.tick > latest]
             for lane in going:
-                self._ask(lane, now_ns)
+                self._go_on(lane, now_ns)
 
     def _pace(self) -> None:
         """Wait for the wall time of the slowest's tick; the buses are served meanwhile."""

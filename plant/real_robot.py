@@ -1,6 +1,6 @@
-"""A robot that the plant doesn't emulate: what the localisation system says of it is its truth.
+"""A real robot beside emulated ones: its pose from the localisation system is its truth.
 
-Its rows in the record have the pose that was said last, and no number for what nobody measures.
+Its rows in the record have its last pose, and NaN for everything that isn't measured.
 """
 
 from math import nan
@@ -13,8 +13,8 @@ from configs.signals import PLANT_SIGNALS
 _UNKNOWN = (nan,) * (len(PLANT_SIGNALS) - 4)
 
 
-class Witness:
-    """What is known of one real robot."""
+class RealRobot:
+    """The last pose of one real robot."""
 
     __slots__ = ("_pose", "refused", "robot")
 
@@ -23,8 +23,8 @@ class Witness:
         self.refused = 0
         self._pose = start.x_m, start.y_m, start.theta_rad
 
-    def take(self, fix: PoseFix | None) -> None:
-        """Take what the localisation system says; what is no pose of this world is counted."""
+    def take_pose(self, fix: PoseFix | None) -> None:
+        """Take a pose from the localisation system; one that is not of this world is counted."""
         if fix is None or not within_world(fix.x_m, fix.y_m, fix.theta_rad):
             self.refused += 1
             return

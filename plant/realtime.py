@@ -20,21 +20,22 @@ from bridge.network.messages import PoseFix, Progress
 from bridge.process import Stop
 from bridge.telemetry import RowBuffer, Tap
 from configs.brief import PlantBrief
-from plant.bus.live import WireLive, live_buses
+from plant.bus.build import build_buses, no_begin
+from plant.bus.sockets import SocketPort
 from plant.lockstep import REPORT_EVERY_NS, Counters
-from plant.robot import Unit
+from plant.robot import EmulatedRobot
 
 FAREWELL_S = 0.5
 """How long the plant stays for controllers that act after its last tick."""
 
 
 class RealtimeLoop:
-    """Runs all units of a plant by the wall clock."""
+    """Runs all robots of a plant by the wall clock."""
 
     def __init__(
         self,
         brief: PlantBrief,
-        units: Sequence[Unit],
+        robots: Sequence[EmulatedRobot],
         end: DrivePort,
         hub: Hub,
         poses: Sequence[Publisher],
@@ -48,14 +49,14 @@ class RealtimeLoop:
         self._zero_ns = brief.schedule.bus_time_ns(0)
         self._end = end
         self._report = report
-        self._buses = live_buses(brief, units, end, hub, taps)
-        often = any(
-            robot.drive.encoder_period_ns < brief.schedule.period_ns for robot in brief.robots
+        external = {robot.brief.bus for robot in robots}.difference(hub.names)
+        self._buses = build_buses(
+            brief, robots, lambda name, _: SocketPort(name, end, hub), no_begin, taps, external
         )
-        self._acting = [bus for bus in self._buses.values() if often or isinstance(bus, WireLive)]
+        self._acting = [bus for bus in self._buses.values() if bus.acts_between_ticks]
         """Buses on which something happens between two ticks."""
-        self._poses = dict(zip(units, poses, strict=True))
-        self._rows = dict(zip(units, rows, strict=True))
+        self._poses = dict(zip(robots, poses, strict=True))
+        self._rows = dict(zip(robots, rows, strict=True))
         self._tick = -brief.schedule.countdown_ticks
         self._epoch_ns = 0
         self._next_report_ns = 0
@@ -102,7 +103,7 @@ class RealtimeLoop:
             wait_s = min(wait_s, max(left_ns, 0) * 1e-9)
         self._end.serve(wait_s)
         for bus in self._end.pending():
-            self._buses[bus].hear(time.monotonic_ns() - power_up_ns)
+            self._buses[bus].react(time.monotonic_ns() - power_up_ns)
         for acting in self._acting:
             acting.advance(time.monotonic_ns() - power_up_ns)
 
@@ -113,13 +114,13 @@ class RealtimeLoop:
         if 0 <= tick < schedule.ticks:
             self._record_others(tick)
         for bus in self._buses.values():
-            bus.tick(bus_ns)
-            for unit in bus.units:
+            bus.move(bus_ns)
+            for robot in bus.robots:
                 if 0 <= tick < schedule.ticks:
-                    self._rows[unit].add(tick, unit.row(t_ns * 1e-9))
-            bus.speak(bus_ns)
+                    self._rows[robot].add(tick, robot.row(t_ns * 1e-9))
+            bus.send_due(bus_ns)
             if schedule.localises(tick):
-                for unit in bus.units:
-                    x, y, theta, *_ = unit.state
-                    self._poses[unit].put(PoseFix(tick, t_ns, x, y, theta).encode())
+                for robot in bus.robots:
+                    x, y, theta, *_ = robot.state
+                    self._poses[robot].put(PoseFix(tick, t_ns, x, y, theta).encode())
             self._serve(0.0, power_up_ns)

@@ -2,13 +2,13 @@
 
     bus frames ─► drive ─torque demand─► motor ─torque─► body ─wheel angle, speed─► encoder ─► drive
 
-A unit is told the time and never asks for it. A step of the integration holds the torques.
+A robot is told the time and never asks for it. A step of the integration holds the torques.
 Drives, motors and encoders are at the motor shaft, the body and what is recorded at the wheel:
 
     wheel torque = gear × shaft torque,  shaft angle = gear × wheel angle,  gear = sign × gear ratio
 
-    Unit        ideal motors and encoders: what a drive asks for acts at once, what it hears is true
-    RealUnit    motors, supply and encoders of `plant.powertrain`
+    EmulatedRobot     ideal motors and encoders: a drive's demand acts at once, its encoder is exact
+    RealisticRobot    motors, supply and encoders of `plant.powertrain`
 """
 
 from collections.abc import Iterable, Sequence
@@ -17,17 +17,17 @@ from bridge.drives import DRIVES, DriveNode
 from bridge.drives.feeling import Feeling
 from bridge.frame import Frame
 from configs.brief import PowertrainModel, RobotBrief, when
-from plant.body import Robot, State
+from plant.body import RigidBody, State
 from plant.divergence import Divergence
 from plant.encoder import PER_RADIAN
 from plant.integrate import rk4
 from plant.powertrain import powertrain
 
-FEEL_EVERY_S = 0.001
+MEASURE_EVERY_S = 0.001
 """How often a drive's firmware reads its thermistors and currents, at most."""
 
 
-class Unit:
+class EmulatedRobot:
     """One robot on its bus."""
 
     __slots__ = (
@@ -51,7 +51,7 @@ class Unit:
     def __init__(self, brief: RobotBrief) -> None:
         node = DRIVES[brief.drive.protocol].node
         self.brief = brief
-        self._body = Robot(brief.body, brief.disturbance)
+        self._body = RigidBody(brief.body, brief.disturbance)
         self._right = node(brief.drive, brief.right_node, brief.drive.serial_number)
         self._left = node(brief.drive, brief.left_node, brief.drive.serial_number + 1)
         self.drives: tuple[DriveNode, DriveNode] = (self._right, self._left)
@@ -161,15 +161,15 @@ class Unit:
         )
 
 
-class RealUnit(Unit):
+class RealisticRobot(EmulatedRobot):
     """One robot with real motors, supply and encoders."""
 
-    __slots__ = ("_felt_s", "_train")
+    __slots__ = ("_train", "_unmeasured_s")
 
     def __init__(self, brief: RobotBrief, model: PowertrainModel) -> None:
         super().__init__(brief)
         self._train = powertrain(model, self._shaft_inertia(brief.mounting.gear_ratio))
-        self._felt_s = 0.0
+        self._unmeasured_s = 0.0
 
     def _shaft_inertia(self, gear_ratio: float) -> float:
         """What a motor turns at least, seen at its shaft [kg·m²]."""
@@ -200,12 +200,12 @@ class RealUnit(Unit):
         self.state = state
         self._demand_right, self._demand_left = demands[0] * gear_r, demands[1] * gear_l
         self._torque_right, self._torque_left = torques
-        self._felt_s += period_s
-        if self._felt_s >= FEEL_EVERY_S:
-            self._felt_s = 0.0
-            self._feel()
+        self._unmeasured_s += period_s
+        if self._unmeasured_s >= MEASURE_EVERY_S:
+            self._unmeasured_s = 0.0
+            self._measure()
 
-    def _feel(self) -> None:
+    def _measure(self) -> None:
         """Tell both drives what they measure of their motors and of the supply."""
         train = self._train
         supply = train.supply
@@ -217,15 +217,19 @@ class RealUnit(Unit):
             drive.feel(Feeling(torque, current, motor.fet_C, motor.motor_C, supply.bus_V, amps))
 
 
-def unit_of(brief: RobotBrief) -> Unit:
+def emulated_robot(brief: RobotBrief) -> EmulatedRobot:
     """The emulation of a robot as its brief wants it."""
-    return Unit(brief) if brief.powertrain is None else RealUnit(brief, brief.powertrain)
+    return (
+        EmulatedRobot(brief)
+        if brief.powertrain is None
+        else RealisticRobot(brief, brief.powertrain)
+    )
 
 
-def diverged_robots(units: Iterable[Unit], period_ns: int) -> dict[str, str]:
+def diverged_robots(robots: Iterable[EmulatedRobot], period_ns: int) -> dict[str, str]:
     """Robots whose motion diverged: the tick that did it, and how."""
     return {
-        unit.brief.robot: f"{when(round(found.t_s * 1e9) // period_ns, period_ns)}: {found}"
-        for unit in units
-        if (found := unit.divergence) is not None
+        robot.brief.robot: f"{when(round(found.t_s * 1e9) // period_ns, period_ns)}: {found}"
+        for robot in robots
+        if (found := robot.divergence) is not None
     }

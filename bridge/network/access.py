@@ -148,7 +148,7 @@ def plan(
     leader: Sequence[str],
     *,
     buses: Sequence[str] = (),
-    witnessed: Collection[str] = (),
+    real_robots: Collection[str] = (),
     guests: Mapping[str, str] | None = None,
     bus_guests: Collection[str] = (),
     certified: bool = False,
@@ -157,8 +157,8 @@ def plan(
 ) -> AccessPlan:
     """The rights of a run from its graph: `hears[i]` are the robots that i hears, `leader` h_i.
 
-    What crosses the `buses` is recorded. Somebody else says the poses of the robots in `witnessed`:
-    they aren't emulated. `guests` are the passwords of identities on other machines (all others are
+    What crosses the `buses` is recorded. `real_robots` aren't emulated: their poses come from the
+    localisation system. `guests` are the passwords of identities on other machines (all others are
     given random ones), who must show a certificate with their identity as its common name if
     `certified`. Periods are of real time; with one, what comes much more often is dropped.
     """
@@ -177,17 +177,17 @@ def plan(
         )
     truths = [keys.truth(run, robot) for robot in robots]
     truths += [keys.traffic(run, bus) for bus in buses]
-    poses = [keys.pose(run, robot) for robot in robots if robot not in witnessed]
-    witnesses = [keys.pose(run, robot) for robot in robots if robot in witnessed]
+    poses = [keys.pose(run, robot) for robot in robots if robot not in real_robots]
+    real_poses = [keys.pose(run, robot) for robot in robots if robot in real_robots]
     rights[PLANT] = Rights(
         puts=(*poses, *truths, *_control(run, PLANT)),
-        hears=(keys.go(run), its_word, *witnesses),
+        hears=(keys.go(run), its_word, *real_poses),
         token=keys.live(run, PLANT),
         watches=launcher,
     )
-    if witnesses:
+    if real_poses:
         rights[LOCALISATION] = Rights(
-            puts=tuple(witnesses), hears=(keys.go(run),), token=keys.live(run, LOCALISATION)
+            puts=tuple(real_poses), hears=(keys.go(run),), token=keys.live(run, LOCALISATION)
         )
     rights[RECORDER] = Rights(
         puts=_control(run, RECORDER),

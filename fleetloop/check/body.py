@@ -5,12 +5,12 @@ from dataclasses import asdict
 from configs.brief import Body as BodyModel
 from configs.brief import Disturbance
 from configs.sections import Body
-from plant.body import Robot
+from plant.body import RigidBody
 
 
-def robot_body(body: Body) -> Robot:
+def robot_body(body: Body) -> RigidBody:
     """The rigid body of (2)-(4), undisturbed."""
-    return Robot(BodyModel(**asdict(body)), Disturbance(0.0, 0.0, 0.0))
+    return RigidBody(BodyModel(**asdict(body)), Disturbance(0.0, 0.0, 0.0))
 
 
 def inertias(body: Body) -> tuple[float, float]:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from agents.laws import LAWS, LawState, Sense
 from agents.paths import Reference
 from configs.brief import Gains, Wheels
-from plant.body import Robot, State
+from plant.body import RigidBody, State
 from plant.integrate import rk4
 
 Vector = NDArray[np.float64]
@@ -39,7 +39,7 @@ class Loop:
     law: str
     gains: Gains
     wheels: Wheels
-    body: Robot
+    body: RigidBody
     period_s: float
     torque_delay_s: float
     pose_every: int
@@ -50,7 +50,7 @@ class Loop:
     """Θ̂ that is held: the start values, or `true_theta`."""
 
 
-def true_theta(body: Robot, damping: tuple[float, float]) -> tuple[float, ...]:
+def true_theta(body: RigidBody, damping: tuple[float, float]) -> tuple[float, ...]:
     """Θ of (32): (c b, d̄_11, d̄_12, m̄_1, c/b, d̄_21, d̄_22, m̄_2)."""
     right, left = damping
     mean, half = 0.5 * (right + left), 0.5 * (right - left)
@@ -189,12 +189,12 @@ def _interval(loop: Loop, v_bar: float, omega_bar: float, s_dot: float, tick: in
     return np.array([(run(nudge) - run(-nudge)) / (2.0 * _NUDGE) for nudge in nudges]).T
 
 
-def _moved(body: Robot, state: State, torques: tuple[float, float], span_s: float) -> State:
+def _moved(body: RigidBody, state: State, torques: tuple[float, float], span_s: float) -> State:
     after = rk4(body, state, torques[0], torques[1], 0.0, span_s)
     return state if after is None else after
 
 
-def _steady_torques(body: Robot, v: float, omega: float) -> tuple[float, float]:
+def _steady_torques(body: RigidBody, v: float, omega: float) -> tuple[float, float]:
     """Torques that keep a speed and a turn rate: accelerations are affine in them."""
     a, w = body.accelerations(v, omega, 0.0, 0.0)
     push = -a * body.mbar_1 / body.r

@@ -1,4 +1,4 @@
-"""The reference: the same units, agents and codecs as in the processes, in one plain loop.
+"""The reference: the same buses, robots, agents and codecs as in the processes, in one plain loop.
 
 What the processes do with sockets and sessions happens here by calls, in the same order and through
 the same bytes, so a run over processes must leave the same record, bit for bit.
@@ -6,24 +6,21 @@ the same bytes, so a run over processes must leave the same record, bit for bit.
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from agents.agent import Agent
 from agents.bus_clock import BusClock
-from bridge.can_bus.packet import Submitted
+from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.frame import Frame
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix, Progress
 from bridge.process import Stop, settled_memory
 from bridge.telemetry import AGENT_ROW, PLANT_ROW, FrameBuffer, RowBuffer
 from configs.brief import AgentBrief, LeaderBrief, PlantBrief
 from fleetloop.record.writer import Source
-from plant.bus.build import Emulation, emulations
-from plant.bus.ideal import IdealBus
-from plant.bus.timed import WireBus
+from plant.bus.build import build_buses
 from plant.herald import Herald
-from plant.robot import Unit, diverged_robots, unit_of
+from plant.robot import EmulatedRobot, diverged_robots, emulated_robot
 
 PROGRESS_EVERY_TICKS = 256
 
@@ -41,120 +38,78 @@ class Keeper(Protocol):
         """Take what crossed a bus."""
 
 
-@dataclass(slots=True)
-class _Mind:
+class _Controller(NamedTuple):
     """A controller and its clock."""
 
     agent: Agent
     clock: BusClock
 
     @classmethod
-    def of(cls, agent: Agent) -> "_Mind":
+    def of(cls, agent: Agent) -> "_Controller":
         """A controller before its first tick."""
         return cls(agent, BusClock(agent.brief.schedule, agent.heard_since))
 
-
-class _Lane:
-    """One bus with the controllers of its robots."""
-
-    __slots__ = ("minds", "name")
-
-    def __init__(self, name: str, units: Sequence[Unit], minds: Mapping[str, _Mind]) -> None:
-        self.name = name
-        self.minds = {unit.brief.robot: minds[unit.brief.robot] for unit in units}
-
-    @property
-    def frames(self) -> int:
-        """How many frames crossed the bus."""
-        raise NotImplementedError
-
-    def tick(self) -> None:
-        """One tick of the bus."""
-        raise NotImplementedError
+    def react(self, received: Sequence[tuple[int, Frame]]) -> list[Frame]:
+        """The answer to frames with their bus times; to none at all: a tick has passed."""
+        agent, clock = self
+        said: list[Frame] = []
+        hear, due = agent.hear, clock.due
+        for at_ns, (can_id, data) in received:
+            hear(can_id, data, at_ns)
+            tick = due(at_ns)
+            if tick is not None:
+                said += agent.step(tick)
+        if not received:
+            said += agent.step(clock.passed())
+        return said
 
 
-class _IdealLane(_Lane):
-    """A bus on which frames take no time."""
+class _Controllers:
+    """The port of a bus whose clients are its robots' controllers, called when they are asked."""
 
-    __slots__ = ("_crossed", "_minds", "_steps")
+    __slots__ = ("_asked", "_controllers", "_frames", "_pending", "_stamp_ns")
 
-    def __init__(self, name: str, bus: IdealBus, minds: Mapping[str, _Mind]) -> None:
-        super().__init__(name, bus.units, minds)
-        self._steps = bus.steps()
-        self._minds = [(mind.agent, mind.clock) for mind in self.minds.values()]
-        self._crossed = 0
+    def __init__(self, controllers: Mapping[str, _Controller]) -> None:
+        self._controllers = controllers
+        self._stamp_ns = 0
+        self._frames: Sequence[Frame] = ()
+        self._pending: dict[str, list[tuple[int, Frame]]] = {robot: [] for robot in controllers}
+        self._asked = ""
 
-    @property
-    def frames(self) -> int:
-        return self._crossed
+    def deliver(self, stamp_ns: int, frames: Sequence[Frame]) -> None:
+        self._stamp_ns, self._frames = stamp_ns, frames
 
-    def tick(self) -> None:
-        steps = self._steps
-        ask = next(steps)
-        while ask is not None:
-            stamp_ns, frames, *_ = ask
-            answers: list[Frame] = []
-            for agent, clock in self._minds:
-                hear = agent.hear
-                tick = None
-                for can_id, data in frames:
-                    hear(can_id, data, stamp_ns)
-                    if tick is None:
-                        tick = clock.due(stamp_ns)
-                        if tick is not None:
-                            answers += agent.step(tick)
-                if not frames:
-                    answers += agent.step(clock.passed())
-            self._crossed += len(frames) + len(answers)
-            ask = steps.send(answers)
+    def receive(self) -> list[Frame]:
+        stamp_ns, frames = self._stamp_ns, self._frames
+        answers: list[Frame] = []
+        for agent, clock in self._controllers.values():
+            hear = agent.hear
+            tick = None
+            for can_id, data in frames:
+                hear(can_id, data, stamp_ns)
+                if tick is None:
+                    tick = clock.due(stamp_ns)
+                    if tick is not None:
+                        answers += agent.step(tick)
+            if not frames:
+                answers += agent.step(clock.passed())
+        return answers
 
+    def forward(self, stamp_ns: int, ended: Sequence[Transmitted], asked: str | None) -> None:  # noqa: ARG002
+        for robot, pending in self._pending.items():
+            pending += [p.as_heard_by(robot) for p in ended if p.heard_by(robot)]
+        self._asked = asked or ""
 
-class _WireLane(_Lane):
-    """A bus with bit timing."""
+    def submitted(self) -> list[Submitted]:
+        robot = self._asked
+        received, self._pending[robot] = self._pending[robot], []
+        return [Submitted(robot, frame) for frame in self._controllers[robot].react(received)]
 
-    __slots__ = ("_pending", "_steps", "_wire")
+    def departed(self) -> Sequence[Key]:
+        return ()
 
-    def __init__(self, name: str, bus: WireBus, minds: Mapping[str, _Mind]) -> None:
-        super().__init__(name, bus.units, minds)
-        self._wire = bus
-        self._steps = bus.steps()
-        self._pending: dict[str, list[tuple[int, Frame]]] = {robot: [] for robot in self.minds}
-
-    @property
-    def frames(self) -> int:
-        return self._wire.crossed
-
-    def tick(self) -> None:
-        steps, pending = self._steps, self._pending
-        ask = next(steps)
-        while ask is not None:
-            for robot, heard in pending.items():
-                heard += [p.as_heard_by(robot) for p in ask.transmitted if p.heard_by(robot)]
-            robot = ask.asked
-            heard, pending[robot] = pending[robot], []
-            said = _think(self.minds[robot], heard)
-            ask = steps.send([Submitted(robot, frame) for frame in said[: self._wire.room(robot)]])
-
-
-def _lane(name: str, bus: Emulation, minds: Mapping[str, _Mind]) -> _Lane:
-    if isinstance(bus, WireBus):
-        return _WireLane(name, bus, minds)
-    return _IdealLane(name, bus, minds)
-
-
-def _think(mind: _Mind, heard: Sequence[tuple[int, Frame]]) -> list[Frame]:
-    """What a controller says to frames that it hears; to none at all: a tick has passed."""
-    agent, clock = mind.agent, mind.clock
-    said: list[Frame] = []
-    hear, due = agent.hear, clock.due
-    for at_ns, (can_id, data) in heard:
-        hear(can_id, data, at_ns)
-        tick = due(at_ns)
-        if tick is not None:
-            said += agent.step(tick)
-    if not heard:
-        said += agent.step(clock.passed())
-    return said
+    def return_credit(self, key: Key, count: int) -> None:
+        """Nobody counts: a controller sends less in a tick than a queue holds."""
 
 
 class InProcessRun:
@@ -170,10 +125,10 @@ class InProcessRun:
         on_notice: Callable[[str, str], None] = lambda *_: None,
     ) -> None:
         self._schedule = plant.schedule
-        self._units = [unit_of(robot) for robot in plant.robots]
+        self._robots = [emulated_robot(brief) for brief in plant.robots]
         self._truths = [
-            RowBuffer(PLANT_ROW, partial(_write, writer, unit.brief.robot, "plant"))
-            for unit in self._units
+            RowBuffer(PLANT_ROW, partial(_write, writer, robot.brief.robot, "plant"))
+            for robot in self._robots
         ]
         self._telemetry = [
             RowBuffer(AGENT_ROW, partial(_write, writer, brief.robot, "controller"))
@@ -190,20 +145,24 @@ class InProcessRun:
             agent.guard.announce = partial(on_notice, agent.brief.robot)
         period_ns = plant.schedule.period_ns
         self._herald = Herald(
-            lambda: diverged_robots(self._units, period_ns), partial(on_notice, "plant")
+            lambda: diverged_robots(self._robots, period_ns), partial(on_notice, "plant")
         )
         self._on_progress = on_progress
-        ends = dict(zip(self._units, zip(self._agents, self._truths, strict=True), strict=True))
+        ends = dict(zip(self._robots, zip(self._agents, self._truths, strict=True), strict=True))
 
-        def begin(group: Sequence[Unit]) -> Callable[[int], None]:
-            return partial(self._begin, [(unit, *ends[unit]) for unit in group])
+        def begin(group: Sequence[EmulatedRobot]) -> Callable[[int], None]:
+            return partial(self._begin, [(robot, *ends[robot]) for robot in group])
 
-        minds = {agent.brief.robot: _Mind.of(agent) for agent in self._agents}
-        names = dict.fromkeys(unit.brief.bus for unit in self._units) if plant.traffic else {}
+        controllers = {agent.brief.robot: _Controller.of(agent) for agent in self._agents}
+
+        def port(_: str, group: Sequence[EmulatedRobot]) -> _Controllers:
+            return _Controllers({r.brief.robot: controllers[r.brief.robot] for r in group})
+
+        names = dict.fromkeys(robot.brief.bus for robot in self._robots) if plant.traffic else {}
         self._logs = {bus: FrameBuffer(partial(_write_traffic, writer, bus)) for bus in names}
         taps = {bus: log.add for bus, log in self._logs.items()}
-        buses = emulations(plant, self._units, begin, taps)
-        self._lanes = [_lane(name, bus, minds) for name, bus in buses.items()]
+        self._buses = build_buses(plant, self._robots, port, begin, taps)
+        self._steps = [bus.steps() for bus in self._buses.values()]
         for agent in self._agents:
             if agent.brief.hears_leader:
                 agent.take_leader(LeaderSpeed(leader.speed_steps))
@@ -213,7 +172,7 @@ class InProcessRun:
     @property
     def frames(self) -> dict[str, int]:
         """Frames that would have crossed each bus."""
-        return {lane.name: lane.frames for lane in self._lanes}
+        return {name: bus.crossed for name, bus in self._buses.items()}
 
     @property
     def stopped_robots(self) -> dict[str, str]:
@@ -223,7 +182,7 @@ class InProcessRun:
             for agent in self._agents
             if agent.guard.stopped_because
         }
-        return stopped | diverged_robots(self._units, self._schedule.period_ns)
+        return stopped | diverged_robots(self._robots, self._schedule.period_ns)
 
     @property
     def notices(self) -> dict[str, list[str]]:
@@ -234,8 +193,8 @@ class InProcessRun:
     def run(self, stop: Stop) -> None:
         """Run from the first tick of the countdown to the closing tick, or until told to stop."""
         self._exchange_paths(-1)
-        for unit, agent in zip(self._units, self._agents, strict=True):
-            _localise(unit, agent, -1, 0)
+        for robot, agent in zip(self._robots, self._agents, strict=True):
+            _localise(robot, agent, -1, 0)
         with settled_memory():
             self._run(stop)
         for rows in (*self._truths, *self._telemetry):
@@ -263,18 +222,19 @@ class InProcessRun:
         """One tick of all buses, one after the other: within a tick they don't meet."""
         if self._schedule.shares(tick):
             self._exchange_paths(tick)
-        for lane in self._lanes:
-            lane.tick()
+        for steps in self._steps:
+            while next(steps) is not None:
+                pass
 
-    def _begin(self, group: Sequence[tuple[Unit, Agent, RowBuffer]], tick: int) -> None:
+    def _begin(self, group: Sequence[tuple[EmulatedRobot, Agent, RowBuffer]], tick: int) -> None:
         """As a plant's process does when a tick begins on a bus."""
         schedule = self._schedule
         t_ns = tick * schedule.period_ns
-        for unit, agent, truth in group:
+        for robot, agent, truth in group:
             if 0 <= tick < schedule.ticks:
-                truth.add(tick, unit.row(t_ns * 1e-9))
+                truth.add(tick, robot.row(t_ns * 1e-9))
             if schedule.localises(tick):
-                _localise(unit, agent, tick, t_ns)
+                _localise(robot, agent, tick, t_ns)
 
     def _exchange_paths(self, tick: int) -> None:
         for agent in self._agents:
@@ -285,8 +245,8 @@ class InProcessRun:
                     hearer.take_path(robot, state)
 
 
-def _localise(unit: Unit, agent: Agent, tick: int, t_ns: int) -> None:
-    x, y, theta, *_ = unit.state
+def _localise(robot: EmulatedRobot, agent: Agent, tick: int, t_ns: int) -> None:
+    x, y, theta, *_ = robot.state
     fix = PoseFix.decode(PoseFix(tick, t_ns, x, y, theta).encode())
     if fix is not None:
         agent.take_pose(fix)

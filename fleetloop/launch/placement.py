@@ -18,8 +18,8 @@ def robots_of_plant(brief: PlantBrief, deployment: Deployment) -> PlantBrief:
         for r in emulated
         if not deployment.is_ours(r.robot)
     )
-    witnessed = tuple((r.robot, r.pose) for r in brief.robots if r not in emulated)
-    return replace(brief, robots=emulated, attached=attached, witnessed=witnessed)
+    real_robots = tuple((r.robot, r.pose) for r in brief.robots if r not in emulated)
+    return replace(brief, robots=emulated, attached=attached, real_robots=real_robots)
 
 
 def agent_bus(
@@ -116,7 +116,7 @@ def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.
         graph.hears,
         graph.leader,
         buses=scenario.buses,
-        witnessed=[robot for robot in scenario.names if not deployment.emulates(robot)],
+        real_robots=[robot for robot in scenario.names if not deployment.emulates(robot)],
         guests=guests(scenario, deployment),
         bus_guests=tuple(bus_guests(deployment)),
         certified=network is not None and network.tls is not None,

@@ -40,7 +40,7 @@ from fleetloop.terminal import note, say
 from plant.__main__ import PLANT_PRIORITY, join
 from plant.__main__ import run as plant_of_a_run
 from plant.realtime import RealtimeLoop
-from plant.robot import Unit, diverged_robots, unit_of
+from plant.robot import EmulatedRobot, diverged_robots, emulated_robot
 
 FOREVER_TICKS = 1 << 53
 GO_AHEAD_NS = 1_000_000
@@ -72,14 +72,14 @@ class _Nowhere:
 class _Watch:
     """Says which robot's motion diverged, as soon as it is seen."""
 
-    def __init__(self, units: Sequence[Unit], period_ns: int) -> None:
-        self._units = units
+    def __init__(self, robots: Sequence[EmulatedRobot], period_ns: int) -> None:
+        self._robots = robots
         self._period_ns = period_ns
         self._told: set[str] = set()
 
     def look(self, _: Progress | None = None) -> None:
         """Say what is new."""
-        for robot, why in diverged_robots(self._units, self._period_ns).items():
+        for robot, why in diverged_robots(self._robots, self._period_ns).items():
             if robot not in self._told:
                 self._told.add(robot)
                 note(f"STOPPED {robot}: {why}; its drives are disarmed for good")
@@ -177,14 +177,14 @@ def _run(
     options: Options,
     stop: Stop,
 ) -> None:
-    units = [unit_of(robot) for robot in brief.robots]
+    robots = [emulated_robot(robot) for robot in brief.robots]
     nowhere = _Nowhere()
-    watch = _Watch(units, brief.schedule.period_ns)
-    rows = [RowBuffer(PLANT_ROW, lambda *_: None) for _ in units]
-    loop = RealtimeLoop(brief, units, end, hub, [nowhere] * len(units), rows, watch.look, {})
+    watch = _Watch(robots, brief.schedule.period_ns)
+    rows = [RowBuffer(PLANT_ROW, lambda *_: None) for _ in robots]
+    loop = RealtimeLoop(brief, robots, end, hub, [nowhere] * len(robots), rows, watch.look, {})
     refused = go_realtime(PLANT_PRIORITY)
     if options.serve_stdin:
-        threading.Thread(target=_serve_stdin, args=(units, loop, stop), daemon=True).start()
+        threading.Thread(target=_serve_stdin, args=(robots, loop, stop), daemon=True).start()
     _say_ready(brief, buses, as_json=options.as_json)
     with settled_memory():
         loop.run(time.monotonic_ns() + GO_AHEAD_NS, stop)
@@ -214,22 +214,22 @@ def _say_ready(brief: PlantBrief, buses: dict[str, Settings], *, as_json: bool) 
     note("drives and physics in real time; Ctrl-C ends")
 
 
-def _serve_stdin(units: Sequence[Unit], loop: RealtimeLoop, stop: Stop) -> None:
+def _serve_stdin(robots: Sequence[EmulatedRobot], loop: RealtimeLoop, stop: Stop) -> None:
     """Answer requests until standard input ends, and the plant with it."""
     for line in sys.stdin:
         match line.strip():
             case "poses":
-                say(json.dumps(_poses(units, loop)))
+                say(json.dumps(_poses(robots, loop)))
             case other:
                 say(json.dumps({"error": f"{other[:40]!r}: no such request; known: poses"}))
     stop.request("standard input has ended")
 
 
-def _poses(units: Sequence[Unit], loop: RealtimeLoop) -> dict[str, Any]:
-    robots = {}
-    for unit in units:
-        state, row = unit.state, dict(zip(_ROW_NAMES, unit.row(0.0), strict=True))
-        robots[unit.brief.robot] = {
+def _poses(robots: Sequence[EmulatedRobot], loop: RealtimeLoop) -> dict[str, Any]:
+    poses = {}
+    for robot in robots:
+        state, row = robot.state, dict(zip(_ROW_NAMES, robot.row(0.0), strict=True))
+        poses[robot.brief.robot] = {
             "x_m": state.x,
             "y_m": state.y,
             "theta_rad": state.theta,
@@ -238,4 +238,4 @@ def _poses(units: Sequence[Unit], loop: RealtimeLoop) -> dict[str, Any]:
             "torque_right_wheel_N_m": row["motor_right_wheel_N_m"],
             "torque_left_wheel_N_m": row["motor_left_wheel_N_m"],
         }
-    return {"t_s": loop.progress().t_ns * 1e-9, "robots": robots}
+    return {"t_s": loop.progress().t_ns * 1e-9, "robots": poses}

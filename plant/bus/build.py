@@ -1,52 +1,74 @@
-"""The buses of a plant in lockstep, as its brief wants them: ideal, or with a wire."""
+"""The buses of a plant, as its brief wants them: ideal, or with bit timing."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from random import Random
 
 from bridge.telemetry import Tap, no_tap
 from configs.brief import PlantBrief
-from plant.bus.ideal import Begin, IdealBus
-from plant.bus.timed import WireBus
-from plant.robot import Unit
+from plant.bus.ideal import IdealBus
+from plant.bus.port import Begin, Bus, Port
+from plant.bus.timed import TimedBus
+from plant.robot import EmulatedRobot
 
-Emulation = IdealBus | WireBus
+Ports = Callable[[str, Sequence[EmulatedRobot]], Port]
+"""The port of a bus, by its name and the robots on it."""
+Begins = Callable[[Sequence[EmulatedRobot]], Begin]
+"""What is told each tick, for the robots of a bus."""
 
 
-def emulations(
+def no_begin(_: Sequence[EmulatedRobot]) -> Begin:
+    """Nothing is told of ticks: in real time the loop knows them."""
+    return lambda _: None
+
+
+def build_buses(
     brief: PlantBrief,
-    units: Sequence[Unit],
-    begin: Callable[[Sequence[Unit]], Begin],
+    robots: Sequence[EmulatedRobot],
+    ports: Ports,
+    begins: Begins,
     taps: Mapping[str, Tap],
-) -> dict[str, Emulation]:
+    external: Container[str] = (),
+) -> dict[str, Bus]:
     """All buses by name, with the robots on them in the order of the scenario.
 
-    `begin` makes what is told each tick from the robots of a bus; `taps` hear what crosses it.
+    `taps` are given all frames of a bus. `external` buses have no bit timing of ours.
     """
-    by_bus: dict[str, list[Unit]] = {}
-    for unit in units:
-        by_bus.setdefault(unit.brief.bus, []).append(unit)
-    return {
-        bus: _emulation(brief, bus, group, begin(group), taps.get(bus, no_tap))
-        for bus, group in by_bus.items()
-    }
+    by_bus: dict[str, list[EmulatedRobot]] = {}
+    for robot in robots:
+        by_bus.setdefault(robot.brief.bus, []).append(robot)
+    buses: dict[str, Bus] = {}
+    for name, group in by_bus.items():
+        port, begin, tap = ports(name, group), begins(group), taps.get(name, no_tap)
+        if brief.wire is None or name in external:
+            buses[name] = IdealBus(group, brief.schedule, brief.substeps, port, begin, tap)
+        else:
+            buses[name] = timed_bus(brief, name, group, port, begin, tap)
+    return buses
 
 
-def wire_bus(brief: PlantBrief, bus: str, units: Sequence[Unit], begin: Begin, tap: Tap) -> WireBus:
+def timed_bus(
+    brief: PlantBrief,
+    name: str,
+    robots: Sequence[EmulatedRobot],
+    port: Port,
+    begin: Begin,
+    tap: Tap,
+) -> TimedBus:
     """A bus with the bit timing that the brief wants.
 
     Raises:
         ValueError: it wants none.
     """
     if brief.wire is None:
-        raise ValueError(f"bus {bus} is ideal")
-    step_ns = brief.schedule.period_ns // brief.substeps
-    random = Random(f"{brief.seed}/{bus}/firmware")
-    return WireBus(units, brief.schedule, brief.wire, step_ns, begin, tap, random)
-
-
-def _emulation(
-    brief: PlantBrief, bus: str, units: Sequence[Unit], begin: Begin, tap: Tap
-) -> Emulation:
-    if brief.wire is None:
-        return IdealBus(units, brief.schedule, brief.substeps, begin, tap)
-    return wire_bus(brief, bus, units, begin, tap)
+        raise ValueError(f"bus {name} is ideal")
+    random = Random(f"{brief.seed}/{name}/firmware")
+    return TimedBus(
+        robots,
+        brief.schedule,
+        brief.wire,
+        brief.substeps,
+        port=port,
+        begin=begin,
+        tap=tap,
+        random=random,
+    )

@@ -1,96 +1,138 @@
-"""One bus in lockstep, step by step: its robots' drives and bodies, and whom it waits for.
+"""A bus on which frames take no time.
 
-A bus is a generator over its ticks. At each it yields the questions that its controllers have to
-answer (an `Ask`), is sent what the clients of the bus had to say, and yields None when the tick is
-over. Who drives it, over sockets or by calls, changes nothing of what happens.
-
-    IdealBus    frames take no time: the drives' frames of an instant are the question, the answer
-                reaches them at the same instant; replies go out at once and are a question again,
-                until `MOST_A_TICK` frames were heard: the rest waits for the next tick, so that
-                nobody who never stops asking can stop time
+lockstep    the drives' frames of an instant are the question, the answer reaches the drives at
+            the same instant; replies go out at once and are a question again, until
+            `MOST_A_TICK` frames came from clients: the rest waits for the next tick, so that a
+            client that never stops asking can't stop time
+real time   a set-point for both wheels is answered at once by their encoder frames; what is
+            cyclic goes out with the ticks, or in its own time where encoder frames are more
+            frequent. An external bus (another python-can interface) is one of these as well
 """
 
-from collections.abc import Callable, Generator, Sequence
-from typing import NamedTuple, TypeVar
+from collections.abc import Sequence
 
-from bridge.can_bus.packet import Key, Transmitted
 from bridge.frame import Frame
 from bridge.telemetry import FROM_DRIVE, Tap
 from configs.brief import Schedule
-from plant.robot import Unit
+from plant.bus.port import ALL, Begin, Port, Steps
+from plant.robot import EmulatedRobot
 
-
-class Ask(NamedTuple):
-    """What the clients of a bus hear, and who has to answer it."""
-
-    stamp_ns: int
-    frames: Sequence[Frame]  # on an ideal bus: all of this instant
-    transmitted: Sequence[Transmitted] = ()  # on a bus with bit timing
-    asked: str = ""  # a robot; "": all of the bus
-    freed: Sequence[tuple[Key, int]] = ()  # frames that left the transmit queues of clients
-
-
-_new = tuple.__new__  # of a question, past its constructor: this is the hot path
 MOST_A_TICK = 1024
-_Answer = TypeVar("_Answer")
-Steps = Generator[Ask | None, Sequence[_Answer], None]
-Begin = Callable[[int], None]
-"""Told each tick as it begins, bodies being where they are at that instant."""
 
 
 class IdealBus:
     """The robots of one bus on which frames take no time."""
 
     def __init__(
-        self, units: Sequence[Unit], schedule: Schedule, substeps: int, begin: Begin, tap: Tap
+        self,
+        robots: Sequence[EmulatedRobot],
+        schedule: Schedule,
+        substeps: int,
+        port: Port,
+        begin: Begin,
+        tap: Tap,
     ) -> None:
-        self.units = units
+        self.robots = robots
+        self.crossed = 0
         self._tap = tap
+        self._port = port
         self._schedule = schedule
         self._substeps = substeps
+        self._zero_ns = schedule.bus_time_ns(0)
+        self._step_ns = schedule.period_ns // substeps
         self._begin = begin
+        self._drives = [drive for robot in robots for drive in robot.drives]
+        self.acts_between_ticks = any(
+            robot.brief.drive.encoder_period_ns < schedule.period_ns for robot in robots
+        )
 
-    def steps(self) -> Steps[Frame]:
+    # --- lockstep --------------------------------------------------------------------------------
+
+    def steps(self) -> Steps:
         """The ticks from the first of the countdown to the closing one."""
         schedule, begin, substeps = self._schedule, self._begin, self._substeps
-        tap = self._tap
+        tap, deliver, receive = self._tap, self._port.deliver, self._port.receive
         period_s, period_ns, last = schedule.period_s, schedule.period_ns, schedule.ticks
-        units = self.units
-        (unit,) = units if len(units) == 1 else (None,)
-        late: list[Frame] = []  # replies that nobody was told in their own tick
+        robots = self.robots
+        (single,) = robots if len(robots) == 1 else (None,)
+        late: list[Frame] = []  # replies that wait for the next tick
         for tick in range(-schedule.countdown_ticks, last + 1):
             bus_ns = schedule.bus_time_ns(tick)
             begin(tick)
-            if unit is not None:
-                frames = unit.frames_due(bus_ns)
+            if single is not None:
+                frames = single.frames_due(bus_ns)
             else:
-                frames = sorted(frame for u in units for frame in u.frames_due(bus_ns))
+                frames = sorted(frame for robot in robots for frame in robot.frames_due(bus_ns))
             tap(bus_ns, frames, FROM_DRIVE)
             if late:
                 frames, late = [*frames, *late], []
-            answers = yield _new(Ask, (bus_ns, frames, (), "", ()))
-            heard = 0
+            deliver(bus_ns, frames)
+            yield ALL
+            answers = receive()
+            count = 0
+            self.crossed += len(frames) + len(answers)
             while answers:
-                heard += len(answers)
+                count += len(answers)
                 tap(bus_ns, answers, 0)
-                replies = self._hear(answers, bus_ns)
+                replies = self._react(answers, bus_ns)
                 if not replies:
                     break
                 tap(bus_ns, replies, FROM_DRIVE)
-                if heard >= MOST_A_TICK:
+                if count >= MOST_A_TICK:
                     late = replies
                     break
-                answers = yield Ask(bus_ns, replies)
+                deliver(bus_ns, replies)
+                yield ALL
+                answers = receive()
+                self.crossed += len(replies) + len(answers)
             if 0 <= tick < last:
                 t_s = tick * period_ns * 1e-9
-                for u in units:
-                    u.advance(t_s, period_s, substeps)
+                for robot in robots:
+                    robot.advance(t_s, period_s, substeps)
             yield None
 
-    def _hear(self, frames: Sequence[Frame], bus_ns: int) -> list[Frame]:
+    # --- real time -------------------------------------------------------------------------------
+
+    def next_ns(self) -> int:
+        """The next bus time at which a drive has something to send."""
+        return min(drive.next_due_ns for drive in self._drives)
+
+    def react(self, now_ns: int) -> None:
+        """Take what clients sent, and answer."""
+        self.move(now_ns)
+        received = self._port.receive()
+        self._tap(now_ns, received, 0)
+        replies = self._react(received, now_ns)
+        for robot in self.robots:
+            replies += robot.feedback(now_ns)
+        self.crossed += len(received)
+        self._send(now_ns, replies)
+
+    def advance(self, now_ns: int) -> None:
+        """Let drives send what is due; bodies move when they are looked at."""
+        if self.next_ns() <= now_ns:
+            self.move(now_ns)
+            self.send_due(now_ns)
+
+    def move(self, bus_ns: int) -> None:
+        """Move the bodies to a bus time."""
+        for robot in self.robots:
+            robot.move(bus_ns, self._zero_ns, self._step_ns)
+
+    def send_due(self, bus_ns: int) -> None:
+        """Let the drives send what is due at a tick."""
+        self._send(bus_ns, [frame for robot in self.robots for frame in robot.frames_due(bus_ns)])
+
+    def _send(self, bus_ns: int, frames: Sequence[Frame]) -> None:
+        if frames:
+            self.crossed += len(frames)
+            self._tap(bus_ns, frames, FROM_DRIVE)
+            self._port.deliver(bus_ns, frames)
+
+    def _react(self, frames: Sequence[Frame], bus_ns: int) -> list[Frame]:
         replies: list[Frame] = []
-        for unit in self.units:
-            hear = unit.hear
+        for robot in self.robots:
+            hear = robot.hear
             for frame in frames:
                 if replied := hear(frame, bus_ns):
                     replies += replied

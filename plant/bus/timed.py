@@ -1,4 +1,4 @@
-"""One bus with bit timing in lockstep: what is said takes its time, and acts when it arrives.
+"""A bus with bit timing: a frame takes its bits, and acts when it arrives.
 
     event                       at                       what happens
     a drive has something due   its own time             its frames go to its mailboxes
@@ -6,15 +6,16 @@
                                                          to the drives' firmware
     a frame is destroyed        by the wire              all clients hear an error frame
     firmware looks at it        a latency after its end  the drive acts; replies go to its mailboxes
-    a robot's drives are done   with their last frame    its controller is asked; what it says goes
-    saying the tick                                      to its transmit queue then
-    the tick is over            start of the next one    who was not asked yet hears what there is,
-                                                         and that the tick passed
+    a robot's drives have sent  with their last frame    its controller is asked; its answer goes to
+    all of the tick                                      its transmit queue then
+    the tick is over            start of the next one    controllers that were not asked yet hear
+                                                         what there is, and that the tick passed
 
-A client joins the wire with the first frame that it sends: who only listens is no node, and changes
-nothing. An error frame from a client is an error flag on order (`wire`). Bodies move from event to
-event. What finds no free mailbox waits for one, the newest of its identifier; what finds no room in
-a client's transmit queue is refused and counted.
+The last two are lockstep's; in real time nobody is asked. A client joins the wire with the first
+frame that it sends: one that only listens is no node, and changes nothing. An error frame from a
+client is an error flag on order (`wire`). Bodies move from event to event. A drive's frame that
+finds no free mailbox waits for one, the newest of its identifier; a client's that finds no place in
+its transmit queue is refused and counted.
 """
 
 from collections.abc import Sequence
@@ -31,8 +32,8 @@ from bridge.wire.node import Delivered, ErrorFrame, Node, StateChanged
 from bridge.wire.queues import Fifo, Mailboxes
 from bridge.wire.wire import Wire
 from configs.brief import Schedule, WireModel
-from plant.bus.ideal import Ask, Begin, Steps
-from plant.robot import Unit
+from plant.bus.port import Begin, Port, Steps
+from plant.robot import EmulatedRobot
 
 _NEVER = 1 << 62
 
@@ -40,10 +41,10 @@ _NEVER = 1 << 62
 class _Drive:
     """A drive at its node of the wire."""
 
-    __slots__ = ("backlog", "drive", "due_ns", "looks_ns", "node", "unit")
+    __slots__ = ("backlog", "drive", "due_ns", "looks_ns", "node", "robot")
 
-    def __init__(self, unit: Unit, drive: DriveNode, node: Node) -> None:
-        self.unit = unit
+    def __init__(self, robot: EmulatedRobot, drive: DriveNode, node: Node) -> None:
+        self.robot = robot
         self.drive = drive
         self.node = node
         self.due_ns = 0
@@ -51,43 +52,47 @@ class _Drive:
         self.backlog: dict[int, Frame] = {}  # by identifier, waiting for a mailbox
 
 
-class WireBus:
+class TimedBus:
     """The robots of one bus, their drives, and the wire between these and all clients."""
 
     def __init__(
         self,
-        units: Sequence[Unit],
+        robots: Sequence[EmulatedRobot],
         schedule: Schedule,
         model: WireModel,
-        step_ns: int,
+        substeps: int,
+        *,
+        port: Port,
         begin: Begin,
         tap: Tap,
         random: Random,
     ) -> None:
         self._tap = tap
-        self.units = units
+        self._port = port
+        self.robots = robots
+        self.acts_between_ticks = True
         self.wire = Wire(model.bitrate_bit_s)
         self._model = model
         self._schedule = schedule
         self._zero_ns = schedule.bus_time_ns(0)
-        self._step_ns = step_ns
+        self._step_ns = schedule.period_ns // substeps
         self._begin = begin
         self._random = random
         self._drives = [
-            _Drive(unit, drive, self._drive_node(f"{unit.brief.robot} {side}"))
-            for unit in units
-            for side, drive in zip(("right", "left"), unit.drives, strict=True)
+            _Drive(robot, drive, self._drive_node(f"{robot.brief.robot} {side}"))
+            for robot in robots
+            for side, drive in zip(("right", "left"), robot.drives, strict=True)
         ]
         self._of_robot = {
-            unit.brief.robot: [drive for drive in self._drives if drive.unit is unit]
-            for unit in units
+            robot.brief.robot: [drive for drive in self._drives if drive.robot is robot]
+            for robot in robots
         }
         self._of_node = {drive.node: drive for drive in self._drives}
         self._hosts: dict[Key, Node] = {}
         self._key_of: dict[Node, Key] = {}
         self._states: dict[Node, NodeState] = {}
-        for unit in units:
-            self._host(unit.brief.robot)
+        for robot in robots:
+            self._host(robot.brief.robot)
         self._mail: list[tuple[int, int, _Drive, Frame]] = []
         self._number = 0
         self._now_ns = 0
@@ -100,34 +105,77 @@ class WireBus:
 
     # --- lockstep --------------------------------------------------------------------------------
 
-    def steps(self) -> Steps[Submitted]:
+    def steps(self) -> Steps:
         """The ticks from the first of the countdown to the closing one."""
         schedule = self._schedule
         for tick in range(-schedule.countdown_ticks, schedule.ticks + 1):
             start_ns = schedule.bus_time_ns(tick)
             end_ns = start_ns + schedule.period_ns
-            for unit in self.units:
-                unit.move(start_ns, self._zero_ns, self._step_ns)
+            self._move(start_ns)
             self._begin(tick)
-            waiting = [unit.brief.robot for unit in self.units]
+            waiting = [robot.brief.robot for robot in self.robots]
             self._step(start_ns)
             while waiting:
-                robot = self._run_to_question(end_ns, waiting)
-                if robot is None:
+                asked = self._run_to_question(end_ns, waiting)
+                if asked is None:
                     for starved in waiting:
                         if self._transmitted:
-                            self.take((yield self._ask(starved)))
-                        self.take((yield self._ask(starved)))
+                            yield self._ask(starved)
+                            self._take_answer()
+                        yield self._ask(starved)
+                        self._take_answer()
                     break
-                waiting.remove(robot)
-                self.take((yield self._ask(robot)))
+                waiting.remove(asked)
+                yield self._ask(asked)
+                self._take_answer()
             self._run(end_ns)
             yield None
 
-    def take(self, said: Sequence[Submitted]) -> None:
-        """What clients said goes to their transmit queues now."""
+    def _ask(self, robot: str) -> str:
+        """Put a question to the clients."""
+        self._return_credit()
+        transmitted, self._transmitted = self._transmitted, []
+        self._port.forward(self._now_ns, transmitted, robot)
+        return robot
+
+    def _take_answer(self) -> None:
+        for key in self._port.departed():
+            self._detach(key)
+        self.submit(self._port.submitted())
+
+    # --- real time -------------------------------------------------------------------------------
+
+    def next_ns(self) -> int:
+        """The next bus time at which a frame ends or a drive acts."""
+        return self._next_ns()
+
+    def react(self, now_ns: int) -> None:
+        """Take what clients want to send."""
+        self.advance(now_ns)
+        self._take_answer()
+
+    def advance(self, now_ns: int) -> None:
+        """Let everything happen through this instant, or through the last one if that is later."""
+        self._run(max(now_ns, self._now_ns) + 1)
+        self._move(self._now_ns)
+        self._return_credit()
+        transmitted, self._transmitted = self._transmitted, []
+        if transmitted:
+            self._port.forward(self._now_ns, transmitted, None)
+
+    def move(self, bus_ns: int) -> None:
+        """Move the bodies to a tick, and everything on the wire with them."""
+        self.advance(bus_ns)
+
+    def send_due(self, bus_ns: int) -> None:
+        """The drives send what is due when it is due."""
+
+    # --- both ------------------------------------------------------------------------------------
+
+    def submit(self, submitted: Sequence[Submitted]) -> None:
+        """Put frames of clients into their transmit queues now."""
         refused: dict[Key, int] = {}
-        for key, frame in said:
+        for key, frame in submitted:
             node = self._hosts.get(key) or self._host(key)
             if not self.wire.submit(node, frame, self._now_ns):
                 refused[key] = refused.get(key, 0) + 1
@@ -135,36 +183,21 @@ class WireBus:
             self.refused += sum(refused.values())
             self._freed += refused.items()
 
-    def depart(self, key: Key) -> None:
+    def _detach(self, key: Key) -> None:
         """A client has left."""
         node = self._hosts.pop(key, None)
         if node is not None:
             del self._key_of[node]
             self.wire.detach(node)
 
-    def room(self, robot: str) -> int:
-        """How many frames its controller's transmit queue takes now."""
-        return self._model.txqueuelen - self.wire.queued(self._hosts[robot])
-
-    # --- real time -------------------------------------------------------------------------------
-
-    def advance(self, now_ns: int) -> Ask:
-        """All that happened through this instant, or the last one if that is later; asks nobody."""
-        self._run(max(now_ns, self._now_ns) + 1)
-        for unit in self.units:
-            unit.move(self._now_ns, self._zero_ns, self._step_ns)
-        return self._ask("")
-
-    def next_ns(self) -> int:
-        """When the next thing happens."""
-        return self._next_ns()
-
-    # --- both ------------------------------------------------------------------------------------
-
-    def _ask(self, robot: str) -> Ask:
-        transmitted, self._transmitted = self._transmitted, []
+    def _return_credit(self) -> None:
         freed, self._freed = self._freed, []
-        return Ask(self._now_ns, (), transmitted, robot, freed)
+        for key, count in freed:
+            self._port.return_credit(key, count)
+
+    def _move(self, bus_ns: int) -> None:
+        for robot in self.robots:
+            robot.move(bus_ns, self._zero_ns, self._step_ns)
 
     def _run_to_question(self, end_ns: int, waiting: Sequence[str]) -> str | None:
         """Run until the drives of a robot have said the tick; None at its end."""
@@ -212,12 +245,12 @@ class WireBus:
                 self._note_state(event)
         while self._mail and self._mail[0][0] <= at_ns:
             _, _, drive, frame = heappop(self._mail)
-            drive.unit.move(at_ns, self._zero_ns, self._step_ns)
+            drive.robot.move(at_ns, self._zero_ns, self._step_ns)
             self._submit(drive, drive.drive.hear(frame, at_ns))
             drive.due_ns = drive.drive.next_due_ns
         for drive in self._drives:
             if drive.due_ns <= at_ns:
-                drive.unit.move(at_ns, self._zero_ns, self._step_ns)
+                drive.robot.move(at_ns, self._zero_ns, self._step_ns)
                 self._submit(drive, drive.drive.due(at_ns))
                 drive.due_ns = drive.drive.next_due_ns
 
@@ -241,7 +274,7 @@ class WireBus:
         concerned = [d for d in self._drives if d.drive.setpoint_id == can_id] or self._drives
         for target in concerned:
             if target.node in event.heard_by:
-                soonest_ns, latest_ns = target.unit.brief.drive.command_latency_ns
+                soonest_ns, latest_ns = target.robot.brief.drive.command_latency_ns
                 latency_ns = soonest_ns
                 if latest_ns > soonest_ns:
                     latency_ns = self._random.randint(soonest_ns, latest_ns)

@@ -10,7 +10,7 @@ from configs.brief import NetworkLink, WorldOffset
 from configs.loading import load
 from configs.resolve import agent_brief, plant_brief, reference_path
 from configs.signals import LAW_SIGNALS
-from plant.body import Robot, State
+from plant.body import RigidBody, State
 from plant.integrate import rk4
 
 NOWHERE = NetworkLink("test", "", "", "")
@@ -22,7 +22,7 @@ NAMES = [signal.name for signal in LAW_SIGNALS]
 
 def drive(law, state: State, seconds: float, speed: float = 0.6):
     """Follow the paper's path at a constant ṡ; the last output."""
-    robot = Robot(plant_brief(PAPER, network=NOWHERE).robots[0].body, NO_DISTURBANCE)
+    robot = RigidBody(plant_brief(PAPER, network=NOWHERE).robots[0].body, NO_DISTURBANCE)
     path = robot_path(reference_path(PAPER.path), WorldOffset(0.0, 2.0))
     memory = output = None
     for k in range(int(seconds / H)):

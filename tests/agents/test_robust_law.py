@@ -11,7 +11,7 @@ from configs.brief import NetworkLink, WorldOffset
 from configs.loading import load
 from configs.resolve import agent_brief, plant_brief, reference_path
 from configs.signals import LAW_SIGNALS
-from plant.body import Robot, State
+from plant.body import RigidBody, State
 from plant.integrate import rk4
 
 NOWHERE = NetworkLink("test", "", "", "")
@@ -26,7 +26,7 @@ def final_errors(scenario, seed: int) -> tuple[float, float]:
     brief = agent_brief(scenario, "r1", network=NOWHERE, bus=())
     plant = plant_brief(scenario, network=NOWHERE).robots[0]
     law = LAWS[scenario.control.law](brief.gains, brief.wheels, scenario.clock.control_period_s)
-    robot = Robot(plant.body, plant.disturbance)
+    robot = RigidBody(plant.body, plant.disturbance)
     path = robot_path(reference_path(scenario.path), WorldOffset(0.0, 0.0))
     h = scenario.clock.control_period_s
     far, where = 3.0 * draw.random() ** 0.5, draw.uniform(-pi, pi)

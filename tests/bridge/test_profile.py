@@ -4,13 +4,13 @@ import time
 
 from bridge.profile import PARTS, Sampler
 from configs.brief import Body, Disturbance
-from plant.body import Robot, State
+from plant.body import RigidBody, State
 from plant.integrate import rk4
 
 
 def test_time_spent_in_the_plant_is_the_plants() -> None:
     body = Body(0.04, 0.1, 0.02, 2.3, 0.28, 0.01, 0.0056, 0.002, 0.02, 0.02, 1)
-    robot = Robot(body, Disturbance(0.0, 0.0, 0.0))
+    robot = RigidBody(body, Disturbance(0.0, 0.0, 0.0))
     state = State(0.0, 0.0, 0.0, 0.5, 0.1, 0.0, 0.0)
     sampler = Sampler()
     with sampler:

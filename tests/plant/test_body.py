@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from configs.brief import Body, Disturbance
-from plant.body import Robot, State
+from plant.body import RigidBody, State
 from plant.divergence import FARTHEST, FASTEST_WHEEL_RAD_S
 from plant.integrate import rk4
 
@@ -17,14 +17,16 @@ CALM = Disturbance(0.0, 0.5, 0.0)
 REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def run(robot: Robot, state: State, right: float, left: float, seconds: float, step=0.001) -> State:
+def run(
+    robot: RigidBody, state: State, right: float, left: float, seconds: float, step=0.001
+) -> State:
     for k in range(round(seconds / step)):
         state = rk4(robot, state, right, left, k * step, step)
     return state
 
 
 def test_derived_constants_are_those_of_the_paper_as_printed() -> None:
-    robot = Robot(ETSRO, CALM)
+    robot = RigidBody(ETSRO, CALM)
     mass, inertia = 2.58, 2.3 * 0.02**2 + 2 * 0.28 * 0.01 + 0.01 + 0.004
     m11 = 0.04**2 / 0.04 * (mass * 0.01 + inertia) + 0.0056
     m12 = 0.04**2 / 0.04 * (mass * 0.01 - inertia)
@@ -34,14 +36,14 @@ def test_derived_constants_are_those_of_the_paper_as_printed() -> None:
 
 
 def test_the_second_wheel_may_count_in_the_mass() -> None:
-    both = Robot(replace(ETSRO, wheels_in_mass=2), CALM)
+    both = RigidBody(replace(ETSRO, wheels_in_mass=2), CALM)
     extra = 0.04**2 / 4 * 0.28  # r² m_w / 4 in m11 and m12 each
-    assert both.mbar_1 - Robot(ETSRO, CALM).mbar_1 == pytest.approx(2 * extra)
+    assert both.mbar_1 - RigidBody(ETSRO, CALM).mbar_1 == pytest.approx(2 * extra)
 
 
 def test_equal_torques_from_rest_give_the_closed_form_of_a_first_order_lag() -> None:
     body = replace(ETSRO, com_offset_m=0.0)
-    robot = Robot(body, CALM)
+    robot = RigidBody(body, CALM)
     end = run(robot, REST, 0.05, 0.05, 2.0)
     rate = 0.02 / robot.mbar_1
     final = 0.04 * 0.05 / 0.02
@@ -52,7 +54,7 @@ def test_equal_torques_from_rest_give_the_closed_form_of_a_first_order_lag() -> 
 
 
 def test_opposite_torques_turn_on_the_spot_with_the_centre_of_mass_on_the_axle() -> None:
-    robot = Robot(replace(ETSRO, com_offset_m=0.0), CALM)
+    robot = RigidBody(replace(ETSRO, com_offset_m=0.0), CALM)
     end = run(robot, REST, 0.05, -0.05, 1.0)
     assert (end.x, end.y, end.v) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
     rate = 0.02 / robot.mbar_2
@@ -61,7 +63,9 @@ def test_opposite_torques_turn_on_the_spot_with_the_centre_of_mass_on_the_axle()
 
 @given(st.floats(-2, 2), st.floats(-5, 5))
 def test_without_damping_and_torque_energy_stays(v: float, omega: float) -> None:
-    robot = Robot(replace(ETSRO, damping_right_wheel_N_m_s=0.0, damping_left_wheel_N_m_s=0.0), CALM)
+    robot = RigidBody(
+        replace(ETSRO, damping_right_wheel_N_m_s=0.0, damping_left_wheel_N_m_s=0.0), CALM
+    )
     end = run(robot, REST._replace(v=v, omega=omega), 0.0, 0.0, 0.5)
 
     # Energy in body speeds: m̄_1 v² + b² m̄_2 ω², up to the factor 1/r².
@@ -76,14 +80,14 @@ def test_without_damping_and_torque_energy_stays(v: float, omega: float) -> None
 @given(st.floats(0, 0.1), st.floats(0, 0.1), st.floats(-2, 2), st.floats(-5, 5))
 def test_damping_with_unequal_sides_never_adds_energy(right, left, v, omega) -> None:
     body = replace(ETSRO, damping_right_wheel_N_m_s=right, damping_left_wheel_N_m_s=left)
-    robot = Robot(body, CALM)
+    robot = RigidBody(body, CALM)
     dv, domega = robot.accelerations(v, omega, 0.0, 0.0)
     power = robot.mbar_1 * v * dv + 0.01 * robot.mbar_2 * omega * domega
     assert power <= 1e-12
 
 
 def test_the_step_is_of_fourth_order() -> None:
-    robot = Robot(replace(ETSRO, damping_left_wheel_N_m_s=0.01), Disturbance(0.02, 9.0, 0.3))
+    robot = RigidBody(replace(ETSRO, damping_left_wheel_N_m_s=0.01), Disturbance(0.02, 9.0, 0.3))
     start = REST._replace(v=0.5, omega=2.0)
     fine = run(robot, start, 0.06, 0.02, 0.512, 0.001)
     errors = [abs(run(robot, start, 0.06, 0.02, 0.512, step).y - fine.y) for step in (0.064, 0.032)]
@@ -91,13 +95,13 @@ def test_the_step_is_of_fourth_order() -> None:
 
 
 def test_wheel_angles_follow_from_what_the_body_did() -> None:
-    robot = Robot(ETSRO, CALM)
+    robot = RigidBody(ETSRO, CALM)
     end = run(robot, REST, 0.06, 0.01, 1.0)
     assert 0.5 * 0.04 / 0.1 * (end.right_wheel_rad - end.left_wheel_rad) == pytest.approx(end.theta)
 
 
 def test_the_disturbance_is_a_sine_and_a_cosine_from_t_0_on() -> None:
-    robot = Robot(ETSRO, Disturbance(0.1, 0.5, 2.0))
+    robot = RigidBody(ETSRO, Disturbance(0.1, 0.5, 2.0))
     assert robot.disturbance(3.0) == pytest.approx((0.1 * sin(3.5), 0.1 * cos(3.5)))
     assert robot.disturbance(-0.1) == (0.0, 0.0)
 
@@ -105,8 +109,8 @@ def test_the_disturbance_is_a_sine_and_a_cosine_from_t_0_on() -> None:
 def test_a_disturbance_acts_like_the_opposite_torque() -> None:
     held = Disturbance(0.05, 0.0, pi / 4)  # constant, equal on both wheels
     torque = 0.05 * sin(pi / 4)
-    pushed = run(Robot(ETSRO, held), REST, 0.0, 0.0, 1.0)
-    driven = run(Robot(ETSRO, CALM), REST, -torque, -torque, 1.0)
+    pushed = run(RigidBody(ETSRO, held), REST, 0.0, 0.0, 1.0)
+    driven = run(RigidBody(ETSRO, CALM), REST, -torque, -torque, 1.0)
     assert pushed.v == pytest.approx(driven.v, rel=1e-12)
 
 
@@ -114,12 +118,14 @@ def test_a_disturbance_acts_like_the_opposite_torque() -> None:
     ("v", "omega"), [(1e308, 1e308), (4.1e4, 0.0), (0.0, 4.1e5), (inf, 0.0), (nan, 0.0)]
 )
 def test_a_step_that_leaves_the_bounds_of_a_motion_leads_nowhere(v: float, omega: float) -> None:
-    robot = Robot(replace(ETSRO, damping_right_wheel_N_m_s=0.0, damping_left_wheel_N_m_s=0.0), CALM)
+    robot = RigidBody(
+        replace(ETSRO, damping_right_wheel_N_m_s=0.0, damping_left_wheel_N_m_s=0.0), CALM
+    )
     assert rk4(robot, REST._replace(v=v, omega=omega), 0.0, 0.0, 1.5, 0.001) is None
 
 
 def test_the_fastest_motion_is_that_of_the_fastest_wheel() -> None:
-    robot = Robot(replace(ETSRO, com_offset_m=0.0, damping_right_wheel_N_m_s=0.0), CALM)
+    robot = RigidBody(replace(ETSRO, com_offset_m=0.0, damping_right_wheel_N_m_s=0.0), CALM)
     fastest = REST._replace(v=0.0399 * FASTEST_WHEEL_RAD_S)
     assert rk4(robot, fastest, 0.0, 0.0, 0.0, 0.001) is not None
     assert rk4(robot, fastest, 200.0, 200.0, 0.0, 1.0) is None
@@ -127,4 +133,4 @@ def test_the_fastest_motion_is_that_of_the_fastest_wheel() -> None:
 
 def test_nobody_drives_further_than_numbers_reach() -> None:
     far = REST._replace(x=FARTHEST, v=1.0)
-    assert rk4(Robot(ETSRO, CALM), far, 0.0, 0.0, 0.0, 0.001) is None
+    assert rk4(RigidBody(ETSRO, CALM), far, 0.0, 0.0, 0.0, 0.001) is None

@@ -12,7 +12,7 @@ from bridge.frame import Frame
 from configs.brief import NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief
-from plant.robot import Unit, diverged_robots, unit_of
+from plant.robot import EmulatedRobot, diverged_robots, emulated_robot
 
 FLT_MAX = 3.4028234663852886e38
 ABSURD = (FLT_MAX, -FLT_MAX, 1e6, 1e30, inf, -inf, nan, -0.0, 1e-45, 0.1)
@@ -20,7 +20,7 @@ PERIOD_NS = 1_000_000
 NOWHERE = NetworkLink("t", "", "", "")
 
 
-def unit(preset: str = "ideal", *overrides: str) -> Unit:
+def robot_of(preset: str = "ideal", *overrides: str) -> EmulatedRobot:
     changes = (
         f"drive.preset='{preset}'",
         "robot.r1.v_m_s=0.0",
@@ -28,19 +28,19 @@ def unit(preset: str = "ideal", *overrides: str) -> Unit:
         "clock.control_period_s=0.001",
         *overrides,
     )
-    return unit_of(plant_brief(load("two_robots", changes), network=NOWHERE).robots[0])
+    return emulated_robot(plant_brief(load("two_robots", changes), network=NOWHERE).robots[0])
 
 
-def tell(robot: Unit, node: int, command: Command, data: bytes, now_ns: int = 0) -> None:
+def tell(robot: EmulatedRobot, node: int, command: Command, data: bytes, now_ns: int = 0) -> None:
     robot.hear(Frame(identifier(node, command), data), now_ns)
 
 
-def arm(robot: Unit) -> None:
+def arm(robot: EmulatedRobot) -> None:
     for node in (0, 1):
         tell(robot, node, Command.SET_AXIS_STATE, f.ONE_U32.pack(AxisState.CLOSED_LOOP_CONTROL))
 
 
-def go_on(robot: Unit, ticks: int, first: int = 0) -> list[Frame]:
+def go_on(robot: EmulatedRobot, ticks: int, first: int = 0) -> list[Frame]:
     frames = []
     for k in range(first, first + ticks):
         frames += robot.frames_due(k * PERIOD_NS)
@@ -55,7 +55,7 @@ def beats(frames: list[Frame], node: int) -> list[f.Heartbeat]:
 
 @pytest.mark.parametrize("torque", [1e6, FLT_MAX, -FLT_MAX])
 def test_an_absurd_torque_on_an_ideal_drive_ends_the_motion_of_its_robot(torque: float) -> None:
-    robot = unit()
+    robot = robot_of()
     arm(robot)
     tell(robot, 0, Command.SET_INPUT_TORQUE, f.ONE_FLOAT.pack(torque))
     frames = go_on(robot, 201)
@@ -72,7 +72,7 @@ def test_an_absurd_torque_on_an_ideal_drive_ends_the_motion_of_its_robot(torque:
 
 
 def test_its_drives_can_not_be_armed_again_whatever_a_client_does() -> None:
-    robot = unit("ideal", "drive.boot_s=0.0")
+    robot = robot_of("ideal", "drive.boot_s=0.0")
     arm(robot)
     tell(robot, 0, Command.SET_INPUT_TORQUE, f.ONE_FLOAT.pack(FLT_MAX))
     go_on(robot, 2)
@@ -86,7 +86,7 @@ def test_its_drives_can_not_be_armed_again_whatever_a_client_does() -> None:
 
 
 def test_the_tick_whose_torques_did_it_is_named_with_the_last_sound_motion() -> None:
-    robot = unit()
+    robot = robot_of()
     arm(robot)
     go_on(robot, 7)
     assert diverged_robots([robot], PERIOD_NS) == {}
@@ -99,7 +99,7 @@ def test_the_tick_whose_torques_did_it_is_named_with_the_last_sound_motion() -> 
 
 
 def test_bodies_that_start_beyond_all_bounds_diverge_at_once() -> None:
-    robot = unit("realistic")
+    robot = robot_of("realistic")
     robot.state = robot.state._replace(v=1e6)
     go_on(robot, 1)
     assert robot.divergence is not None
@@ -120,7 +120,7 @@ def test_no_set_point_in_any_mode_makes_more_of_a_robot_than_numbers(
     wanted: tuple[float, float],
     parameters: tuple[float, ...],
 ) -> None:
-    robot = unit(preset)
+    robot = robot_of(preset)
     for node in (0, 1):
         two = f.TWO_FLOATS.pack
         tell(robot, node, Command.SET_LIMITS, two(*parameters[:2]))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from support.powertrain_parts import INERTIA, MODEL, motor, motor_model, supply
 
 from configs.brief import Body, Disturbance
-from plant.body import Robot, State
+from plant.body import RigidBody, State
 from plant.integrate import rk4
 from plant.motor import IdealMotor, Motor, MotorFault
 from plant.supply import SupplyFault
@@ -206,7 +206,7 @@ ETSRO = Body(0.04, 0.1, 0.0, 2.3, 0.28, 0.01, 0.0056, 0.002, 0.0, 0.0, 1)
 def test_friction_at_both_wheels_of_a_body_never_adds_energy(
     com_offset_m: float, v: float, omega: float, step_s: float
 ) -> None:
-    robot = Robot(replace(ETSRO, com_offset_m=com_offset_m), Disturbance(0.0, 0.0, 0.0))
+    robot = RigidBody(replace(ETSRO, com_offset_m=com_offset_m), Disturbance(0.0, 0.0, 0.0))
     inertia = min(robot.mbar_1, robot.mbar_2)
     model, source = motor_model(coulomb_friction_shaft_N_m=0.05), supply()
     right = Motor(model, inertia, source, Random(1))
@@ -225,7 +225,7 @@ def test_friction_at_both_wheels_of_a_body_never_adds_energy(
 
 
 def test_a_robot_on_two_wheels_stops_and_does_not_chatter() -> None:
-    robot = Robot(ETSRO, Disturbance(0.0, 0.0, 0.0))
+    robot = RigidBody(ETSRO, Disturbance(0.0, 0.0, 0.0))
     inertia = min(robot.mbar_1, robot.mbar_2)
     wheels = [Motor(motor_model(), inertia, supply(), Random(n)) for n in (1, 2)]
     state = State(0.0, 0.0, 0.0, 0.2, 1.0, 0.0, 0.0)

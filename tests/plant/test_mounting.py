@@ -9,17 +9,17 @@ from bridge.frame import Frame
 from configs.brief import NetworkLink
 from configs.loading import load
 from configs.resolve import agent_brief, plant_brief
-from plant.robot import Unit, unit_of
+from plant.robot import EmulatedRobot, emulated_robot
 
 NETWORK = NetworkLink("t", "", "", "")
 CLOSE = [Frame(identifier(node, Command.SET_AXIS_STATE), f.ONE_U32.pack(8)) for node in (0, 1)]
 MIRRORED = "mounting.left_sign=-1"
 
 
-def driven(*overrides: str) -> tuple[tuple[float, ...], tuple[float, ...], Unit]:
+def driven(*overrides: str) -> tuple[tuple[float, ...], tuple[float, ...], EmulatedRobot]:
     """What the host reads, what is recorded, and the robot, after 0.1 s of torque."""
     scenario = load("two_robots", overrides)
-    robot = unit_of(plant_brief(scenario, network=NETWORK).robots[0])
+    robot = emulated_robot(plant_brief(scenario, network=NETWORK).robots[0])
     client = DRIVES["odrive"].client(agent_brief(scenario, "r1", network=NETWORK, bus=()).drives)
     for frame in (*client.torque(0.2, 0.1), *CLOSE):
         robot.hear(frame, 0)

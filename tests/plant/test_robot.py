@@ -11,29 +11,29 @@ from configs.brief import NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief
 from configs.signals import PLANT_SIGNALS
-from plant.robot import Unit, unit_of
+from plant.robot import EmulatedRobot, emulated_robot
 
 COLUMNS = [signal.name for signal in PLANT_SIGNALS]
 
 
-def unit() -> Unit:
+def robot_of() -> EmulatedRobot:
     scenario = load("two_robots", ("robot.r1.v_m_s=0.0", "robot.r1.pose.theta_rad=0.0"))
-    return unit_of(plant_brief(scenario, network=NetworkLink("t", "", "", "")).robots[0])
+    return emulated_robot(plant_brief(scenario, network=NetworkLink("t", "", "", "")).robots[0])
 
 
-def arm(robot: Unit, right: float, left: float) -> None:
+def arm(robot: EmulatedRobot, right: float, left: float) -> None:
     for node, torque in ((0, right), (1, left)):
         robot.hear(Frame(identifier(node, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(torque)), 0)
         robot.hear(Frame(identifier(node, Command.SET_AXIS_STATE), f.ONE_U32.pack(8)), 0)
 
 
 def test_frames_of_an_instant_come_in_order_of_arbitration() -> None:
-    identifiers = [frame.can_id for frame in unit().frames_due(0)]
+    identifiers = [frame.can_id for frame in robot_of().frames_due(0)]
     assert identifiers == [0x001, 0x009, 0x021, 0x029]
 
 
 def test_an_idle_robot_coasts() -> None:
-    robot = unit()
+    robot = robot_of()
     robot.state = robot.state._replace(v=0.5)
     robot.advance(0.0, 0.01, 2)
     assert 0.0 < robot.state.v < 0.5
@@ -41,7 +41,7 @@ def test_an_idle_robot_coasts() -> None:
 
 
 def test_torques_on_the_bus_move_the_robot_and_its_encoders() -> None:
-    robot = unit()
+    robot = robot_of()
     arm(robot, 0.1, 0.1)
     for k in range(100):
         robot.advance(k * 0.001, 0.001, 1)
@@ -54,14 +54,14 @@ def test_torques_on_the_bus_move_the_robot_and_its_encoders() -> None:
 
 
 def test_the_right_wheel_turns_the_robot_to_the_left() -> None:
-    robot = unit()
+    robot = robot_of()
     arm(robot, 0.1, -0.1)
     robot.advance(0.0, 0.01, 10)
     assert robot.state.omega > 0.0
 
 
 def test_a_row_is_the_truth_and_the_torques_of_the_last_period() -> None:
-    robot = unit()
+    robot = robot_of()
     arm(robot, 0.1, 0.05)
     robot.advance(0.0, 0.001, 1)
     row = dict(zip(COLUMNS, robot.row(0.001), strict=True))
@@ -72,7 +72,7 @@ def test_a_row_is_the_truth_and_the_torques_of_the_last_period() -> None:
 
 
 def test_feedback_comes_once_both_drives_have_taken_a_set_point() -> None:
-    robot = unit()
+    robot = robot_of()
     arm(robot, 0.0, 0.0)
     right = Frame(identifier(0, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(0.1))
     left = Frame(identifier(1, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(0.1))

@@ -180,7 +180,7 @@ def test_guests_keep_their_passwords_and_show_certificates_if_they_must() -> Non
 
 
 def test_the_pose_of_a_robot_that_is_not_emulated_is_the_localisation_systems_alone() -> None:
-    plan = access.plan(RUN, ROBOTS, HEARS, ("r1",), witnessed=["r3"])
+    plan = access.plan(RUN, ROBOTS, HEARS, ("r1",), real_robots=["r3"])
     pose = keys.pose(RUN, "r3")
     speakers = [user for user, rights in plan.rights.items() if pose in rights.puts]
     assert speakers == [access.LOCALISATION]

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import pytest
+from support.manual_port import ManualPort, Question
 
 from bridge.can_bus.packet import Submitted
 from bridge.drives.odrive import frames as f
@@ -14,10 +15,9 @@ from bridge.wire.queues import Endless
 from configs.brief import NetworkLink, PlantBrief
 from configs.loading import load, loads
 from configs.resolve import plant_brief
-from plant.bus.build import wire_bus
-from plant.bus.ideal import Ask, Steps
-from plant.bus.timed import WireBus
-from plant.robot import unit_of
+from plant.bus.build import timed_bus
+from plant.bus.timed import TimedBus
+from plant.robot import emulated_robot
 
 US, MS = 1000, 1_000_000
 
@@ -50,25 +50,24 @@ class Driven:
         plant = brief(*overrides)
         self.schedule = plant.schedule
         self.began: list[int] = []
-        unit = unit_of(plant.robots[0])
-        self.unit = unit
-        self.bus: WireBus = wire_bus(plant, "r1", [unit], self.began.append, no_tap)
-        self._steps: Steps[Submitted] = self.bus.steps()
+        self.robot = robot = emulated_robot(plant.robots[0])
+        self.port = ManualPort()
+        self.bus: TimedBus = timed_bus(plant, "r1", [robot], self.port, self.began.append, no_tap)
+        self.steps = self.bus.steps()
         self._answer = answer
         self.tick_number = -plant.schedule.countdown_ticks
 
-    def tick(self) -> list[Ask]:
+    def tick(self) -> list[Question]:
         """One tick: the questions of it."""
-        asks: list[Ask] = []
-        ask = next(self._steps)
-        while ask is not None:
+        asks: list[Question] = []
+        while (ask := self.port.next_question(self.steps)) is not None:
             asks.append(ask)
             said = self._answer(self.tick_number) if len(asks) == 1 else []
-            ask = self._steps.send([Submitted("r1", frame) for frame in said])
+            self.port.said = [Submitted("r1", frame) for frame in said]
         self.tick_number += 1
         return asks
 
-    def ticks(self, count: int) -> list[Ask]:
+    def ticks(self, count: int) -> list[Question]:
         return [ask for _ in range(count) for ask in self.tick()]
 
 
@@ -89,13 +88,13 @@ def test_the_controller_is_asked_when_the_last_frame_of_its_drives_has_ended() -
 def test_a_torque_acts_within_the_tick_when_its_frame_has_ended() -> None:
     driven = Driven(lambda tick: ARM if tick < 0 else torques(0.1, 0.1), "robot.r1.v_m_s=0.0")
     driven.ticks(250)
-    assert driven.unit.state.v == 0.0  # held during the countdown
+    assert driven.robot.state.v == 0.0  # held during the countdown
     driven.tick()  # tick 0: torques of this tick arrive after about 0.4 ms
-    mbar, r, share = driven.unit._body.mbar_1, 0.04, 0.001 - 0.00041
-    assert driven.unit.moved_ns < driven.schedule.bus_time_ns(1)
+    mbar, r, share = driven.robot._body.mbar_1, 0.04, 0.001 - 0.00041
+    assert driven.robot.moved_ns < driven.schedule.bus_time_ns(1)
     driven.bus.advance(driven.schedule.bus_time_ns(1))
     expected = r / 2 * 0.2 / mbar * share
-    assert driven.unit.state.v == pytest.approx(expected, rel=0.1)
+    assert driven.robot.state.v == pytest.approx(expected, rel=0.1)
 
 
 def test_firmware_acts_after_its_latency_and_in_order() -> None:
@@ -107,7 +106,7 @@ def test_firmware_acts_after_its_latency_and_in_order() -> None:
     )
     driven.ticks(250)
     (ask,) = driven.tick()
-    right, _ = driven.unit.drives
+    right, _ = driven.robot.drives
     assert right.input_torque_shaft == pytest.approx(0.3)  # the later of two
     ended = ask.stamp_ns + 2 * 90 * US + 200 * US
     assert right.fed_ns == pytest.approx(ended, abs=15 * US)
@@ -137,7 +136,7 @@ def test_drives_that_hear_nothing_through_a_babbler_trip_their_watchdog() -> Non
         lambda tick: ARM if tick == -250 else torques(0.1, 0.1), "drive.watchdog_s=0.05"
     )
     driven.ticks(20)
-    right, _ = driven.unit.drives
+    right, _ = driven.robot.drives
     assert right.torque_demand_shaft(0.0) == pytest.approx(0.1)
     driven.bus.wire.attach("babbler", queue=Endless(Frame(0x000, bytes(8))))
     driven.ticks(60)
@@ -147,8 +146,8 @@ def test_drives_that_hear_nothing_through_a_babbler_trip_their_watchdog() -> Non
 def test_a_client_that_departs_leaves_the_wire() -> None:
     driven = Driven(lambda _: [])
     driven.tick()
-    driven.bus.take([Submitted(7, Frame(0x700, b""))] * 3)
-    driven.bus.depart(7)
+    driven.bus.submit([Submitted(7, Frame(0x700, b""))] * 3)
+    driven.port.gone = [7]
     asks = driven.ticks(2)
     # The frame that was on the wire is completed, the others have gone.
     assert sum(p.frame.can_id == 0x700 for ask in asks for p in ask.transmitted) <= 1
@@ -204,10 +203,9 @@ def test_an_error_frame_from_a_client_destroys_what_starts_with_it_and_leaves_it
 
     driven = Driven(lambda _: torques(0.1, 0.1))
     driven.ticks(3)
-    steps = driven._steps
-    ask = next(steps)
-    said = [Submitted("r1", torques(0.1, 0.1)[0]), Submitted(7, Frame(ERR, b""))]
-    steps.send(said)
+    ask = driven.port.next_question(driven.steps)
+    driven.port.said = [Submitted("r1", torques(0.1, 0.1)[0]), Submitted(7, Frame(ERR, b""))]
+    driven.port.next_question(driven.steps)
     after = driven.ticks(1)
     passed = [p for a in (ask, *after) if a is not None for p in a.transmitted]
     assert [p.frame.can_id & ~ERR for p in passed if p.frame.can_id & ERR] == [0x08]
@@ -220,10 +218,10 @@ def test_an_error_frame_from_a_client_destroys_what_starts_with_it_and_leaves_it
 def test_who_only_listens_is_no_node_on_the_wire() -> None:
     driven = Driven(lambda _: [])
     nodes = len(driven.bus.wire._main.nodes)
-    driven.bus.depart(7)  # who has said nothing
+    driven.port.gone = [7]  # which has sent nothing
     driven.ticks(3)
     assert len(driven.bus.wire._main.nodes) == nodes
-    driven.bus.take([Submitted(7, Frame(0x700, b""))])
+    driven.bus.submit([Submitted(7, Frame(0x700, b""))])
     assert len(driven.bus.wire._main.nodes) == nodes + 1
 
 
@@ -248,7 +246,7 @@ def test_a_host_that_nobody_acknowledges_hears_of_it_and_finds_its_queue_full() 
     heard = [passed.frame for ask in driven.ticks(40) for passed in ask.transmitted]
     kinds = {frame.can_id & ~ERR for frame in heard if frame.can_id & ERR}
     assert {0x04, 0x20} <= kinds
-    assert driven.bus.room("r1") == 0
+    assert driven.bus.wire.queued(host) == 10
     assert driven.bus.refused > 0
 
 
@@ -262,16 +260,14 @@ def test_frames_of_seven_robots_on_one_bus_come_to_each_in_its_turn() -> None:
         'countdown_s = 0.5\nshare_period_s = 0.02\n[bus]\ntiming = "wire"\n' + robots
     )
     plant = plant_brief(loads("seven", text), network=NetworkLink("t", "", "", ""))
-    units = [unit_of(robot) for robot in plant.robots]
-    bus = wire_bus(plant, "fleet", units, lambda _: None, no_tap)
-    steps = bus.steps()
+    port = ManualPort()
+    emulated = [emulated_robot(robot) for robot in plant.robots]
+    steps = timed_bus(plant, "fleet", emulated, port, lambda _: None, no_tap).steps()
     for _ in range(3):
         asked, stamps = [], []
-        ask = next(steps)
-        while ask is not None:
+        while (ask := port.next_question(steps)) is not None:
             asked.append(ask.asked)
             stamps.append(ask.stamp_ns)
-            ask = steps.send([])
         assert sorted(asked) == [f"r{n}" for n in range(1, 8)]
         assert stamps == sorted(stamps)
     nodes = [node for robot in plant.robots for node in (robot.right_node, robot.left_node)]

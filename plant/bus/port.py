@@ -1,0 +1,70 @@
+"""The clients of one bus, as the bus sees them; and what every kind of bus offers.
+
+A bus in lockstep is a generator over its ticks (`Steps`). At a question it gives the port what the
+clients hear, and yields whom it waits for; when it is resumed it takes from the port what the
+clients sent. It yields None when the tick is over. Sockets or calls behind the port change nothing
+of what happens on the bus.
+"""
+
+from collections.abc import Callable, Generator, Sequence
+from typing import Protocol
+
+from bridge.can_bus.packet import Key, Submitted, Transmitted
+from bridge.frame import Frame
+from plant.robot import EmulatedRobot
+
+ALL = ""
+"""Whom a bus waits for: every controller on it; otherwise the name of a robot."""
+Steps = Generator[str | None, None, None]
+Begin = Callable[[int], None]
+"""Told each tick as it begins, bodies being where they are at that instant."""
+
+
+class Port(Protocol):
+    """The clients of one bus. Ideal buses need the first two methods, timed buses the others."""
+
+    def deliver(self, stamp_ns: int, frames: Sequence[Frame]) -> None:
+        """Give frames of the drives, all of one bus time, to all clients."""
+
+    def receive(self) -> Sequence[Frame]:
+        """What clients sent since the last call, in order."""
+
+    def forward(self, stamp_ns: int, ended: Sequence[Transmitted], asked: str | None) -> None:
+        """Give what ended on the wire until `stamp_ns` to all clients; `asked` has to answer."""
+
+    def submitted(self) -> Sequence[Submitted]:
+        """What clients handed to their transmit queues since the last call, in order."""
+
+    def departed(self) -> Sequence[Key]:
+        """Clients that left since the last call."""
+
+    def return_credit(self, key: Key, count: int) -> None:
+        """Frames of a client have left its transmit queue."""
+
+
+class Bus(Protocol):
+    """One bus with the robots on it, in lockstep (`steps`) or in real time (the other methods)."""
+
+    robots: Sequence[EmulatedRobot]
+    crossed: int
+    """Frames that crossed the bus, whoever sent them."""
+    acts_between_ticks: bool
+    """In real time, whether `next_ns` has to be looked at between two ticks."""
+
+    def steps(self) -> Steps:
+        """The ticks from the first of the countdown to the closing one."""
+
+    def next_ns(self) -> int:
+        """The next bus time at which something happens."""
+
+    def react(self, now_ns: int) -> None:
+        """Take what clients sent, and answer."""
+
+    def advance(self, now_ns: int) -> None:
+        """Let everything happen that is due until this instant."""
+
+    def move(self, bus_ns: int) -> None:
+        """Move the bodies to a tick."""
+
+    def send_due(self, bus_ns: int) -> None:
+        """Let the drives send what is due at a tick."""
