@@ -4,9 +4,8 @@ Started by `fleetloop run` with an `AgentBrief` on standard input; `fleetloop ag
 a process of its own, on the robot.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import asdict
 from functools import partial
 from typing import NamedTuple
 
@@ -14,16 +13,16 @@ import can
 
 from agents.agent import Agent
 from agents.guard import Phase
-from agents.lockstep import Counters, LockstepLoop, give
-from agents.realtime import Counters as Clock
-from agents.realtime import RealtimeLoop
+from agents.lockstep import LockstepCounters, LockstepLoop, give
+from agents.realtime import RealtimeCounters, RealtimeLoop
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import open_bus, to_message
 from bridge.launcher import follow_launcher
 from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.link import Arrival, Link, Publisher
-from bridge.network.messages import Notice, Report, Rows
+from bridge.network.messages import Notice, Rows
+from bridge.network.reports import AgentReport
 from bridge.network.zenoh_link import POLLED_DEPTH, StoppedError, open_polled
 from bridge.process import (
     Stop,
@@ -38,6 +37,7 @@ from bridge.profile import Sampler
 from bridge.telemetry import AGENT_ROW, RowBuffer
 from configs.brief import AgentBrief
 from configs.errors import FleetloopError, InfrastructureError
+from configs.roles import AGENT
 
 NEWEST = 64
 """In real time, messages of each neighbour that wait: the newest wins."""
@@ -67,13 +67,13 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> str:
     name, robot = brief.network.run, brief.robot
     path = link.publisher(keys.path(name, robot))
     telemetry = link.publisher(keys.telemetry(name, robot))
-    report = link.publisher(keys.report(name, f"agent/{robot}"))
+    report = link.publisher(keys.report(name, AGENT.process(robot)))
     rows = RowBuffer(
         AGENT_ROW,
         lambda first, count, block, final: telemetry.put(Rows(first, count, block, final).encode()),
     )
     agent = Agent(brief, rows)
-    notice = link.publisher(keys.notice(name, f"agent/{robot}"))
+    notice = link.publisher(keys.notice(name, AGENT.process(robot)))
     agent.guard.announce = lambda text: notice.put(Notice(text).encode())
     link.subscribe(keys.pose(name, robot), "pose")
     for neighbour in brief.hears:
@@ -113,14 +113,14 @@ class _Wired(NamedTuple):
             within_s=brief.schedule.start_deadline_s,
             stop=stop,
         )
-        self.link.declare_live(keys.live(brief.network.run, f"agent/{brief.robot}"))
+        self.link.declare_live(keys.live(brief.network.run, AGENT.process(brief.robot)))
 
     def run(
         self,
         body: Callable[[], None],
         stop: Stop,
-        counters: Counters | Clock,
-        refused: Iterable[str] = (),
+        counters: LockstepCounters | RealtimeCounters,
+        missing_privileges: Sequence[str] = (),
     ) -> str:
         """Run the loop's body; stop the wheels, hand on the last rows and say the last word.
 
@@ -139,20 +139,22 @@ class _Wired(NamedTuple):
             self.stop_wheels()
             early = stop.reason
             self.rows.finish()
-            values: dict[str, int | float | str] = {
-                **asdict(counters),
-                **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
-                "stopped": self.agent.guard.stopped_because,
-                "stopped_tick": self.agent.guard.stopped_tick,
-                "notices": "\n".join(self.agent.notices()),
-                "flood": ", ".join(self.agent.admission.refusals.floods()),
-                "refused": ", ".join(refused),
-                "failure": failure,
-                "early": "" if self.agent.closed else early,
-                "cpu_ns": cpu_ns() - began_ns,
-                "processor_ns": processor_wait_ns() - waited_ns,
-            }
-            self.report.put(Report(values).encode())
+            guard = self.agent.guard
+            report = AgentReport(
+                failure=failure,
+                left_early="" if self.agent.closed else early,
+                notices=tuple(self.agent.notices()),
+                flooders=tuple(self.agent.admission.refusals.floods()),
+                missing_privileges=tuple(missing_privileges),
+                cpu_ns=cpu_ns() - began_ns,
+                durations_ns=counters.durations_ns()
+                | {"processor": processor_wait_ns() - waited_ns},
+                profile_ns=sampler.nanoseconds(),
+                stop_reason=guard.stopped_because,
+                stop_tick=guard.stopped_tick,
+                deadlines=counters.deadlines(),
+            )
+            self.report.put(report.encode())
             stop.await_release()
         return early
 
@@ -182,15 +184,15 @@ def _lockstep(wired: _Wired, stop: Stop) -> str:
 
 def _realtime(wired: _Wired, stop: Stop) -> str:
     brief = wired.agent.brief
-    beat = wired.link.publisher(keys.progress(brief.network.run, f"agent/{brief.robot}"))
+    beat = wired.link.publisher(keys.progress(brief.network.run, AGENT.process(brief.robot)))
     loop = RealtimeLoop(wired.agent, wired.bus, wired.link, wired.path, wired.hellos, beat)
     wired.await_peers(lambda arrival: (give(wired.agent, arrival), None)[1], stop)
     settle_memory()
-    refused = go_realtime(CONTROLLER_PRIORITY)
+    missing = go_realtime(CONTROLLER_PRIORITY)
     epoch_ns = loop.await_go(stop)
     if epoch_ns is None:
         return stop.reason
-    return wired.run(partial(loop.run, epoch_ns, stop), stop, loop.counters, refused)
+    return wired.run(partial(loop.run, epoch_ns, stop), stop, loop.counters, missing)
 
 
 def _serve(brief: AgentBrief, stop: Stop) -> None:

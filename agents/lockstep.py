@@ -38,7 +38,7 @@ _SAID = {"pose": ("pose", LOCALISATION), "leader": ("speed", LEADER)}
 
 
 @dataclass(slots=True)
-class Counters:
+class LockstepCounters:
     """Where a controller's time went [ns of wall time], and what arrived that nobody understood."""
 
     ticks: int = 0
@@ -47,6 +47,13 @@ class Counters:
     compute_ns: int = 0
     unsent: int = 0  # frames that found the transmit queue full
     undecodable: int = 0
+
+    def durations_ns(self) -> dict[str, int]:
+        """Wall time by what it was spent on."""
+        return {"bus": self.bus_ns, "listen": self.listen_ns, "compute": self.compute_ns}
+
+    def deadlines(self) -> None:
+        """Lockstep has none."""
 
 
 class LockstepLoop:
@@ -62,7 +69,7 @@ class LockstepLoop:
         self._link = link
         self._path = path
         self._hellos = hellos
-        self.counters = Counters()
+        self.counters = LockstepCounters()
 
     def take(self, arrival: Arrival) -> None:
         """Give one message to the agent; what nobody understands is counted."""

@@ -29,11 +29,12 @@ from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import can_id_of, to_frame, to_message
 from bridge.clock import implausible_start, monotonic_of
 from bridge.frame import ERR, Frame
-from bridge.network.access import LAUNCHER
 from bridge.network.barrier import Hellos
 from bridge.network.link import Link, Publisher, waiting
 from bridge.network.messages import Go, Progress
+from bridge.network.reports import Deadlines
 from bridge.process import Stop
+from configs.roles import LAUNCHER
 
 ARRIVALS_PER_TICK = 64
 """Messages that are looked at in one tick, and two more for every in-neighbour: the rest waits."""
@@ -46,7 +47,7 @@ BEAT_EVERY_S = 0.2
 
 
 @dataclass(slots=True)
-class Counters:
+class RealtimeCounters:
     """How well the controller kept its time."""
 
     ticks: int = 0
@@ -56,6 +57,14 @@ class Counters:
     bus_errors: int = 0  # other errors of the bus that were borne
     error_frames: int = 0  # that the bus's controller told of
     undecodable: int = 0
+
+    def durations_ns(self) -> dict[str, int]:
+        """Nothing: by the wall clock what is left of a period is waited for."""
+        return {}
+
+    def deadlines(self) -> Deadlines:
+        """What a report says of them."""
+        return Deadlines(self.misses, self.skipped)
 
 
 class RealtimeLoop:
@@ -85,7 +94,7 @@ class RealtimeLoop:
         self._most_arrivals = ARRIVALS_PER_TICK + 2 * len(agent.brief.hears)
         self._power_up_ns = 0
         self._sent_ns = 0  # when torques were sent that have no feedback yet; 0: there are none
-        self.counters = Counters()
+        self.counters = RealtimeCounters()
 
     def await_go(self, stop: Stop) -> int | None:
         """Say hello until the launcher says when tick 0 is; None when told to stop."""
@@ -115,11 +124,11 @@ class RealtimeLoop:
         refusals = self._agent.admission.refusals
         go = Go.decode(payload)
         if go is None:
-            refusals.note("go", LAUNCHER, "not well formed")
+            refusals.note("go", LAUNCHER.name, "not well formed")
             return None
         epoch_ns = monotonic_of(go.epoch_ns)
         if far := implausible_start(epoch_ns, self._schedule.longest_start_s):
-            refusals.note("go", LAUNCHER, "clocks", far)
+            refusals.note("go", LAUNCHER.name, "clocks", far)
             return None
         self._agent.last_tick = min(self._schedule.ticks, max(go.ticks, 0))
         return epoch_ns

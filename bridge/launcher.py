@@ -7,10 +7,10 @@ the way to it.
 from functools import partial
 
 from bridge.network import keys
-from bridge.network.access import LAUNCHER
-from bridge.network.messages import Report
+from bridge.network.reports import LauncherReport
 from bridge.network.zenoh_link import ZenohLink
 from bridge.process import LAUNCHER_GONE, Stop
+from configs.roles import LAUNCHER
 
 RUN_ENDED = "the run was ended"
 
@@ -19,9 +19,9 @@ def follow_launcher(link: ZenohLink, run: str, stop: Stop) -> None:
     """End with the run, for its reason."""
 
     def hear(payload: bytes) -> None:
-        report = Report.decode(payload)
+        report = LauncherReport.decode(payload)
         if report is not None:
-            stop.end(f"{RUN_ENDED}: {report.values.get('reason', '')}")
+            stop.end(f"{RUN_ENDED}: {report.reason}")
 
-    link.each(keys.report(run, LAUNCHER), hear)
-    link.on_gone(keys.live(run, LAUNCHER), partial(stop.end, LAUNCHER_GONE))
+    link.each(keys.report(run, LAUNCHER.name), hear)
+    link.on_gone(keys.live(run, LAUNCHER.name), partial(stop.end, LAUNCHER_GONE))

@@ -182,24 +182,24 @@ def keep_to_itself() -> None:
 
 
 def go_realtime(priority: int) -> list[str]:
-    """Ask the kernel for what real time needs; return what it refused, in the words of a user.
+    """Ask the kernel for what real time needs; return the privileges that are missing, by name.
 
     On a single processor a loop that is late would keep it from the network's own threads, so
     there it shares.
     """
-    refused = []
+    missing = []
     try:
         if len(os.sched_getaffinity(0)) > 1:
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
         else:
-            refused.append("SCHED_FIFO (a single processor)")
+            missing.append("SCHED_FIFO (a single processor)")
     except OSError:
-        refused.append("SCHED_FIFO")
+        missing.append("SCHED_FIFO")
     if ctypes.CDLL(None, use_errno=True).mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
-        refused.append("memory locking")
+        missing.append("memory locking")
     with contextlib.suppress(OSError):
         Path("/proc/self/timerslack_ns").write_text("1", "ascii")
-    return refused
+    return missing
 
 
 def launcher_stopped() -> bool:

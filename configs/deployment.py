@@ -22,16 +22,11 @@ from configs.complaints import MISSING, complaints, refusal
 from configs.errors import Complaint, ScenarioError
 from configs.files import expanded
 from configs.parameters import Name, as_tuples
+from configs.roles import AGENT, ROLES, STARTED, identity_of, processes_of
 from configs.scenario import Scenario
 from configs.users import read_users
 
-PLANT, RECORDER = "plant", "recorder"
 Endpoint = Annotated[str, Field(pattern=patterns.ENDPOINT)]
-
-
-def agent_role(robot: str) -> str:
-    """The role of a robot's controller."""
-    return f"agent/{robot}"
 
 
 class Section(BaseModel):
@@ -134,12 +129,7 @@ class Deployment(Section):
 
     def elsewhere(self, scenario: Scenario) -> tuple[str, ...]:
         """The roles that are started by somebody else."""
-        return tuple(role for role in roles_of(scenario) if not self.runs_here(role))
-
-
-def roles_of(scenario: Scenario) -> tuple[str, ...]:
-    """All roles of a run."""
-    return (PLANT, RECORDER, *(agent_role(robot) for robot in scenario.names))
+        return tuple(role for role in processes_of(scenario.names) if not self.runs_here(role))
 
 
 def load_deployment(path: Path, scenario: Scenario) -> Deployment:
@@ -216,15 +206,17 @@ def _settings(robot: str, bus: BusSection) -> Settings:
 
 
 def _problems(deployment: Deployment, scenario: Scenario) -> list[Problem]:
-    roles = roles_of(scenario)
+    roles = processes_of(scenario.names)
+    identities = {identity_of(role) for role in roles} | {role.name for role in ROLES}
     problems = [
         Problem("roles", role, f"no such role; known: {', '.join(roles)}")
         for role in deployment.roles or ()
         if role not in roles
     ]
-    if not deployment.runs_here(RECORDER):
-        right = "must name recorder: the record is written where `fleetloop run` is"
-        problems.append(Problem("roles", list(deployment.roles or ()), right))
+    for role in STARTED:
+        if role.beside_launcher and not deployment.runs_here(role.name):
+            right = f"must name {role.name}: it works where `fleetloop run` is"
+            problems.append(Problem("roles", list(deployment.roles or ()), right))
     if deployment.elsewhere(scenario) and deployment.network is None:
         right = f"must be given: {', '.join(deployment.elsewhere(scenario))} come from elsewhere"
         problems.append(Problem("network", MISSING, right))
@@ -238,7 +230,7 @@ def _problems(deployment: Deployment, scenario: Scenario) -> list[Problem]:
             for bus in buses
             if bus not in (*scenario.buses, "*")
         ]
-        if user in roles or user.startswith("agent-") or user in ("plant", "recorder", "launcher"):
+        if user in identities or user.startswith(f"{AGENT.name}-"):
             problems.append(Problem(f"network.guests.{user}", user, "is a role's name"))
     places: dict[tuple[object, object], str] = {}
     for robot, section in deployment.robot.items():

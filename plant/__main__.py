@@ -18,7 +18,8 @@ from bridge.launcher import follow_launcher
 from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.link import Arrival, Link, Publisher, waiting
-from bridge.network.messages import Go, Notice, PoseFix, Progress, Report, Rows
+from bridge.network.messages import Go, Notice, PoseFix, Progress, Rows
+from bridge.network.reports import PlantReport
 from bridge.network.zenoh_link import StoppedError, open_client
 from bridge.process import (
     Stop,
@@ -32,8 +33,9 @@ from bridge.profile import Sampler
 from bridge.telemetry import PLANT_ROW, FrameBuffer, RowBuffer
 from configs.brief import PlantBrief, Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError
+from configs.roles import PLANT
 from plant.herald import Herald
-from plant.lockstep import Counters, LockstepLoop, bus_frames
+from plant.lockstep import LockstepLoop, PlantCounters
 from plant.real_robot import RealRobot
 from plant.realtime import RealtimeLoop
 from plant.robot import diverged_robots, emulated_robot
@@ -93,7 +95,7 @@ def join(hub: Hub, attached: Sequence[tuple[str, Settings]]) -> DrivePort:
     return CombinedPort(hub, ExternalBuses(dict(attached)), names)
 
 
-def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) -> Counters:
+def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) -> PlantCounters:
     name = brief.network.run
     emulated = [emulated_robot(robot) for robot in brief.robots]
     others = [RealRobot(robot, start) for robot, start in brief.real_robots]
@@ -110,8 +112,8 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
             truths.append(traffic)
             logs[bus] = FrameBuffer(partial(_put_rows, traffic))
     taps = {bus: log.add for bus, log in logs.items()}
-    progress = link.publisher(keys.progress(name, "plant"))
-    report = link.publisher(keys.report(name, "plant"))
+    progress = link.publisher(keys.progress(name, PLANT.name))
+    report = link.publisher(keys.report(name, PLANT.name))
     link.subscribe(keys.go(name), "go")
     for other in others:
         link.subscribe(keys.pose(name, other.robot), other.robot)
@@ -134,20 +136,20 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
         }
         return troubles | late | diverged_robots(emulated, brief.schedule.period_ns)
 
-    notice = link.publisher(keys.notice(name, "plant"))
+    notice = link.publisher(keys.notice(name, PLANT.name))
     herald = Herald(news, lambda text: notice.put(Notice(text).encode()))
 
     def say(state: Progress) -> None:
         progress.put(state.encode())
         herald.look()
 
-    refused: list[str] = []
+    missing_privileges: list[str] = []
     body: Callable[[Stop], None]
     if brief.schedule.realtime:
-        link.declare_live(keys.live(name, "plant"))
+        link.declare_live(keys.live(name, PLANT.name))
         epoch_ns = _serve_until_go(brief, end, link, hellos, stop)
         settle_memory()
-        refused = go_realtime(PLANT_PRIORITY)
+        missing_privileges = go_realtime(PLANT_PRIORITY)
         record = partial(_record, link, others, rows[len(emulated) :], brief.schedule.period_s)
         wall = RealtimeLoop(
             brief, emulated, end, hub, poses, rows[: len(emulated)], say, taps, record
@@ -156,7 +158,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
         body = partial(wall.run, epoch_ns)
     else:
         _await_controllers(brief, hub, hellos, stop)
-        link.declare_live(keys.live(name, "plant"))
+        link.declare_live(keys.live(name, PLANT.name))
         _await_go(brief, link, hellos, stop)
         settle_memory()
         loop = LockstepLoop(brief, emulated, hub, poses, rows, say, taps)
@@ -176,25 +178,23 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
         for log in logs.values():
             log.finish()
         say(progress_of())
-        values: dict[str, int | float | str] = {
-            "ticks": counters.ticks,
-            "wall_ns": counters.wall_ns,
-            "waited_ns": counters.waited_ns,
-            "overruns": counters.overruns,
-            "cpu_ns": cpu_ns() - began_ns,
-            "processor_ns": processor_wait_ns() - waited_ns,
-            "refused": ", ".join(refused),
-            "early": stop.reason if counters.ticks < brief.schedule.ticks else "",
-            **bus_frames(counters),
-            **{
-                f"stopped.{robot}": why
-                for robot, why in diverged_robots(emulated, brief.schedule.period_ns).items()
+        summary = PlantReport(
+            left_early=stop.reason if counters.ticks < brief.schedule.ticks else "",
+            missing_privileges=tuple(missing_privileges),
+            cpu_ns=cpu_ns() - began_ns,
+            durations_ns={
+                "wall": counters.wall_ns,
+                "waited": counters.waited_ns,
+                "processor": processor_wait_ns() - waited_ns,
             },
-            **{f"stall.{stall.tick}": stall.lasted_s for stall in stalls},
-            **{f"trouble.{bus}": text for bus, text in end.troubles().items()},
-            **{f"profile.{part}": ns for part, ns in sampler.nanoseconds().items()},
-        }
-        report.put(Report(values).encode())
+            profile_ns=sampler.nanoseconds(),
+            overruns=counters.overruns,
+            frames=counters.frames,
+            stopped_robots=diverged_robots(emulated, brief.schedule.period_ns),
+            bus_troubles=end.troubles(),
+            stalls=tuple(stalls),
+        )
+        report.put(summary.encode())
         stop.await_release()
     return counters
 

@@ -43,7 +43,7 @@ silent; after it, the launcher names the plant."""
 
 
 @dataclass(slots=True)
-class Counters:
+class PlantCounters:
     """What the run cost, for the summary."""
 
     ticks: int = 0
@@ -110,7 +110,7 @@ class LockstepLoop:
         self._at_slowest = len(self._lanes)
         self._held: list[_Lane] = []
         self._start_ns = 0
-        self.counters = Counters()
+        self.counters = PlantCounters()
 
     def run(self, stop: Stop) -> None:
         """Run from the first tick of the countdown to the closing tick, or until told to stop.
@@ -241,8 +241,3 @@ class LockstepLoop:
                 raise InfrastructureError(
                     f"{when}: no answer from the controller of {robot} within {self._limit_s:g} s"
                 )
-
-
-def bus_frames(counters: Counters) -> Mapping[str, int]:
-    """Frames that crossed each bus, as flat values for a report."""
-    return {f"frames.{bus}": count for bus, count in counters.frames.items()}

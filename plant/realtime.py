@@ -22,7 +22,7 @@ from bridge.telemetry import RowBuffer, Tap
 from configs.brief import PlantBrief
 from plant.bus.build import build_buses, no_begin
 from plant.bus.sockets import SocketPort
-from plant.lockstep import REPORT_EVERY_NS, Counters
+from plant.lockstep import REPORT_EVERY_NS, PlantCounters
 from plant.robot import EmulatedRobot
 
 FAREWELL_S = 0.5
@@ -60,7 +60,7 @@ class RealtimeLoop:
         self._tick = -brief.schedule.countdown_ticks
         self._epoch_ns = 0
         self._next_report_ns = 0
-        self.counters = Counters()
+        self.counters = PlantCounters()
         self.lateness = Lateness(brief.schedule.period_s)
 
     def progress(self) -> Progress:

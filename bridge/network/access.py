@@ -1,24 +1,12 @@
 """Graph → who may say and hear what: the router's access control and everybody's credentials.
 
-The graph *is* the network. The router refuses everything that isn't listed here (default deny), and
-each process is bound to its identity by a random password that it alone is given:
-
-    agent-<r>   puts   its own path, telemetry, progress, notices, report; its own token
-                hears  path of exactly its in-neighbours, its own pose, leader/speed iff h_i = 1,
-                       @clock/go
-    plant       puts   pose and truth of all robots, traffic of all buses, progress, notices,
-                       report; its token
-                hears  @clock/go
-    recorder    puts   progress, notices, report; its token
-                hears  truth and telemetry of all robots, traffic of all buses
-    localisation       only with robots that aren't emulated:
-                puts   their poses
-                hears  @clock/go
-
-    a guest            a client of buses on another machine
-                puts   its lines up, its token; which buses it may open is the relay's to say
-                hears  its lines down
-                sees   the token of the relay
+The graph *is* the network. The router refuses everything that isn't listed (default deny), and each
+process is bound to its identity by a random password that it alone is given. The rights of a role
+are in its row of `configs.roles`: of an agent its own path and telemetry to put, and to hear the
+paths of exactly its in-neighbours, its own pose, and leader/speed iff h_i = 1. Every role that a
+run starts also puts progress, notices and its report. Besides the roles there are guests, clients
+of buses on other machines: they put their lines up and hear their lines down; which buses they may
+open is the relay's decision.
 
 Plant and controllers may watch the launcher's token and hear its last word: on other machines that
 is how they learn that the run is over, and why. Who comes from another machine has a password that
@@ -41,30 +29,18 @@ an egress put.
 
 import json
 import secrets
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from bridge.network import keys
 from bridge.network.messages import MOST_BYTES
+from configs.roles import ROLES, Role, Topic
 
 MOST_PER_PERIOD = 8.0
 """Path states and poses of one robot within the period in which the schedule has one."""
 LEAST_HZ = 100.0
 """No rate is limited below this: what comes in a burst isn't too much."""
-PLANT = "plant"
-RECORDER = "recorder"
-LAUNCHER = "launcher"
-LOCALISATION = "localisation"
-
-
-def agent_user(robot: str) -> str:
-    """The identity of a robot's controller."""
-    return f"agent-{robot}"
-
-
-def user_of(role: str) -> str:
-    """The identity of a role: plant, recorder, agent/<robot>."""
-    return role.replace("/", "-")
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,38 +138,12 @@ def plan(
     given random ones), who must show a certificate with their identity as its common name if
     `certified`. Periods are of real time; with one, what comes much more often is dropped.
     """
+    graph = _Graph(run, robots, hears, leader, buses, real_robots)
     rights: dict[str, Rights] = {}
-    launcher, its_word = (keys.live(run, LAUNCHER),), keys.report(run, LAUNCHER)
-    for robot in robots:
-        process = f"agent/{robot}"
-        heard = [keys.path(run, other) for other in hears[robot]]
-        if robot in leader:
-            heard.append(keys.leader_speed(run))
-        rights[agent_user(robot)] = Rights(
-            puts=(keys.path(run, robot), keys.telemetry(run, robot), *_control(run, process)),
-            hears=(keys.pose(run, robot), keys.go(run), its_word, *heard),
-            token=keys.live(run, process),
-            watches=launcher,
-        )
-    truths = [keys.truth(run, robot) for robot in robots]
-    truths += [keys.traffic(run, bus) for bus in buses]
-    poses = [keys.pose(run, robot) for robot in robots if robot not in real_robots]
-    real_poses = [keys.pose(run, robot) for robot in robots if robot in real_robots]
-    rights[PLANT] = Rights(
-        puts=(*poses, *truths, *_control(run, PLANT)),
-        hears=(keys.go(run), its_word, *real_poses),
-        token=keys.live(run, PLANT),
-        watches=launcher,
-    )
-    if real_poses:
-        rights[LOCALISATION] = Rights(
-            puts=tuple(real_poses), hears=(keys.go(run),), token=keys.live(run, LOCALISATION)
-        )
-    rights[RECORDER] = Rights(
-        puts=_control(run, RECORDER),
-        hears=(*truths, *(keys.telemetry(run, robot) for robot in robots)),
-        token=keys.live(run, RECORDER),
-    )
+    for role in ROLES:
+        for robot in robots if role.per_robot else ("",):
+            if role.module or graph.keys(role.puts, robot):
+                rights[role.identity(robot)] = _rights(role, robot, graph)
     for user in bus_guests:
         rights[user] = Rights(
             puts=(keys.guest_lines("up", user),),
@@ -212,8 +162,59 @@ def plan(
     return AccessPlan(rights, passwords, frozenset(known if certified else ()), most_hz)
 
 
-def _control(run: str, process: str) -> tuple[str, ...]:
-    return keys.progress(run, process), keys.notice(run, process), keys.report(run, process)
+class _Graph(NamedTuple):
+    """What the rights of a run depend on."""
+
+    run: str
+    robots: Sequence[str]
+    hears: Mapping[str, Sequence[str]]
+    leader: Sequence[str]
+    buses: Sequence[str]
+    measured: Collection[str]  # robots that aren't emulated
+
+    def keys(self, topics: Iterable[Topic], robot: str) -> tuple[str, ...]:
+        """The keys of these topics to a role's process; `robot` is its own."""
+        return tuple(key for topic in topics for key in self._keys(topic, robot))
+
+    def _keys(self, topic: Topic, robot: str) -> Iterable[str]:
+        run = self.run
+        match topic:
+            case Topic.OWN_PATH:
+                return [keys.path(run, robot)]
+            case Topic.OWN_POSE:
+                return [keys.pose(run, robot)]
+            case Topic.OWN_TELEMETRY:
+                return [keys.telemetry(run, robot)]
+            case Topic.PATHS_OF_IN_NEIGHBOURS:
+                return [keys.path(run, other) for other in self.hears[robot]]
+            case Topic.LEADER_SPEED:
+                return [keys.leader_speed(run)] if robot in self.leader else []
+            case Topic.EMULATED_POSES:
+                return [keys.pose(run, r) for r in self.robots if r not in self.measured]
+            case Topic.MEASURED_POSES:
+                return [keys.pose(run, r) for r in self.robots if r in self.measured]
+            case Topic.TRUTHS:
+                return [keys.truth(run, r) for r in self.robots]
+            case Topic.TELEMETRIES:
+                return [keys.telemetry(run, r) for r in self.robots]
+            case Topic.TRAFFIC:
+                return [keys.traffic(run, bus) for bus in self.buses]
+            case Topic.GO:
+                return [keys.go(run)]
+
+
+def _rights(role: Role, robot: str, graph: _Graph) -> Rights:
+    run, process = graph.run, role.process(robot)
+    control: tuple[str, ...] = ()
+    if role.module:
+        control = keys.progress(run, process), keys.notice(run, process), keys.report(run, process)
+    reports = tuple(keys.report(run, other) for other in role.watches)
+    return Rights(
+        puts=(*graph.keys(role.puts, robot), *control),
+        hears=(*graph.keys(role.hears, robot), *reports),
+        token=keys.live(run, process),
+        watches=tuple(keys.live(run, other) for other in role.watches),
+    )
 
 
 def _rules_of(user: str, rights: Rights) -> list[dict[str, object]]:

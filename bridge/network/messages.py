@@ -1,4 +1,4 @@
-"""Every message over Zenoh and its bytes.
+"""Every message over Zenoh and its bytes; the reports are in `bridge.network.reports`.
 
 A message is a msgpack array that begins with the version of its layout. Decoding is bounded: too
 long, the wrong types, a wrong length, an unknown version or a number that isn't finite give None,
@@ -13,19 +13,13 @@ still be impossible: that is for those to say who know the run.
     Rows           [1, first_tick, length, rows, final]          robot/<name>/truth, telemetry
     Progress       [1, tick, t_ns, wall_ns]                      @progress/<process>
     Notice         [1, text]                                     @notice/<process>
-    Report         [1, {name: number or text, ...}]              @report/<process>
     Go             [1, epoch_ns]                                 @clock/go
 """
 
-from collections.abc import Mapping
-from math import isfinite
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import msgpack
+from bridge.network.packing import MAX_BYTES, finite, ints, pack, printable, unpack
 
-VERSION = 1
-MAX_BYTES = 1 << 18
-"""Of any message."""
 MOST_BYTES = {
     "path": 128,
     "pose": 128,
@@ -39,15 +33,9 @@ MOST_BYTES = {
 }
 """Of what others than the launcher say, by `bridge.network.keys.kind`: several times what they
 need."""
-MAX_TEXT = 1 << 15
-"""Characters of a text in a report."""
 MAX_NOTICE = 500
 """Characters of a notice."""
-_MAX_VALUES, _MAX_NAME = 4096, 128
 _MAX_STEPS = 10_000
-_MAX_INT = 1 << 63
-
-Value = int | float | str
 
 
 class PathState(NamedTuple):
@@ -60,13 +48,13 @@ class PathState(NamedTuple):
 
     def encode(self) -> bytes:
         """Bytes for the wire."""
-        return _pack((VERSION, *self))
+        return pack(*self)
 
     @classmethod
     def decode(cls, payload: bytes) -> "PathState | None":
         """The message in the bytes, None if there is none."""
-        fields = _unpack(payload, 5)
-        if fields is None or not (_ints(fields[1:3]) and _finite(fields[3:])):
+        fields = unpack(payload, 5)
+        if fields is None or not (ints(fields[1:3]) and finite(fields[3:])):
             return None
         return cls(fields[1], fields[2], fields[3], fields[4])
 
@@ -82,13 +70,13 @@ class PoseFix(NamedTuple):
 
     def encode(self) -> bytes:
         """Bytes for the wire."""
-        return _pack((VERSION, *self))
+        return pack(*self)
 
     @classmethod
     def decode(cls, payload: bytes) -> "PoseFix | None":
         """The message in the bytes, None if there is none."""
-        fields = _unpack(payload, 6)
-        if fields is None or not (_ints(fields[1:3]) and _finite(fields[3:])):
+        fields = unpack(payload, 6)
+        if fields is None or not (ints(fields[1:3]) and finite(fields[3:])):
             return None
         return cls(*fields[1:])
 
@@ -112,12 +100,12 @@ class LeaderSpeed(NamedTuple):
 
     def encode(self) -> bytes:
         """Bytes for the wire."""
-        return _pack((VERSION, self.steps))
+        return pack(self.steps)
 
     @classmethod
     def decode(cls, payload: bytes) -> "LeaderSpeed | None":
         """The message in the bytes, None if there is none."""
-        fields = _unpack(payload, 2)
+        fields = unpack(payload, 2)
         if fields is None or not isinstance(fields[1], list):
             return None
         if not 1 <= len(fields[1]) <= _MAX_STEPS:
@@ -125,7 +113,7 @@ class LeaderSpeed(NamedTuple):
         for step in fields[1]:
             if not (isinstance(step, list) and len(step) == 2):
                 return None
-            if not (_ints(step[:1]) and _finite(step[1:])):
+            if not (ints(step[:1]) and finite(step[1:])):
                 return None
         times = [step[0] for step in fields[1]]
         return cls(tuple((t, v) for t, v in fields[1])) if times == sorted(times) else None
@@ -141,13 +129,13 @@ class Rows(NamedTuple):
 
     def encode(self) -> bytes:
         """Bytes for the wire."""
-        return _pack((VERSION, *self))
+        return pack(*self)
 
     @classmethod
     def decode(cls, payload: bytes, row_bytes: int) -> "Rows | None":
         """The message in the bytes, None if there is none or its rows aren't `row_bytes` long."""
-        fields = _unpack(payload, 5)
-        if fields is None or not _ints(fields[1:3]):
+        fields = unpack(payload, 5)
+        if fields is None or not ints(fields[1:3]):
             return None
         _, _, length, rows, final = fields
         if not isinstance(rows, bytes) or not isinstance(final, bool):
@@ -164,13 +152,13 @@ class Progress(NamedTuple):
 
     def encode(self) -> bytes:
         """Bytes for the wire."""
-        return _pack((VERSION, *self))
+        return pack(*self)
 
     @classmethod
     def decode(cls, payload: bytes) -> "Progress | None":
         """The message in the bytes, None if there is none."""
-        fields = _unpack(payload, 4)
-        return cls(*fields[1:]) if fields is not None and _ints(fields[1:]) else None
+        fields = unpack(payload, 4)
+        return cls(*fields[1:]) if fields is not None and ints(fields[1:]) else None
 
 
 class Notice(NamedTuple):
@@ -180,54 +168,15 @@ class Notice(NamedTuple):
 
     def encode(self) -> bytes:
         """Bytes for the wire."""
-        return _pack((VERSION, self.text[:MAX_NOTICE]))
+        return pack(self.text[:MAX_NOTICE])
 
     @classmethod
     def decode(cls, payload: bytes) -> "Notice | None":
         """The message in the bytes, None if there is none."""
-        fields = _unpack(payload, 2)
+        fields = unpack(payload, 2)
         if fields is None or type(fields[1]) is not str or len(fields[1]) > MAX_NOTICE:
             return None
         return cls(printable(fields[1].replace("\n", " ")))
-
-
-class Report(NamedTuple):
-    """The last word of a process: counters by name."""
-
-    values: Mapping[str, Value]
-
-    def number(self, name: str) -> float:
-        """A counter, 0 if the process didn't count it."""
-        value = self.values.get(name, 0)
-        return value if isinstance(value, int | float) else 0
-
-    def encode(self) -> bytes:
-        """Bytes for the wire; a text that is too long loses its end."""
-        values = {
-            name: value[:MAX_TEXT] if isinstance(value, str) else value
-            for name, value in self.values.items()
-        }
-        return _pack((VERSION, values))
-
-    @classmethod
-    def decode(cls, payload: bytes) -> "Report | None":
-        """The message in the bytes, None if there is none."""
-        fields = _unpack(payload, 2)
-        if fields is None or not isinstance(fields[1], dict):
-            return None
-        if len(fields[1]) > _MAX_VALUES:
-            return None
-        values: dict[str, Value] = {}
-        for name, value in fields[1].items():
-            if type(name) is not str or len(name) > _MAX_NAME:
-                return None
-            if type(value) is str and len(value) <= MAX_TEXT:
-                values[printable(name)] = printable(value)
-            elif _ints([value]) or _finite([value]):
-                values[printable(name)] = value
-            else:
-                return None
-        return cls(values)
 
 
 class Go(NamedTuple):
@@ -238,42 +187,10 @@ class Go(NamedTuple):
 
     def encode(self) -> bytes:
         """Bytes for the wire."""
-        return _pack((VERSION, *self))
+        return pack(*self)
 
     @classmethod
     def decode(cls, payload: bytes) -> "Go | None":
         """The message in the bytes, None if there is none."""
-        fields = _unpack(payload, 3)
-        return cls(*fields[1:]) if fields is not None and _ints(fields[1:]) else None
-
-
-def printable(text: str) -> str:
-    """Text as it may be shown: lines, but nothing that a terminal would obey or hide."""
-    if text.isprintable():
-        return text
-    return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
-
-
-def _pack(fields: tuple[object, ...]) -> bytes:
-    packed: bytes = msgpack.packb(fields)
-    return packed
-
-
-def _unpack(payload: bytes, length: int) -> list[Any] | None:
-    if len(payload) > MAX_BYTES:
-        return None
-    try:
-        fields = msgpack.unpackb(payload)
-    except (ValueError, TypeError, RecursionError, msgpack.UnpackException):
-        return None
-    if type(fields) is not list or len(fields) != length or fields[0] != VERSION:
-        return None
-    return fields
-
-
-def _ints(values: list[Any]) -> bool:
-    return all(type(value) is int and -_MAX_INT <= value < _MAX_INT for value in values)
-
-
-def _finite(values: list[Any]) -> bool:
-    return all(type(value) is float and isfinite(value) for value in values)
+        fields = unpack(payload, 3)
+        return cls(*fields[1:]) if fields is not None and ints(fields[1:]) else None

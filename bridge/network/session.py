@@ -16,7 +16,7 @@ from typing import TypeVar
 import zenoh
 
 from bridge.network import zenoh_log
-from bridge.network.messages import MAX_BYTES
+from bridge.network.packing import MAX_BYTES
 from configs.brief import TlsFiles
 
 ONE_THREAD = (

@@ -19,7 +19,7 @@ import zenoh
 from zenoh.handlers import Callback, RingChannel
 
 from bridge.network import zenoh_log
-from bridge.network.access import AccessPlan, agent_user
+from bridge.network.access import AccessPlan
 from bridge.network.denials import Denials, directives, is_ours
 from bridge.network.floods import FloodGuard, deafen
 from bridge.network.link import ROOM_BYTES, Arrival, Dropped, Inbox, Publisher
@@ -39,6 +39,7 @@ from bridge.process import Stop
 from bridge.waiting import readable
 from configs.brief import LEASE_S, NetworkLink, Outside
 from configs.errors import InfrastructureError
+from configs.roles import AGENT
 
 CLOSE_S = 1.0
 _PROBE_S = 1.0
@@ -247,7 +248,7 @@ class RouterLink(ZenohLink):
 
     def look_for_floods(self, ticks: int, now_s: float) -> None:
         """Cut off controllers that say far too much; call it several times a second."""
-        controllers = self.denials.peers(agent_user(""))
+        controllers = self.denials.peers(AGENT.identity())
         for peer in self._guard.look(controllers, ticks, now_s):
             self.denials.note_flood(controllers[peer], peer)
 

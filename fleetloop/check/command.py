@@ -7,10 +7,11 @@ from pathlib import Path
 
 from rich.table import Table
 
-from configs.deployment import Deployment, agent_role, load_deployment
+from configs.deployment import Deployment, load_deployment
 from configs.errors import Complaint, ScenarioError
 from configs.loading import json_schema, load, shipped
 from configs.overrides import Overrides
+from configs.roles import AGENT
 from configs.scenario import Scenario
 from fleetloop.check.examine import examine
 from fleetloop.check.finding import Finding, named, worst
@@ -132,7 +133,7 @@ def place_findings(scenario: Scenario, deployment: Deployment) -> list[Finding]:
     for robot in scenario.names:
         bus = dict(deployment.bus_of(robot))
         drives = "emulated" if deployment.emulates(robot) else "REAL"
-        where = "here" if deployment.runs_here(agent_role(robot)) else "elsewhere"
+        where = "here" if deployment.runs_here(AGENT.process(robot)) else "elsewhere"
         text = f"controller {where}, {drives} drives on {bus['interface']} {bus['channel']}"
         found.append(Finding("ok", "place", text, (robot,)))
     return found

@@ -11,11 +11,12 @@ from pathlib import Path
 from agents.__main__ import run
 from bridge.launcher import RUN_ENDED
 from bridge.process import LAUNCHER_GONE, keep_to_itself
-from configs.deployment import agent_role, load_deployment
+from configs.deployment import load_deployment
 from configs.errors import InfrastructureError, ScenarioError
 from configs.loading import load
 from configs.overrides import Overrides
 from configs.resolve import agent_brief
+from configs.roles import AGENT
 from fleetloop.launch import placement
 from fleetloop.launch.signals import stop_on_signals
 from fleetloop.terminal import note
@@ -40,7 +41,7 @@ def run_agent(source: str, robot: str, deployment_file: Path, overrides: Overrid
             ' wall clock; it must be "realtime" (--clock realtime)'
         )
     deployment = load_deployment(deployment_file, scenario)
-    role = agent_role(robot)
+    role = AGENT.process(robot)
     keep_to_itself()
     network = placement.network_link(scenario, deployment, role)
     bus = placement.agent_bus(deployment, robot)

@@ -27,6 +27,7 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from configs.errors import InfrastructureError
+from configs.roles import STARTED
 from fleetloop import packages
 
 BIRTH_S = 20.0
@@ -37,7 +38,7 @@ _MORE, _ALL_BORN = "+", "."
 _BATCH = "--batch"
 """Processes are born as batch work: who is woken waits for its turn instead of interrupting, which
 is worth a seventh of a lockstep tick."""
-_ROLES = ("agents", "plant")
+_FORKED = tuple(role.module for role in STARTED if role.forked)
 """Forked; any other module gets an interpreter of its own, and no descriptors."""
 
 
@@ -131,7 +132,7 @@ def _serve(folder: Path) -> None:
 
     if _BATCH in sys.argv:
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
-    for role in _ROLES:
+    for role in _FORKED:
         __import__(f"{role}.__main__")
     gc.collect()
     gc.freeze()
@@ -197,7 +198,7 @@ def _be(module: str, stdin: int, stdout: int, *_: int) -> None:
         for fd, standard in ((stdin, 0), (stdout, 1)):
             os.dup2(fd, standard)
             os.close(fd)
-        if module not in _ROLES:
+        if module not in _FORKED:
             os.execv(sys.executable, [sys.executable, "-P", "-m", module])
         role = sys.modules[f"{module}.__main__"]
         status = role.main()

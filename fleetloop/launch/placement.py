@@ -7,6 +7,7 @@ from bridge.network import access
 from configs.brief import NetworkLink, Outside, PlantBrief, Settings, TlsFiles
 from configs.deployment import Deployment, NetworkSection, passwords, tls_files
 from configs.errors import ScenarioError
+from configs.roles import LOCALISATION, identity_of
 from configs.scenario import Scenario
 
 
@@ -88,9 +89,9 @@ def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
     Raises:
         ScenarioError: the deployment's credentials lack one of them.
     """
-    identities = [access.user_of(role) for role in deployment.elsewhere(scenario)]
+    identities = [identity_of(role) for role in deployment.elsewhere(scenario)]
     if any(not deployment.emulates(robot) for robot in scenario.names):
-        identities.append(access.LOCALISATION)
+        identities.append(LOCALISATION.name)
     known = passwords(deployment.network, (*identities, *bus_guests(deployment)))
     return known | {user: _as_option(known[user]) for user in bus_guests(deployment)}
 
@@ -136,7 +137,7 @@ def network_link(scenario: Scenario, deployment: Deployment, role: str) -> Netwo
         raise ScenarioError(
             f"{role} on its own needs a deployment with [network] endpoint: where its router is"
         )
-    user = access.user_of(role)
+    user = identity_of(role)
     (password,) = passwords(network, (user,)).values()
     run = network.run or scenario.name
     return NetworkLink(run, network.endpoint, user, password, _tls(network, user))

@@ -27,11 +27,12 @@ from bridge.network.messages import Progress
 from bridge.process import Stop, go_realtime, keep_to_itself, name_process, settled_memory
 from bridge.telemetry import PLANT_ROW, RowBuffer
 from configs.brief import NetworkLink, PlantBrief, Settings
-from configs.deployment import PLANT, Deployment, load_deployment
+from configs.deployment import Deployment, load_deployment
 from configs.errors import ScenarioError
 from configs.loading import load
 from configs.overrides import Override, Overrides
 from configs.resolve import plant_brief
+from configs.roles import PLANT
 from configs.scenario import Scenario
 from configs.signals import PLANT_SIGNALS
 from fleetloop.launch import open_files, placement
@@ -122,7 +123,7 @@ def run_plant(source: str, options: Options) -> int:
 def _join(scenario: Scenario, deployment: Deployment) -> int:
     """Be the plant of a run whose launcher is elsewhere."""
     keep_to_itself()
-    network = placement.network_link(scenario, deployment, PLANT)
+    network = placement.network_link(scenario, deployment, PLANT.name)
     brief = placement.robots_of_plant(plant_brief(scenario, network=network), deployment)
     attached = {bus for bus, _ in brief.attached}
     ours = [bus for bus in dict.fromkeys(r.bus for r in brief.robots) if bus not in attached]
@@ -182,7 +183,7 @@ def _run(
     watch = _Watch(robots, brief.schedule.period_ns)
     rows = [RowBuffer(PLANT_ROW, lambda *_: None) for _ in robots]
     loop = RealtimeLoop(brief, robots, end, hub, [nowhere] * len(robots), rows, watch.look, {})
-    refused = go_realtime(PLANT_PRIORITY)
+    missing = go_realtime(PLANT_PRIORITY)
     if options.serve_stdin:
         threading.Thread(target=_serve_stdin, args=(robots, loop, stop), daemon=True).start()
     _say_ready(brief, buses, as_json=options.as_json)
@@ -193,7 +194,7 @@ def _run(
         note(f"BUS {bus}: {trouble}")
     frames = ", ".join(f"{bus} {count}" for bus, count in loop.counters.frames.items())
     late = f"; late ticks: {loop.counters.overruns}" if loop.counters.overruns else ""
-    jitter = f" (refused to this user: {', '.join(refused)})" if late and refused else ""
+    jitter = f" (missing privileges: {', '.join(missing)})" if late and missing else ""
     if not options.as_json:
         note(f"{loop.counters.wall_ns * 1e-9:.1f} s; frames: {frames}{late}{jitter}")
 

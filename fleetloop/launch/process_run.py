@@ -23,16 +23,18 @@ from typing import Any
 from bridge.can_bus import sockets
 from bridge.can_bus.relay import Relay
 from bridge.clock import wall_of
-from bridge.network import access, keys
+from bridge.network import keys
 from bridge.network.barrier import Hellos
 from bridge.network.link import Arrival, Link, waiting
-from bridge.network.messages import Go, LeaderSpeed, Progress, Report
+from bridge.network.messages import Go, LeaderSpeed, Progress
+from bridge.network.reports import LauncherReport, Report
 from bridge.network.zenoh_link import RouterLink, open_router
 from bridge.process import Stop, cpu_ns
 from configs.brief import LEASE_S, LOCAL_LEASE_S, NetworkLink
-from configs.deployment import Deployment, roles_of
+from configs.deployment import Deployment
 from configs.errors import FleetloopError, InfrastructureError
 from configs.resolve import leader_brief, schedule
+from configs.roles import LAUNCHER, PLANT, RECORDER, identity_of, processes_of
 from configs.scenario import Scenario
 from fleetloop.launch import open_files, placement
 from fleetloop.launch.child import (
@@ -111,7 +113,7 @@ class ProcessRun:
         self._on_progress = on_progress
         self._on_notice = on_notice
         self._robots = scenario.names
-        self._processes = roles_of(scenario)
+        self._processes = processes_of(scenario.names)
         self._children: list[Child] = []
         self._alive: set[str] = set()
         self._next_look_s = 0.0
@@ -120,7 +122,7 @@ class ProcessRun:
         self._ticking = False
         period_s = scenario.clock.control_period_s
         self._machine = MachineWatch(
-            lambda: self.outcome.ticks * period_s, partial(self._note, access.LAUNCHER)
+            lambda: self.outcome.ticks * period_s, partial(self._note, LAUNCHER.name)
         )
         self._now = self._machine.clock.now
         self.outcome = Outcome()
@@ -131,7 +133,7 @@ class ProcessRun:
         Raises:
             InfrastructureError: the run could not start.
         """
-        refuse_shadowed_roles(("agents", "plant", "fleetloop"))
+        refuse_shadowed_roles(("agents", PLANT.name, "fleetloop"))
         open_files.ensure(len(self._processes))
         began = time.monotonic()
         try:
@@ -155,7 +157,7 @@ class ProcessRun:
                 self.outcome.notices["router"] = refusals
             self._words.note_dropped(link.dropped())
             if refusals := self._words.refusals.lines():
-                self.outcome.notices.setdefault(access.LAUNCHER, []).extend(refusals)
+                self.outcome.notices.setdefault(LAUNCHER.name, []).extend(refusals)
             self._blame_floods(link.denials.flooders)
         finally:
             end(self._children, grace_s=0.0)
@@ -178,7 +180,7 @@ class ProcessRun:
                 at = scenario.network.endpoint
                 router = open_router(at, plan, folder, outside, lease_s=lease_s, unread_s=unread_s)
                 link = open_.enter_context(router)
-                link.declare_live(keys.live(run, access.LAUNCHER))
+                link.declare_live(keys.live(run, LAUNCHER.name))
                 link.watch_live(keys.live_all(run), "live")
                 # One by one: a wildcard is wider than any identity's rights and would be refused.
                 for process in self._processes:
@@ -233,7 +235,7 @@ class ProcessRun:
 
     def _watch(self, link: RouterLink, stop: Stop) -> Failure | None:
         """Follow the run until the plant and all controllers have ended."""
-        actors = [child for child in self._children if child.name != "recorder"]
+        actors = [child for child in self._children if child.name != RECORDER.name]
         while not stop.requested:
             self._take(link.receive(WATCH_EVERY_S))
             self._tell_refusals(link)
@@ -242,7 +244,7 @@ class ProcessRun:
                 return self._root_of(failure, link, actors)
             if all(child.ended() for child in actors) and self._elsewhere.ended():
                 return None
-            plant = self._child("plant")
+            plant = self._child(PLANT.name)
             if plant is not None and plant.ended() and (left := self._settle(link, actors)):
                 name = left[0].name
                 return Failure(
@@ -256,8 +258,8 @@ class ProcessRun:
     def _blame_floods(self, cut_off: Iterable[str]) -> None:
         """Who says so much that nobody has time for others is the cause of whoever is too late."""
         reports = self.outcome.reports.values()
-        said = [str(report.values.get("flood", "")) for report in reports]
-        floods = sorted({*filter(None, said), *self._words.refusals.floods()})
+        said = {flooder for report in reports for flooder in report.flooders}
+        floods = sorted(said.union(self._words.refusals.floods()))
         floods += [f"{user} (cut off by the router)" for user in sorted(cut_off)]
         if floods and self.outcome.ended == "aborted":
             self.outcome.reason += f"; flooded by {', '.join(floods)}"
@@ -275,8 +277,8 @@ class ProcessRun:
         """Whose part of the run is broken because the router cut it off; None if nobody's is."""
         lockstep = self._scenario.clock.mode == "lockstep"
         for child in self._children if link.denials.cut_off else ():
-            deaf = access.user_of(child.name) in link.denials.cut_off
-            needed = lockstep or child.name == "recorder"  # else what is newer is as good
+            deaf = identity_of(child.name) in link.denials.cut_off
+            needed = lockstep or child.name == RECORDER.name  # else what is newer is as good
             if deaf and needed and child.name not in self._alive and not child.ended():
                 text = f"{child.name}: did not read what was sent to it, and was cut off"
                 return Failure(GAVE_UP, child.name, text)
@@ -329,7 +331,7 @@ class ProcessRun:
     def _silent(self) -> Failure | None:
         """The process whose progress stopped, None while all are well."""
         limit_s, now_s = self._limit_s(), self._now()
-        for name in ("plant", "recorder"):
+        for name in (PLANT.name, RECORDER.name):
             child, silence = self._child(name), self._vitals.silence(name, now_s)
             if child is None or silence is None or silence.lasted_s <= limit_s or child.ended():
                 continue
@@ -374,7 +376,7 @@ class ProcessRun:
                 silence = self._vitals.beat(process, progress.tick, self._now())
                 if silence is not None:
                     self._note(process, f"goes on after {silence.lasted_s:.1f} s")
-                if process == "plant":
+                if process == PLANT.name:
                     self._ticking = True
                     self.outcome.ticks = progress.tick
                     self.outcome.wall_s = progress.wall_ns * 1e-9
@@ -390,8 +392,8 @@ class ProcessRun:
             self._vitals.end(process)
             self.outcome.reports[process] = report
             self._elsewhere.note_report(process, report)
-            if (early := report.values.get("early")) and self.outcome.ended == "completed":
-                self._on_notice(process, f"left the run early: {early}")
+            if report.left_early and self.outcome.ended == "completed":
+                self._on_notice(process, f"left the run early: {report.left_early}")
         for child in self._children:
             if child.name == process:
                 child.release()
@@ -409,7 +411,7 @@ class ProcessRun:
         if outcome.ended != "completed":
             self._tell_elsewhere(link, outcome.reason)
         # Without launcher those elsewhere stop, if they haven't.
-        link.withdraw_live(keys.live(self._run, access.LAUNCHER))
+        link.withdraw_live(keys.live(self._run, LAUNCHER.name))
         if outcome.ended != "completed":
             if actors:
                 actors[0].ask_to_stop()
@@ -456,8 +458,8 @@ class ProcessRun:
                 return
             if stall := self._machine.lately(self._limit_s() + 1.0):
                 outcome.reason = f"{stall}; {failure.text}"
-            elif left := [name for name, it in outcome.reports.items() if it.values.get("early")]:
-                early = outcome.reports[left[0]].values["early"]
+            elif left := [name for name, it in outcome.reports.items() if it.left_early]:
+                early = outcome.reports[left[0]].left_early
                 outcome.reason = f"{left[0]}: left the run early: {early}; {failure.text}"
 
     def _complete_record(self) -> None:
@@ -472,8 +474,8 @@ class ProcessRun:
         """Why the run ends, before the launcher's token goes."""
         if self._elsewhere.ended():
             return
-        word = Report({"reason": reason}).encode()
-        link.publisher(keys.report(self._run, access.LAUNCHER)).put(word)
+        word = LauncherReport(reason).encode()
+        link.publisher(keys.report(self._run, LAUNCHER.name)).put(word)
         deadline = self._now() + WORD_S
         while not self._elsewhere.ended() and (left_s := deadline - self._now()) > 0.0:
             self._take(link.receive(min(left_s, WATCH_EVERY_S)))
@@ -487,7 +489,7 @@ class ProcessRun:
 
 def _with_refusals(absent: Sequence[str], link: RouterLink) -> str:
     """Who is not there, and what the router refused to somebody who wanted to be it."""
-    named = {role: link.denials.logins_of(access.user_of(role)) for role in absent}
+    named = {role: link.denials.logins_of(identity_of(role)) for role in absent}
     texts = [f"{role} ({'; '.join(found)})" if found else role for role, found in named.items()]
     told = {note for found in named.values() for note in found}
     others = [note for note in link.denials.notes() if note not in told]

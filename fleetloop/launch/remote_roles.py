@@ -8,7 +8,7 @@ lost       token gone, and no report after `GRACE_S`
 
 from collections.abc import Iterable
 
-from bridge.network.messages import Report
+from bridge.network.reports import Report
 from fleetloop.launch.child import CRASHED, GAVE_UP, Failure
 
 GRACE_S = 0.5
@@ -50,8 +50,8 @@ class Elsewhere:
     def failure(self, now_s: float) -> Failure | None:
         """Why one of them ended before its time, None if none did."""
         for process, report in self._reports.items():
-            if text := str(report.values.get("failure", "")):
-                return Failure(GAVE_UP, process, text)
+            if report.failure:
+                return Failure(GAVE_UP, process, report.failure)
         for process, gone_s in self._gone_s.items():
             if process not in self._reports and now_s - gone_s > GRACE_S:
                 text = f"{process}: lost; it, its machine or the network to it is gone"

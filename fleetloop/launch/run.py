@@ -14,6 +14,7 @@ from configs.errors import InfrastructureError, ScenarioError
 from configs.loading import load, to_toml
 from configs.overrides import Overrides
 from configs.resolve import agent_brief, leader_brief, plant_brief, schedule
+from configs.roles import short_name
 from configs.scenario import Scenario
 from fleetloop.check.examine import examine
 from fleetloop.check.finding import likewise, titled, worst
@@ -94,7 +95,7 @@ def run_scenario(source: str, options: Options) -> int:
             progress.show(state.t_ns * 1e-9, state.wall_ns * 1e-9)
 
         def on_notice(process: str, text: str) -> None:
-            progress.notice(f"{process.removeprefix('agent/')}: {text}")
+            progress.notice(f"{short_name(process)}: {text}")
 
         try:
             run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))

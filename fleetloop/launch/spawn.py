@@ -4,17 +4,17 @@ Each is told, by its brief, exactly what it may know; its buses' listening socke
 """
 
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bridge.can_bus import sockets
-from bridge.network import access
 from configs.brief import AgentBrief, NetworkLink, PlantBrief, RecorderBrief
-from configs.deployment import PLANT, RECORDER, Deployment, agent_role
+from configs.deployment import Deployment
 from configs.loading import to_toml
 from configs.resolve import agent_brief, plant_brief, schedule
+from configs.roles import AGENT, PLANT, RECORDER, STARTED
 from configs.scenario import Scenario
 from fleetloop.launch import placement
 from fleetloop.launch.child import Child
@@ -37,69 +37,91 @@ class Orders:
     profile: bool
 
 
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where one process of a run is, among the others."""
+
+    orders: Orders
+    network: NetworkLink
+    folder: Path
+    robot: str  # of a role per robot
+    secrets: Mapping[str, str]
+    """By robot: how its bus knows the controller that it waits for; none in real time."""
+
+
 def spawn(
     orders: Orders, links: Links, folder: Path, nursery: Nursery, children: list[Child]
 ) -> None:
-    """Start the processes, the recorder last, and add them to `children` as they are born.
+    """Start the processes in the order of their roles and add them to `children` as they start.
 
     Raises:
         InfrastructureError: a socket or a process can't be had.
     """
-    scenario, deployment = orders.scenario, orders.deployment
-    realtime = schedule(scenario).realtime
-    here = deployment.runs_here
-    robots = [r for r in scenario.names if deployment.is_ours(r) and here(PLANT)]
-    waited_for = [] if realtime else robots
+    scenario = orders.scenario
+    waited_for = () if schedule(scenario).realtime else _ours(orders)
     told = {robot: secrets.token_hex(16) for robot in waited_for}
-
-    def start(name: str, module: str, fds: Sequence[int] = ()) -> Child:
-        children.append(Child(nursery, name, module, fds))
-        return children[-1]
-
-    if here(PLANT):
-        buses = list(dict.fromkeys(scenario.bus_of(robot) for robot in robots))
-        with ExitStack() as listening:
-            listeners = sockets.listen(folder, buses)
-            for listener in listeners.values():
-                listening.enter_context(listener)
-            plant = start(PLANT, "plant", [listeners[bus].fileno() for bus in buses])
-        brief = replace(
-            _plant(orders, links),
-            listeners=tuple(zip(buses, plant.fds, strict=True)),
-            controllers=tuple(told.items()),
-        )
-        plant.tell(brief)
-    for robot in scenario.names:
-        if here(role := agent_role(robot)):
-            bus = scenario.bus_of(robot)
-            socket = str(sockets.socket_path(folder, bus)) if robot in robots else ""
-            agent = _agent(orders, links, robot, socket, told.get(robot, ""))
-            start(role, "agents").tell(agent)
-    start(RECORDER, "fleetloop.record.recorder").tell(_recorder(orders, links, folder))
+    for role in STARTED:
+        for robot in scenario.names if role.per_robot else ("",):
+            if not orders.deployment.runs_here(role.process(robot)):
+                continue
+            place = Place(orders, links[role.identity(robot)], folder, robot, told)
+            brief = BRIEFS[role.name](place)
+            if isinstance(brief, PlantBrief):
+                children.append(_start_plant(brief, place, nursery))
+                continue
+            children.append(Child(nursery, role.process(robot), role.module))
+            children[-1].tell(brief)
 
 
-def _plant(orders: Orders, links: Links) -> PlantBrief:
+def _ours(orders: Orders) -> tuple[str, ...]:
+    """The robots on buses of ours, which the plant of this machine serves."""
+    deployment = orders.deployment
+    if not deployment.runs_here(PLANT.name):
+        return ()
+    return tuple(robot for robot in orders.scenario.names if deployment.is_ours(robot))
+
+
+def _start_plant(brief: PlantBrief, place: Place, nursery: Nursery) -> Child:
+    """Open the listening sockets of its buses, and hand them to it."""
+    orders = place.orders
+    buses = list(dict.fromkeys(orders.scenario.bus_of(robot) for robot in _ours(orders)))
+    with ExitStack() as listening:
+        listeners = sockets.listen(place.folder, buses)
+        for listener in listeners.values():
+            listening.enter_context(listener)
+        fds = [listeners[bus].fileno() for bus in buses]
+        child = Child(nursery, PLANT.name, PLANT.module, fds)
+    child.tell(replace(brief, listeners=tuple(zip(buses, child.fds, strict=True))))
+    return child
+
+
+def _plant(place: Place) -> PlantBrief:
+    orders = place.orders
     brief = plant_brief(
-        orders.scenario,
-        network=links[access.PLANT],
-        speed=orders.speed,
-        profile=orders.profile,
+        orders.scenario, network=place.network, speed=orders.speed, profile=orders.profile
     )
-    return placement.robots_of_plant(brief, orders.deployment)
+    brief = placement.robots_of_plant(brief, orders.deployment)
+    return replace(brief, controllers=tuple(place.secrets.items()))
 
 
-def _agent(orders: Orders, links: Links, robot: str, socket: str, secret: str) -> AgentBrief:
+def _agent(place: Place) -> AgentBrief:
+    orders, robot = place.orders, place.robot
+    socket = ""
+    if robot in _ours(orders):
+        socket = str(sockets.socket_path(place.folder, orders.scenario.bus_of(robot)))
+    secret = place.secrets.get(robot, "")
     return agent_brief(
         orders.scenario,
         robot,
-        network=links[access.agent_user(robot)],
+        network=place.network,
         bus=placement.agent_bus(orders.deployment, robot, secret=secret, socket=socket),
         speed=orders.speed,
         profile=orders.profile,
     )
 
 
-def _recorder(orders: Orders, links: Links, folder: Path) -> RecorderBrief:
+def _recorder(place: Place) -> RecorderBrief:
+    orders = place.orders
     ticks = schedule(orders.scenario, orders.speed)
     return RecorderBrief(
         str(orders.record),
@@ -110,8 +132,8 @@ def _recorder(orders: Orders, links: Links, folder: Path) -> RecorderBrief:
         ticks.period_ns,
         ticks.start_deadline_s,
         ticks.hello_every_s,
-        links[access.RECORDER],
-        str(folder),
+        place.network,
+        str(place.folder),
         ticks.ticks,
         ticks.bus_time_ns(ticks.ticks) + AFTERWARDS_NS,
     )
@@ -123,3 +145,11 @@ def _recorded(orders: Orders) -> tuple[str, ...]:
     if not scenario.bus.record:
         return ()
     return tuple(dict.fromkeys(scenario.bus_of(r) for r in scenario.names if emulates(r)))
+
+
+BRIEFS: Mapping[str, Callable[[Place], object]] = {
+    PLANT.name: _plant,
+    AGENT.name: _agent,
+    RECORDER.name: _recorder,
+}
+"""What fills the brief of each role that a run starts."""

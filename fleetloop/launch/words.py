@@ -7,8 +7,9 @@ from collections.abc import Iterable
 
 from bridge.network import keys
 from bridge.network.link import Dropped
-from bridge.network.messages import Notice, Progress, Report
+from bridge.network.messages import Notice, Progress
 from bridge.network.refusals import Refusals
+from bridge.network.reports import Report, decode_report
 from configs.brief import Schedule
 
 
@@ -30,7 +31,7 @@ class Words:
 
     def report(self, process: str, payload: bytes) -> Report | None:
         """A process's last word, None if it is none."""
-        report = Report.decode(payload)
+        report = decode_report(process, payload)
         if report is None:
             self.refusals.note("report", process, "not well formed")
         return report

@@ -14,12 +14,14 @@ from bridge.frame import MAX_DATA
 from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.link import Arrival, Dropped
-from bridge.network.messages import Progress, Report, Rows, Value
+from bridge.network.messages import Progress, Rows
 from bridge.network.refusals import Refusals
+from bridge.network.reports import Report
 from bridge.network.zenoh_link import open_client
 from bridge.process import Stop, cpu_ns, serve
 from bridge.telemetry import AGENT_ROW, BLOCK_FRAMES, BLOCK_TICKS, FRAME_ROW, PLANT_ROW
 from configs.brief import RecorderBrief
+from configs.roles import RECORDER
 from fleetloop.record.can_log import frames_of
 from fleetloop.record.run_record import RunRecord
 from fleetloop.record.writer import Source
@@ -154,18 +156,18 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
             link.subscribe(telemetry, f"controller/{robot}", room_bytes=ROOM_BYTES)
         for bus in brief.buses:
             link.subscribe(keys.traffic(name, bus), f"can/{bus}", room_bytes=ROOM_BYTES)
-        progress = link.publisher(keys.progress(name, "recorder"))
-        report = link.publisher(keys.report(name, "recorder"))
+        progress = link.publisher(keys.progress(name, RECORDER.name))
+        report = link.publisher(keys.report(name, RECORDER.name))
         await_hellos(
             link,
             Hellos(brief.hello_every_s),
             recorder.take,
             lambda: sorted(recorder.unheard),
-            who="recorder",
+            who=RECORDER.name,
             within_s=brief.start_deadline_s,
             stop=stop,
         )
-        link.declare_live(keys.live(name, "recorder"))
+        link.declare_live(keys.live(name, RECORDER.name))
         next_report = 0.0
         began_ns = cpu_ns()
         quiet_since = time.monotonic()
@@ -190,13 +192,12 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
             lost = [*refused, f"the run ended before the last of {missing} came"]
         if lost:
             record.note_lost("; ".join(lost))
-        values: dict[str, Value] = {
-            "undecodable": recorder.undecodable,
-            "notices": "\n".join(refused),
-            "flood": ", ".join(recorder.refusals.floods()),
-            "cpu_ns": cpu_ns() - began_ns,
-        }
-        report.put(Report(values).encode())
+        summary = Report(
+            notices=tuple(refused),
+            flooders=tuple(recorder.refusals.floods()),
+            cpu_ns=cpu_ns() - began_ns,
+        )
+        report.put(summary.encode())
         stop.await_release()
     return f"{brief.path} has {recorder.ticks} ticks"
 
@@ -207,4 +208,4 @@ def _tidy(brief: RecorderBrief) -> None:
 
 
 if __name__ == "__main__":
-    raise SystemExit(serve(RecorderBrief, run, name="recorder", orphaned=_tidy))
+    raise SystemExit(serve(RecorderBrief, run, name=RECORDER.name, orphaned=_tidy))

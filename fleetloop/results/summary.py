@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from configs.resolve import leader_brief
+from configs.roles import LAUNCHER, RECORDER
 from configs.scenario import Scenario
 from fleetloop.record.reader import Record
 from fleetloop.results import expectations
@@ -46,7 +47,7 @@ class RunStats:
     left_early: dict[str, str] = field(default_factory=dict)  # robots told to stop, by whom
     cpu_s: dict[str, float] = field(default_factory=dict)
     realtime: dict[str, dict[str, int]] = field(default_factory=dict)
-    refused: set[str] = field(default_factory=set)
+    missing_privileges: set[str] = field(default_factory=set)
     profile_s: dict[str, dict[str, float]] = field(default_factory=dict)
 
 
@@ -227,7 +228,7 @@ def _realtime(controllers: dict[str, np.ndarray], stats: RunStats) -> dict[str, 
             np.concatenate([r["round_trip_s"] for r in controllers.values()])
         ),
         "cpu_percent_of_one_core": round(100.0 * cpu, 1),
-        "refused": sorted(stats.refused),
+        "missing_privileges": sorted(stats.missing_privileges),
         "robots": robots,
     }
 
@@ -237,8 +238,8 @@ def _profile(stats: RunStats, ticks: int) -> dict[str, dict[str, float]] | None:
     if not stats.profile_s or not ticks:
         return None
     parts = dict(stats.profile_s)
-    parts["recorder"] = {"record": stats.cpu_s.get("recorder", 0.0)}
-    parts["launcher"] = {"Zenoh": stats.cpu_s.get("launcher", 0.0)}
+    parts[RECORDER.name] = {"record": stats.cpu_s.get(RECORDER.name, 0.0)}
+    parts[LAUNCHER.name] = {"Zenoh": stats.cpu_s.get(LAUNCHER.name, 0.0)}
     return {
         process: {part: round(seconds / ticks * 1e6, 2) for part, seconds in shares.items()}
         for process, shares in sorted(parts.items())

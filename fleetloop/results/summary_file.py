@@ -68,7 +68,7 @@ class _Realtime(BaseModel):
     late_us: dict[str, float]
     round_trip_us: dict[str, float]
     cpu_percent_of_one_core: float
-    refused: list[str]
+    missing_privileges: list[str]
 
 
 class _Stall(BaseModel):

@@ -177,8 +177,9 @@ def realtime_lines(summary: Summary) -> Iterator[str]:
         f" {trip.get('p50', 0):.0f} p99 {trip.get('p99', 0):.0f} max {trip.get('max', 0):.0f} µs,"
         f" processor {kept['cpu_percent_of_one_core']:g} % of one core"
     )
-    if kept["refused"]:
-        yield f"note: refused to this user, so the clock jitters more: {', '.join(kept['refused'])}"
+    if kept["missing_privileges"]:
+        missing = ", ".join(kept["missing_privileges"])
+        yield f"note: this user lacks privileges, so the clock jitters more: {missing}"
     if kept["miss_percent"] > HOLDS_PERCENT:
         yield (
             f"WARNING: this machine does not hold the rate: {kept['miss_percent']:g} % of the ticks"

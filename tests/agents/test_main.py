@@ -8,7 +8,7 @@ from support.robot_bench import ZERO, Bench, commands, set_points
 
 from agents.__main__ import _Wired
 from agents.guard import Phase
-from agents.lockstep import Counters
+from agents.lockstep import LockstepCounters
 from bridge.can_bus.pythoncan import to_frame
 from bridge.drives.odrive.frames import Command
 from bridge.network.barrier import Hellos
@@ -46,7 +46,7 @@ class Ending:
             raise error
 
         with pytest.raises(type(error)):
-            self.wired.run(body, self.stop, Counters())
+            self.wired.run(body, self.stop, LockstepCounters())
 
 
 @pytest.mark.parametrize(

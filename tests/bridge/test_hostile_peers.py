@@ -20,6 +20,7 @@ from bridge.network import access, keys
 from bridge.network.messages import MOST_BYTES, PathState
 from bridge.network.zenoh_link import POLLED_DEPTH, ZenohLink, open_client, open_polled
 from configs.brief import NetworkLink
+from configs.roles import AGENT
 
 pytestmark = pytest.mark.system
 RUN, ROBOTS = "test", ("r1", "r2", "r3", "r4")
@@ -72,7 +73,7 @@ class Router:
         return self._process.stdout.readline()
 
     def login(self, robot: str) -> NetworkLink:
-        user = access.agent_user(robot)
+        user = AGENT.identity(robot)
         return NetworkLink(RUN, self.endpoint, user, self.passwords[user])
 
     def end(self) -> None:

@@ -13,10 +13,11 @@ import pytest
 from support.addresses import free_port
 from support.processes import Run
 
-from bridge.network import access, keys
+from bridge.network import keys
 from bridge.network.messages import PathState, Rows
 from bridge.network.zenoh_link import ZenohLink, open_client
 from configs.brief import NetworkLink
+from configs.roles import AGENT, identity_of
 from fleetloop.record.reader import Record
 
 pytestmark = pytest.mark.system
@@ -67,7 +68,7 @@ def notices(run: Run) -> str:
 
 def test_lies_about_a_path_variable_move_nobody_and_are_named(tmp_path, monkeypatch) -> None:
     with attacked(tmp_path, monkeypatch, "--duration", "6", "--speed", "1") as attack:
-        with attack.client(access.agent_user("r1")) as r1:
+        with attack.client(AGENT.identity("r1")) as r1:
             mouth = r1.publisher(attack.key(keys.path, "r1"))
             for share in range(0, 100, 10):
                 for state in (
@@ -91,7 +92,7 @@ def test_a_state_in_a_neighbours_place_ends_the_run_with_its_name_or_not_at_all(
     tmp_path, monkeypatch
 ) -> None:
     with attacked(tmp_path, monkeypatch, "--speed", "1") as attack:
-        with attack.client(access.agent_user("r1")) as r1:
+        with attack.client(AGENT.identity("r1")) as r1:
             mouth = r1.publisher(attack.key(keys.path, "r1"))
             for tick in range(0, 15_000, 10):
                 mouth.put(PathState(tick, tick * 2_000_000, 1e6, 0.6).encode())
@@ -103,16 +104,20 @@ def test_a_state_in_a_neighbours_place_ends_the_run_with_its_name_or_not_at_all(
 def test_nonsense_in_a_roles_report_and_progress_ends_nothing(tmp_path, monkeypatch) -> None:
     with attacked(tmp_path, monkeypatch, "--duration", "3", "--speed", "1") as attack:
         for role in ("agent/r1", "recorder", "plant"):
-            with attack.client(access.user_of(role)) as link:
+            with attack.client(identity_of(role)) as link:
                 report = link.publisher(attack.key(keys.report, role))
                 progress = link.publisher(attack.key(keys.progress, role))
-                for values in (
-                    {"misses": float("inf"), "cpu_ns": float("nan")},
-                    {"notices": "\x1b[2J\x1b]0;owned\x07", "frames.r1": 0.5, "misses": 1e300},
-                    {"stopped": ["x"]},
-                    {f"n{n}": n for n in range(5000)},
+                honest = ["", "", ["\x1b[2J\x1b]0;owned\x07"], [], [], 0, {}, {}]
+                own = {"plant": [0, {}, {}, {}, []], "agent/r1": ["", 0, None]}.get(role, [])
+                report.put(msgpack.packb([1, *honest, *own]))
+                for wrong in (
+                    [1, *honest[:5], float("nan"), {}, {}, *own],
+                    [1, *honest[:6], {"x": 1e300}, {}, *own],
+                    [1, *honest[:7], {f"n{n}": n for n in range(5000)}, *own],
+                    [1, ["x"], *honest[1:], *own],
+                    [1, {"misses": float("inf")}],
                 ):
-                    report.put(msgpack.packb([1, values]))
+                    report.put(msgpack.packb(wrong))
                 progress.put(msgpack.packb([1, 2**62, 2**62, -1]))
                 report.put(b"\xc1")
         status, out = attack.run.end()
@@ -130,7 +135,7 @@ def test_ten_megabytes_and_floods_on_ones_own_keys_end_no_run_or_name_their_send
         started = [psutil.Process(p.pid) for p in attack.run.launcher.children(recursive=True)]
         before = {p.pid: p.memory_info().rss for p in (*started, attack.run.launcher)}
         most: dict[int, int] = dict(before)
-        with attack.client(access.agent_user("r1")) as r1:
+        with attack.client(AGENT.identity("r1")) as r1:
             own = [r1.publisher(attack.key(of, "r1")) for of in (keys.path, keys.telemetry)]
             own += [r1.publisher(attack.key(of, "agent/r1")) for of in (keys.progress, keys.report)]
             for mouth in own:

@@ -12,6 +12,7 @@ from bridge.network import access, keys
 from bridge.network.zenoh_link import RouterLink, ZenohLink, open_client, open_router
 from configs.brief import NetworkLink
 from configs.errors import InfrastructureError
+from configs.roles import AGENT, LAUNCHER, LOCALISATION, PLANT
 
 ROBOTS = ("r1", "r2", "r3", "r4")
 HEARS = {"r1": (), "r2": ("r1",), "r3": ("r2",), "r4": ("r2", "r3")}
@@ -39,7 +40,7 @@ def test_rights_of_a_robot_are_its_graph(plan: access.AccessPlan) -> None:
     assert set(rights.hears) == {
         keys.pose(RUN, "r4"),
         keys.go(RUN),
-        keys.report(RUN, access.LAUNCHER),
+        keys.report(RUN, LAUNCHER.name),
         keys.path(RUN, "r2"),
         keys.path(RUN, "r3"),
     }
@@ -76,7 +77,7 @@ def heard_by(link: ZenohLink, seconds: float) -> set[tuple[str, bytes]]:
 def test_a_robot_hears_exactly_its_in_neighbours_on_every_pair(
     router: RouterLink, plan: access.AccessPlan
 ) -> None:
-    links = {robot: client(router, plan, access.agent_user(robot)) for robot in ROBOTS}
+    links = {robot: client(router, plan, AGENT.identity(robot)) for robot in ROBOTS}
     try:
         for link in links.values():
             for other in ROBOTS:
@@ -116,7 +117,7 @@ def test_nobody_can_speak_under_another_robots_key(
     router.subscribe(keys.go(RUN), "go")
     for impostor in ROBOTS:
         router.subscribe(keys.report(RUN, f"agent/{impostor}"), f"report of {impostor}")
-        with client(router, plan, access.agent_user(impostor)) as link:
+        with client(router, plan, AGENT.identity(impostor)) as link:
             forged = [keys.path(RUN, r) for r in ROBOTS if r != impostor]
             forged += [keys.pose(RUN, impostor), keys.leader_speed(RUN), keys.go(RUN)]
             for key in forged:
@@ -158,7 +159,7 @@ def test_a_liveliness_token_comes_and_goes_with_its_session(
     router: RouterLink, plan: access.AccessPlan
 ) -> None:
     router.watch_live(keys.live_all(RUN), "live")
-    with client(router, plan, access.PLANT) as link:
+    with client(router, plan, PLANT.name) as link:
         link.declare_live(keys.live(RUN, "plant"))
         link.declare_live(keys.live(RUN, "recorder"))  # not its own
         arrival = router.receive(5.0)
@@ -183,16 +184,16 @@ def test_the_pose_of_a_robot_that_is_not_emulated_is_the_localisation_systems_al
     plan = access.plan(RUN, ROBOTS, HEARS, ("r1",), real_robots=["r3"])
     pose = keys.pose(RUN, "r3")
     speakers = [user for user, rights in plan.rights.items() if pose in rights.puts]
-    assert speakers == [access.LOCALISATION]
-    assert pose in plan.rights[access.PLANT].hears
-    assert keys.pose(RUN, "r1") in plan.rights[access.PLANT].puts
-    assert access.LOCALISATION not in access.plan(RUN, ROBOTS, HEARS, ("r1",)).rights
+    assert speakers == [LOCALISATION.name]
+    assert pose in plan.rights[PLANT.name].hears
+    assert keys.pose(RUN, "r1") in plan.rights[PLANT.name].puts
+    assert LOCALISATION.name not in access.plan(RUN, ROBOTS, HEARS, ("r1",)).rights
 
 
 def test_a_token_that_is_withdrawn_or_whose_session_ends_is_noticed(
     router: RouterLink, plan: access.AccessPlan
 ) -> None:
-    token = keys.live(RUN, access.LAUNCHER)
+    token = keys.live(RUN, LAUNCHER.name)
     gone = threading.Event()
     with client(router, plan, "agent-r1") as watcher:
         router.declare_live(token)

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.network.messages import (
-    MAX_BYTES,
     MAX_NOTICE,
     Go,
     LeaderSpeed,
@@ -16,9 +15,9 @@ from bridge.network.messages import (
     PathState,
     PoseFix,
     Progress,
-    Report,
     Rows,
 )
+from bridge.network.packing import MAX_BYTES
 
 ints = st.integers(-(2**62), 2**62)
 floats = st.floats(allow_nan=False, allow_infinity=False)
@@ -52,9 +51,7 @@ def test_progress_survives_the_wire(progress: Progress) -> None:
     assert Progress.decode(progress.encode()) == progress
 
 
-def test_a_report_and_a_go_survive_the_wire() -> None:
-    report = Report({"ticks": 3, "stopped": "because", "share": 0.5})
-    assert Report.decode(report.encode()) == report
+def test_a_go_survives_the_wire() -> None:
     assert Go.decode(Go(5, 400).encode()) == Go(5, 400)
 
 
@@ -74,7 +71,6 @@ DECODERS = [
     LeaderSpeed.decode,
     lambda payload: Rows.decode(payload, 24),
     Progress.decode,
-    Report.decode,
     Go.decode,
 ]
 
@@ -118,7 +114,7 @@ def test_a_path_state_that_is_not_exactly_one_is_none(fields) -> None:
 
 
 def test_what_is_too_long_is_not_even_looked_at() -> None:
-    assert Report.decode(msgpack.packb([1, {"x": "y" * MAX_BYTES}])) is None
+    assert Notice.decode(msgpack.packb([1, "y" * MAX_BYTES])) is None
 
 
 def test_the_leader_speed_holds_from_each_step_on_and_before_the_first() -> None:

@@ -17,6 +17,7 @@ from bridge.network import access
 from bridge.network import keys
 from bridge.network.zenoh_link import open_client, open_router
 from configs.brief import NetworkLink
+from configs.roles import AGENT
 
 folder = Path(sys.argv[1])
 plan = access.plan("test", ("r1",), {"r1": ()}, ("r1",))
@@ -37,7 +38,7 @@ def opens_and_closes():
 
 with open_router(None, plan, folder) as lasting:
     lasting.each(keys.path("test", "r1"), lambda _: next(heard))
-    user = access.agent_user("r1")
+    user = AGENT.identity("r1")
     login = NetworkLink("test", lasting.endpoint, user, plan.passwords[user])
     with open_client(login, 10.0) as client:
         mouth = client.publisher(keys.path("test", "r1"))
@@ -86,6 +87,7 @@ from pathlib import Path
 from bridge.network import access
 from bridge.network.zenoh_link import open_client, open_router
 from configs.brief import NetworkLink
+from configs.roles import AGENT
 from configs.errors import InfrastructureError
 plan = access.plan("test", ("r1",), {"r1": ()}, ("r1",))
 try:

@@ -1,18 +1,19 @@
 """What processes reported, put together."""
 
-from bridge.network.messages import Report
+from bridge.awake import Stall
+from bridge.network.reports import AgentReport, PlantReport
 from fleetloop.launch.accounts import stats_of
 from fleetloop.launch.process_run import Outcome
 
 
-def outcome(plant: dict, agent: dict) -> Outcome:
-    return Outcome(reports={"plant": Report(plant), "agent/r1": Report(agent)})
+def outcome(plant: PlantReport, agent: AgentReport) -> Outcome:
+    return Outcome(reports={"plant": plant, "agent/r1": agent})
 
 
 def test_a_robot_that_stops_soon_after_the_plant_stood_still_stopped_because_of_that() -> None:
-    stalled = {"stall.200": 0.1, "stall.x": 1.0}
+    stalled = PlantReport(stalls=(Stall(200, 0.1),))
     for tick, blamed in ((150, False), (195, True), (205, True), (260, True), (300, False)):
-        stopped = {"stopped": "no encoder frames", "stopped_tick": tick}
+        stopped = AgentReport(stop_reason="no encoder frames", stop_tick=tick)
         stats = stats_of(outcome(stalled, stopped), realtime=True, period_s=0.01)
         reason = stats.stopped_robots["r1"]
         assert reason.startswith("no encoder frames")
@@ -22,7 +23,7 @@ def test_a_robot_that_stops_soon_after_the_plant_stood_still_stopped_because_of_
 
 
 def test_what_a_process_said_is_kept_if_it_did_not_live_to_report_it() -> None:
-    ended = outcome({}, {"notices": "a\nb"})
+    ended = outcome(PlantReport(), AgentReport(notices=("a", "b")))
     ended.said = {"agent/r1": ["a"], "agent/r2": ["c"]}
     ended.notices = {"agent/r1": ["no sign of life"]}
     stats = stats_of(ended, realtime=True, period_s=0.01)
@@ -30,5 +31,6 @@ def test_what_a_process_said_is_kept_if_it_did_not_live_to_report_it() -> None:
 
 
 def test_a_controller_that_was_told_to_stop_left_early() -> None:
-    stats = stats_of(outcome({}, {"early": "asked to stop"}), realtime=True, period_s=0.01)
+    ended = outcome(PlantReport(), AgentReport(left_early="asked to stop"))
+    stats = stats_of(ended, realtime=True, period_s=0.01)
     assert stats.left_early == {"r1": "asked to stop"}

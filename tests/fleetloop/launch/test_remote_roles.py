@@ -1,6 +1,6 @@
 """What the launcher makes of roles that somebody else started."""
 
-from bridge.network.messages import Report
+from bridge.network.reports import Report
 from fleetloop.launch.child import CRASHED, GAVE_UP
 from fleetloop.launch.remote_roles import GRACE_S, Elsewhere
 
@@ -25,10 +25,10 @@ def test_without_roles_elsewhere_nobody_is_missed() -> None:
 def test_a_report_is_an_end_and_its_failure_the_runs() -> None:
     far = Elsewhere([R2])
     far.note_token(R2, 0.0, there=True)
-    far.note_report(R2, Report({"failure": "", "ticks": 5}))
+    far.note_report(R2, Report())
     assert far.ended()
     assert far.failure(1.0) is None
-    far.note_report(R2, Report({"failure": "r2: lost its bus"}))
+    far.note_report(R2, Report(failure="r2: lost its bus"))
     failure = far.failure(1.0)
     assert (failure.rank, failure.name, failure.text) == (GAVE_UP, R2, "r2: lost its bus")
 

@@ -7,8 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge.awake import Stall
 from bridge.network.link import Dropped
-from bridge.network.messages import MAX_TEXT, Progress, Report
+from bridge.network.messages import Progress
+from bridge.network.reports import (
+    MAX_TEXT,
+    AgentReport,
+    Deadlines,
+    PlantReport,
+    Report,
+    decode_report,
+)
 from configs.loading import load
 from configs.resolve import schedule
 from fleetloop.launch.accounts import stats_of
@@ -19,50 +28,121 @@ SCENARIO = load("two_robots")
 SCHEDULE = schedule(SCENARIO)
 
 
-def said(values: object) -> bytes:
-    packed: bytes = msgpack.packb([1, values])
+HONEST = ["", "", [], [], [], 0, {}, {}]
+OWN = {"plant": [0, {}, {}, {}, []], "agent/r1": ["", 0, None]}
+
+
+def said(process: str, changes: dict[int, object]) -> bytes:
+    """A report of that process with other values at some places of its layout."""
+    fields = dict(enumerate([1, *HONEST, *OWN.get(process, [])])) | changes
+    packed: bytes = msgpack.packb(list(fields.values()))
     return packed
 
 
 @pytest.mark.parametrize(
-    "values",
+    "process, changes",
     [
-        {"misses": inf},
-        {"misses": -inf},
-        {"cpu_ns": nan},
-        {"ticks": 2**63},
-        {"ticks": True},
-        {"ticks": None},
-        {"ticks": [1]},
-        {"stopped": b"bytes"},
-        {"stopped": "x" * (MAX_TEXT + 1)},
-        {"x" * 1000: 1},
-        {1: 1},
-        {f"name {n}": n for n in range(5000)},
-        "text",
-        [],
+        ("agent/r1", {0: 2}),
+        ("agent/r1", {1: b"bytes"}),
+        ("agent/r1", {1: "x" * (MAX_TEXT + 1)}),
+        ("agent/r1", {3: ["x" * MAX_TEXT, "x"]}),
+        ("agent/r1", {3: "text"}),
+        ("agent/r1", {6: inf}),
+        ("agent/r1", {6: nan}),
+        ("agent/r1", {6: 2**63}),
+        ("agent/r1", {6: True}),
+        ("agent/r1", {6: None}),
+        ("agent/r1", {7: {"x" * 1000: 1}}),
+        ("agent/r1", {7: {1: 1}}),
+        ("agent/r1", {7: {"bus": 0.5}}),
+        ("agent/r1", {8: {f"name {n}": n for n in range(5000)}}),
+        ("agent/r1", {11: [1]}),
+        ("agent/r1", {12: 0}),
+        ("plant", {11: {"r1": 1}}),
+        ("plant", {13: [[200, inf]]}),
+        ("plant", {13: [[200]]}),
+        ("plant", {13: [[n, 0.1] for n in range(1000)]}),
+        ("recorder", {9: 0}),
     ],
-    ids=lambda values: str(values)[:20],
 )
-def test_a_report_with_what_is_no_counter_is_refused_and_its_sender_named(values) -> None:
+def test_a_report_that_is_none_is_refused_and_its_sender_named(process, changes) -> None:
     words = Words(SCHEDULE)
-    assert words.report("agent/r1", said(values)) is None
-    assert words.refusals.lines() == ["refused 1 report of agent/r1: not well formed"]
+    assert words.report(process, said(process, changes)) is None
+    assert words.refusals.lines() == [f"refused 1 report of {process}: not well formed"]
+
+
+def test_no_process_can_send_the_report_of_another_role() -> None:
+    words = Words(SCHEDULE)
+    assert isinstance(words.report("plant", said("plant", {})), PlantReport)
+    assert isinstance(words.report("agent/r1", said("agent/r1", {})), AgentReport)
+    assert words.report("agent/r1", said("plant", {})) is None
 
 
 def test_what_a_terminal_would_obey_is_replaced_in_names_and_texts() -> None:
-    report = Words(SCHEDULE).report(
-        "agent/r1", said({"not\x1b[2Jices": "1st\n\x1b]0;owned\x07\x9b31m\u202e2nd\x7f"})
-    )
+    texts = {3: ["1st\n\x1b]0;owned\x07\x9b31m\u202e2nd\x7f"], 7: {"b\x1b[2Jus": 1}}
+    report = Words(SCHEDULE).report("agent/r1", said("agent/r1", texts))
     assert report is not None
-    ((name, text),) = report.values.items()
-    assert name == "not\ufffd[2Jices"
-    assert text == "1st\n\ufffd]0;owned\ufffd\ufffd31m\ufffd2nd\ufffd"
+    assert report.notices == ("1st\n\ufffd]0;owned\ufffd\ufffd31m\ufffd2nd\ufffd",)
+    assert report.durations_ns == {"b\ufffd[2Jus": 1}
 
 
 def test_an_honest_report_that_is_too_long_arrives_without_its_end() -> None:
-    report = Report.decode(Report({"notices": "x" * 10 * MAX_TEXT}).encode())
-    assert report == Report({"notices": "x" * MAX_TEXT})
+    notices = ("x" * (MAX_TEXT - 1), "yz", "nothing of this")
+    report = AgentReport.decode(AgentReport(notices=notices, failure="x" * 2 * MAX_TEXT).encode())
+    assert report == AgentReport(notices=("x" * (MAX_TEXT - 1), "y"), failure="x" * MAX_TEXT)
+
+
+names = st.text(max_size=8)
+counts = st.dictionaries(names, st.integers(-(2**63), 2**63 - 1), max_size=4)
+texts = st.lists(names, max_size=4).map(tuple)
+common = {
+    "failure": names,
+    "left_early": names,
+    "notices": texts,
+    "flooders": texts,
+    "missing_privileges": texts,
+    "cpu_ns": st.integers(0, 2**62),
+    "durations_ns": counts,
+    "profile_ns": counts,
+}
+stalls = st.builds(Stall, st.integers(-9, 2**40), st.floats(0.0, 1e9))
+by_name = st.dictionaries(names, names, max_size=4)
+reports = st.fixed_dictionaries(
+    {
+        "plant": st.builds(
+            PlantReport,
+            **common,
+            overruns=st.integers(0, 9),
+            frames=counts,
+            stopped_robots=by_name,
+            bus_troubles=by_name,
+            stalls=st.lists(stalls, max_size=4).map(tuple),
+        ),
+        "agent/r1": st.builds(
+            AgentReport,
+            **common,
+            stop_reason=names,
+            stop_tick=st.integers(-9, 2**40),
+            deadlines=st.none() | st.builds(Deadlines, st.integers(0, 9), st.integers(0, 9)),
+        ),
+        "recorder": st.builds(Report, **common),
+    }
+)
+
+
+@given(reports)
+def test_whatever_roles_report_arrives_and_there_are_statistics(reports) -> None:
+    heard = {process: decode_report(process, it.encode()) for process, it in reports.items()}
+    assert {type(report) for report in heard.values()} == {PlantReport, AgentReport, Report}
+    assert heard["plant"].stalls == reports["plant"].stalls
+    assert heard["agent/r1"].deadlines == reports["agent/r1"].deadlines
+    for realtime in (False, True):
+        stats_of(Outcome(reports=heard), realtime=realtime, period_s=0.01)
+
+
+@given(st.sampled_from(["plant", "recorder", "agent/r1"]), st.binary(max_size=64))
+def test_no_bytes_on_a_report_key_raise(process: str, payload: bytes) -> None:
+    Words(SCHEDULE).report(process, payload)
 
 
 @pytest.mark.parametrize(
@@ -95,22 +175,3 @@ def test_what_found_no_room_is_counted_by_its_sender() -> None:
     assert words.refusals.lines() == [
         "refused 40000 progress messages of agent/r1: more than anybody could read"
     ]
-
-
-values = st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False, allow_infinity=False)
-NAMES = """cpu_ns bus_ns misses skipped overruns frames.r1 trouble.r1 stopped stopped.r1 notices
-refused profile.law profile.x early failure ticks stall.3 stall.-7 stopped_tick"""
-names = st.sampled_from(NAMES.split()) | st.text(max_size=8)
-
-
-@given(
-    st.dictionaries(
-        st.sampled_from(["plant", "recorder", "agent/r1", "agent/r2"]),
-        st.dictionaries(names, values | st.text(max_size=8), max_size=8),
-    )
-)
-def test_whatever_roles_report_there_are_statistics(reports) -> None:
-    decoded = {process: Report.decode(said(report)) for process, report in reports.items()}
-    outcome = Outcome(reports={p: report for p, report in decoded.items() if report is not None})
-    for realtime in (False, True):
-        stats_of(outcome, realtime=realtime, period_s=0.01)

@@ -89,7 +89,7 @@ def test_whatever_is_read_can_be_shown(finished_run: Path, folder: Path) -> None
         "late_us": {"p50": 1.0},
         "round_trip_us": {},
         "cpu_percent_of_one_core": 90.0,
-        "refused": ["SCHED_FIFO"],
+        "missing_privileges": ["SCHED_FIFO"],
     }
     summary["machine"] = {
         "stalls": 1,

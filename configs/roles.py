@@ -1,0 +1,113 @@
+"""The roles of a run, one row each: name, process, brief, rights on the network, whom it follows.
+
+    role          processes                              started by
+    plant         one                                    `fleetloop run` or `plant --join`
+    agent         one per robot, agent/<robot>           `fleetloop run` or `fleetloop agent`
+    recorder      one, on the launcher's machine         `fleetloop run`
+    localisation  one, if robots aren't emulated         the operator: a program of the robots' own
+    launcher      one                                    the operator; its session is in the router
+
+Spawning, access control, keys and deployments read this table. A role more is a row here, its
+module, and the function that fills its brief (`fleetloop.launch.spawn.BRIEFS`). Modules are named
+by strings: the processes that read the table import none of them.
+"""
+
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from configs.brief import AgentBrief, PlantBrief, RecorderBrief
+
+
+class Topic(Enum):
+    """Keys of a run by their meaning to a role; `bridge.network.access` resolves them."""
+
+    OWN_PATH = auto()
+    OWN_POSE = auto()
+    OWN_TELEMETRY = auto()
+    PATHS_OF_IN_NEIGHBOURS = auto()
+    LEADER_SPEED = auto()  # of robots with h_i = 1
+    EMULATED_POSES = auto()  # of the robots that the plant emulates
+    MEASURED_POSES = auto()  # of the robots that it doesn't
+    TRUTHS = auto()
+    TELEMETRIES = auto()
+    TRAFFIC = auto()
+    GO = auto()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Role:
+    """One kind of process of a run."""
+
+    name: str
+    module: str = ""
+    """Runs it with `python -m`; empty for a role that no run starts."""
+    brief: type | None = None
+    """What it is given on standard input."""
+    per_robot: bool = False
+    forked: bool = False
+    """Forked from a process that imported it; others get an interpreter of their own."""
+    beside_launcher: bool = False
+    """Can't be placed on another machine."""
+    puts: tuple[Topic, ...] = ()
+    hears: tuple[Topic, ...] = ()
+    watches: tuple[str, ...] = ()
+    """Roles whose liveliness token and report it may see."""
+
+    def process(self, robot: str = "") -> str:
+        """The name of this role's process: plant, or agent/<robot>."""
+        return f"{self.name}/{robot}" if self.per_robot else self.name
+
+    def identity(self, robot: str = "") -> str:
+        """The user as which this role's process comes to the router: plant, or agent-<robot>."""
+        return identity_of(self.process(robot))
+
+
+LAUNCHER = Role(name="launcher")
+PLANT = Role(
+    name="plant",
+    module="plant",
+    brief=PlantBrief,
+    forked=True,
+    puts=(Topic.EMULATED_POSES, Topic.TRUTHS, Topic.TRAFFIC),
+    hears=(Topic.GO, Topic.MEASURED_POSES),
+    watches=(LAUNCHER.name,),
+)
+AGENT = Role(
+    name="agent",
+    module="agents",
+    brief=AgentBrief,
+    per_robot=True,
+    forked=True,
+    puts=(Topic.OWN_PATH, Topic.OWN_TELEMETRY),
+    hears=(Topic.OWN_POSE, Topic.GO, Topic.PATHS_OF_IN_NEIGHBOURS, Topic.LEADER_SPEED),
+    watches=(LAUNCHER.name,),
+)
+RECORDER = Role(
+    name="recorder",
+    module="fleetloop.record.recorder",
+    brief=RecorderBrief,
+    beside_launcher=True,
+    hears=(Topic.TRUTHS, Topic.TRAFFIC, Topic.TELEMETRIES),
+)
+LOCALISATION = Role(name="localisation", puts=(Topic.MEASURED_POSES,), hears=(Topic.GO,))
+
+ROLES = (PLANT, AGENT, RECORDER, LOCALISATION, LAUNCHER)
+"""In the order in which a run starts them."""
+STARTED = tuple(role for role in ROLES if role.module)
+
+
+def identity_of(process: str) -> str:
+    """The user as which a process comes to the router."""
+    return process.replace("/", "-")
+
+
+def short_name(process: str) -> str:
+    """How people call a process: a controller by its robot, others by their role."""
+    return process.removeprefix(f"{AGENT.name}/")
+
+
+def processes_of(robots: tuple[str, ...]) -> tuple[str, ...]:
+    """The processes of a run, in the order in which it starts them."""
+    return tuple(
+        role.process(robot) for role in STARTED for robot in (robots if role.per_robot else ("",))
+    )
