@@ -23,7 +23,8 @@ from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.link import Arrival, Link, Publisher
 from bridge.network.messages import Notice, Rows
 from bridge.network.reports import AgentReport
-from bridge.network.zenoh_link import POLLED_DEPTH, StoppedError, open_polled
+from bridge.network.client import StoppedError, open_polled
+from bridge.network.zenoh_link import POLLED_DEPTH
 from bridge.process import (
     Stop,
     cpu_ns,

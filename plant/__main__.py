@@ -20,7 +20,7 @@ from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.link import Arrival, Link, Publisher, waiting
 from bridge.network.messages import Go, Notice, PoseFix, Progress, Rows
 from bridge.network.reports import PlantReport
-from bridge.network.zenoh_link import StoppedError, open_client
+from bridge.network.client import StoppedError, open_client
 from bridge.process import (
     Stop,
     cpu_ns,

@@ -10,8 +10,14 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import Generic, TypeVar
 
-from bridge.can_bus import packet as wire
-from bridge.can_bus.packet import Key, Stamped, Submitted
+from bridge.can_bus.packet import (
+    FRAMES,
+    Key,
+    Stamped,
+    Submitted,
+    encode_lost,
+    frames_in,
+)
 from bridge.frame import Frame
 
 BACKLOG = 100_000
@@ -21,7 +27,7 @@ TURN = 1024
 _Item = TypeVar("_Item")
 
 
-class Spoken(Generic[_Item]):
+class SubmissionQueue(Generic[_Item]):
     """What the clients of a bus sent and nobody has taken yet, in order.
 
     What a controller says in lockstep is taken at once. The others get `TURN` frames through at a
@@ -52,7 +58,7 @@ class Spoken(Generic[_Item]):
         return now
 
 
-class Counters:
+class BusCounters:
     """What went over one bus."""
 
     __slots__ = ("dropped", "from_clients", "from_drives", "garbage", "joins")
@@ -85,10 +91,10 @@ class Bus:
         "name",
         "owing",
         "queue",
-        "said",
+        "received",
         "stamp_ns",
-        "strangers",
-        "taken",
+        "submitted",
+        "unidentified",
     )
 
     def __init__(
@@ -98,15 +104,15 @@ class Bus:
         self.listener = listener
         self.queue = queue
         self.controllers = controllers
-        self.said: Spoken[Submitted] = Spoken()
+        self.submitted: SubmissionQueue[Submitted] = SubmissionQueue()
         self.departed: list[Key] = []
         self.stamp_ns = -1  # not powered up yet
         self.clients: list[Connection] = []
-        self.strangers: list[Connection] = []  # connected, and have not said hello
+        self.unidentified: list[Connection] = []  # connected, and have not said hello
         self.held: list[Connection] = []  # not read until what was said is taken
-        self.taken: Spoken[Frame] = Spoken()
+        self.received: SubmissionQueue[Frame] = SubmissionQueue()
         self.owing = 0
-        self.counters = Counters()
+        self.counters = BusCounters()
 
     def joined_controllers(self) -> set[str]:
         """Robots whose controllers are there."""
@@ -120,7 +126,6 @@ class Connection:
         "backlog",
         "batched",
         "bus",
-        "gone",
         "held",
         "joined",
         "key",
@@ -131,6 +136,7 @@ class Connection:
         "own",
         "pending",
         "receive",
+        "released",
         "send_now",
         "sock",
         "synchronous",
@@ -143,7 +149,7 @@ class Connection:
         self.mask = mask  # what the hub waits for at its socket
         self.name = ""
         self.key: Key = 0
-        self.gone = 0  # frames that left its transmit queue
+        self.released = 0  # frames that left its transmit queue
         self.pending: list[Stamped] = []  # what a synchronous client hears with its next question
         self.joined = self.synchronous = self.batched = self.own = self.owes = False
         self.held = False  # it isn't read until what its bus said was taken
@@ -162,7 +168,7 @@ class Connection:
             return False
         except OSError:
             # It has gone; what it said before is still to be read, and then its end.
-            self.bus.counters.dropped += wire.frames_in(packet)
+            self.bus.counters.dropped += frames_in(packet)
         return True
 
     def pend(self, frame: Stamped) -> None:
@@ -189,28 +195,28 @@ class Connection:
             self.missing = 0
         return True
 
-    def say_last(self, packet: bytes) -> None:
+    def send_last(self, packet: bytes) -> None:
         """Send a last packet; what is still kept is lost, and the client told how much."""
         self.bus.counters.dropped += self._kept_frames()
-        self.missing += sum(map(wire.frames_in, self.backlog))
+        self.missing += sum(map(frames_in, self.backlog))
         self.backlog.clear()
         with contextlib.suppress(OSError):
             # A full socket takes two packets more once it may hold more: the kernel doubles this.
             room = self.sock.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
             self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, room)
             if self.missing:
-                self.send_now(wire.encode_lost(self.missing))
+                self.send_now(encode_lost(self.missing))
             self.send_now(packet)
 
     def _keep(self, packet: bytes) -> None:
         if len(self.backlog) >= BACKLOG:
-            self._lose(wire.frames_in(packet))
+            self._lose(frames_in(packet))
             return
         self._tell_missing()
         self.backlog.append(packet)
 
     def _kept_frames(self) -> int:
-        return sum(wire.frames_in(kept) for kept in self.backlog if kept[0] == wire.FRAMES)
+        return sum(frames_in(kept) for kept in self.backlog if kept[0] == FRAMES)
 
     def _lose(self, count: int) -> None:
         self.bus.counters.dropped += count
@@ -219,5 +225,5 @@ class Connection:
     def _tell_missing(self) -> None:
         """The client is told of what is missing before anything newer."""
         if self.missing:
-            self.backlog.append(wire.encode_lost(self.missing))
+            self.backlog.append(encode_lost(self.missing))
             self.missing = 0

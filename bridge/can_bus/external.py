@@ -40,7 +40,7 @@ BACKLOG = 10_000
 _FAILURES = (can.CanError, OSError, ValueError)  # ValueError: a descriptor that was closed
 
 
-class Counters:
+class ExternalBusCounters:
     """What went over one bus, and what did not."""
 
     __slots__ = ("dropped", "error_frames", "from_clients", "from_drives", "garbage", "outages")
@@ -79,7 +79,7 @@ class _Attachment:
         self.bus: can.BusABC | None = None
         self.fd: int | None = None
         self.taken: list[Frame] = []
-        self.counters = Counters()
+        self.counters = ExternalBusCounters()
         self.failing_since_s: float | None = None
         self.deaf = 0  # failed receives since it last worked
         self.retry_s = 0.0
@@ -159,7 +159,7 @@ class ExternalBuses:
         """How many buses are open: nobody knows who listens on them."""
         return sum(attachment.bus is not None for attachment in self._all.values())
 
-    def counters(self, name: str) -> Counters:
+    def counters(self, name: str) -> ExternalBusCounters:
         """What went over a bus so far."""
         return self._all[name].counters
 
@@ -307,7 +307,7 @@ class CombinedPort:
         return self._end_of(name).receive(name)
 
     def clients(self) -> int:
-        """How many may be listening."""
+        """Number of buses or clients that may be listening."""
         return sum(end.clients() for end in self._both)
 
     def counters(self, name: str) -> FrameCounters:

@@ -1,75 +1,75 @@
-"""How far a sender may run ahead of who takes its packets, where the line itself sets no bound.
+"""Credit-based flow control between a remote client and the relay.
 
-    sender      may send while  sent < given                   given starts at `WINDOW_BYTES`
-    receiver    gives back what was taken, a quarter of the window at a time:
-                given = `WINDOW_BYTES` + taken
+    sender      may send while  sent < granted          granted starts at `INITIAL_CREDIT_BYTES`
+    receiver    returns the credit of consumed packets, a quarter of the initial credit at a time:
+                granted = `INITIAL_CREDIT_BYTES` + consumed
 
-    room        kind u8 = `ROOM`, 7 bytes padding, taken u64   little endian, 16 bytes
+    CREDIT      kind u8 = 0x40, 7 bytes padding, consumed u64        little endian, 16 bytes
 
-A packet counts as its length, at least `LEAST_BYTES`: as in a socket, a small one costs room too.
-The last packet may go past the window, so that one as large as it gets always fits. Room packets
-are outside the count. `taken` is a total, so one that is lost or late is made good by the next.
+A packet costs its length, at least `LEAST_BYTES`: a small packet also occupies a buffer. The last
+packet may exceed the credit, so that a packet of maximum length always fits. CREDIT packets cost
+nothing. `consumed` is a total, so the next CREDIT packet replaces a lost or late one.
 """
 
 import struct
 
 from bridge.can_bus.packet import MAX_BYTES
 
-WINDOW_BYTES = 128 * 1024
+INITIAL_CREDIT_BYTES = 128 * 1024
 LEAST_BYTES = 256
-ROOM = 0x40
-_ROOM = struct.Struct("<B7xQ")
+CREDIT = 0x40
+_CREDIT = struct.Struct("<B7xQ")
 
 
 def cost(packet: bytes) -> int:
-    """What a packet takes of a window [bytes]."""
+    """Credit that a packet costs [bytes]."""
     return max(len(packet), LEAST_BYTES)
 
 
 class Sender:
-    """The end that must not run ahead."""
+    """The sending end: spends credit."""
 
-    __slots__ = ("_given", "_sent")
+    __slots__ = ("_granted", "_sent")
 
     def __init__(self) -> None:
         self._sent = 0
-        self._given = WINDOW_BYTES
+        self._granted = INITIAL_CREDIT_BYTES
 
-    def has_room(self) -> bool:
-        """Whether one more packet may go."""
-        return self._sent < self._given
+    def has_credit(self) -> bool:
+        """Whether one more packet may be sent."""
+        return self._sent < self._granted
 
-    def send(self, packet: bytes) -> None:
-        """Count a packet that goes."""
+    def spend(self, packet: bytes) -> None:
+        """Count a packet that is sent."""
         self._sent += cost(packet)
 
-    def hear(self, packet: bytes) -> bool:
-        """Take a room packet; False if it is something else."""
-        if len(packet) != _ROOM.size or packet[0] != ROOM:
+    def grant(self, packet: bytes) -> bool:
+        """Take the credit of a CREDIT packet; False if the packet is another one."""
+        if len(packet) != _CREDIT.size or packet[0] != CREDIT:
             return False
-        _, taken = _ROOM.unpack(packet)
-        # Nobody gives back what was never sent.
-        self._given = max(self._given, WINDOW_BYTES + min(taken, self._sent))
+        _, consumed = _CREDIT.unpack(packet)
+        # No receiver consumes more than was sent.
+        self._granted = max(self._granted, INITIAL_CREDIT_BYTES + min(consumed, self._sent))
         return True
 
 
 class Receiver:
-    """The end that takes."""
+    """The receiving end: returns credit."""
 
-    __slots__ = ("_arrived", "_taken", "_told")
+    __slots__ = ("_arrived", "_consumed", "_returned")
 
     def __init__(self) -> None:
-        self._arrived = self._taken = self._told = 0
+        self._arrived = self._consumed = self._returned = 0
 
     def arrive(self, packet: bytes) -> bool:
-        """Count a packet that came; False if its sender ran ahead of what it was given."""
+        """Count a packet that arrived; False if its sender exceeded the credit."""
         self._arrived += cost(packet)
-        return self._arrived - self._told <= WINDOW_BYTES + MAX_BYTES
+        return self._arrived - self._returned <= INITIAL_CREDIT_BYTES + MAX_BYTES
 
-    def take(self, packet: bytes) -> bytes | None:
-        """Count a packet that is out of the way; the room packet to send if one is due."""
-        self._taken += cost(packet)
-        if self._taken - self._told < WINDOW_BYTES // 4:
+    def consume(self, packet: bytes) -> bytes | None:
+        """Count a packet that was consumed; return the CREDIT packet to send, if one is due."""
+        self._consumed += cost(packet)
+        if self._consumed - self._returned < INITIAL_CREDIT_BYTES // 4:
             return None
-        self._told = self._taken
-        return _ROOM.pack(ROOM, self._taken)
+        self._returned = self._consumed
+        return _CREDIT.pack(CREDIT, self._consumed)

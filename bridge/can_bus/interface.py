@@ -35,12 +35,26 @@ import can
 from can.typechecking import AutoDetectedConfig, CanFilters
 
 from bridge.can_bus import options, sockets
-from bridge.can_bus import packet as wire
-from bridge.can_bus.credentials import OPTIONS, as_option, network_of
+from bridge.can_bus.credentials import OPTIONS, as_option
+from bridge.can_bus.packet import (
+    BATCHED,
+    BYE,
+    DONE,
+    FRAMES,
+    HELLO,
+    LOST,
+    MAX_FRAMES,
+    MORE,
+    OWN,
+    SYNCHRONOUS,
+    VERSION,
+    decode,
+    encode_frames,
+    encode_text,
+)
 from bridge.can_bus.pythoncan import to_frame, to_message
-from bridge.can_bus.transport import Line, UnixTransport
+from bridge.can_bus.transport import JoinError, Transport, connect
 from bridge.frame import Frame
-from configs.errors import ScenarioError
 
 FLUSH_S = 10.0
 """How long a hub that doesn't read may keep waiting who gathers what it sends."""
@@ -109,45 +123,23 @@ class FleetloopBus(can.BusABC):
         self._closed_because: str | None = None
         self._queue = 0  # frames that may wait at this node; 0: frames take no time
         self._said = self._gone = 0  # frames sent, and how many of them have left the queue
-        self._line = self._connect(own, timeout_s, remote)
-        self._send_now, self._next = self._line.send, self._line.receive
+        self._transport = self._connect(own, timeout_s, remote)
+        self._send_now, self._next = self._transport.send, self._transport.receive
         self.channel_info = f"fleetloop bus {self.channel}"
         self._can_protocol = can.CanProtocol.CAN_20
         super().__init__(channel=self.channel, can_filters=can_filters)
 
-    def _open_line(self, hello: bytes, timeout_s: float, remote: dict[str, str]) -> Line:
-        if not remote:
-            return UnixTransport(sockets.find(self.channel), hello, timeout_s)
-        # Zenoh costs nobody anything who doesn't need it.
-        from bridge.can_bus.zenoh_transport import ZenohTransport
-
-        return ZenohTransport(network_of(remote), self.channel, hello, timeout_s)
-
-    def _connect(self, own: bool, timeout_s: float, remote: dict[str, str]) -> Line:
-        flags = wire.SYNCHRONOUS if self._synchronous else wire.BATCHED if self._batched else 0
-        flags |= wire.OWN if own else 0
+    def _connect(self, own: bool, timeout_s: float, remote: dict[str, str]) -> Transport:
+        flags = SYNCHRONOUS if self._synchronous else BATCHED if self._batched else 0
+        flags |= OWN if own else 0
         name = f"{self._name}\0{self._secret}" if self._synchronous else socket.gethostname()
-        hello = wire.encode_text(wire.HELLO, name, flags=flags, count=wire.VERSION)
-        line = None
+        hello = encode_text(HELLO, name, flags=flags, count=VERSION)
         try:
-            line = self._open_line(hello, timeout_s, remote)
-            said = line.receive(timeout_s)
-        except (OSError, ValueError, sockets.NoSuchBusError, ScenarioError) as error:
-            if line is not None:
-                line.close()
-            late = isinstance(error, TimeoutError) and not remote
-            reason = "no answer in time" if late else str(error)
-            raise can.CanInitializationError(f"bus {self.channel!r}: {reason}") from error
-        answer = wire.decode(said) if said else None
-        if answer is None or answer.kind != wire.WELCOME:
-            line.close()
-            if said is None:
-                raise can.CanInitializationError(f"bus {self.channel!r}: no answer in time")
-            reason = answer.text if answer is not None else "it closed without a word"
-            raise can.CanInitializationError(f"bus {self.channel!r} refused: {reason}")
-        self._stamp_ns = answer.stamp_ns
-        self._queue = answer.room
-        return line
+            transport, welcome = connect(self.channel, hello, timeout_s, remote)
+        except JoinError as error:
+            raise can.CanInitializationError(f"bus {self.channel!r}{error}") from error
+        self._stamp_ns, self._queue = welcome.stamp_ns, welcome.credit
+        return transport
 
     # --- python-can's contract -------------------------------------------------------------------
 
@@ -200,11 +192,11 @@ class FleetloopBus(can.BusABC):
         if self._batched:
             if self._is_shutdown:
                 raise self._gone_with(None)
-            if len(self._outbox) == wire.MAX_FRAMES:
+            if len(self._outbox) == MAX_FRAMES:
                 self._flush(0)
             self._outbox.append(frame)
             return
-        data = wire.encode_frames(0, self._stamp_ns, (frame,))
+        data = encode_frames(0, self._stamp_ns, (frame,))
         try:
             self._send_now(data)
         except BlockingIOError:
@@ -219,7 +211,7 @@ class FleetloopBus(can.BusABC):
 
     def fileno(self) -> int:
         """The descriptor that becomes readable with the next frame."""
-        return self._line.fileno()
+        return self._transport.fileno()
 
     def shutdown(self) -> None:
         """Leave the bus; what was sent before is delivered. Idempotent.
@@ -231,9 +223,9 @@ class FleetloopBus(can.BusABC):
         super().shutdown()
         try:
             if self._outbox:
-                self._flush(wire.DONE)
+                self._flush(DONE)
         finally:
-            self._line.close()
+            self._transport.close()
 
     @staticmethod
     def _detect_available_configs() -> list[AutoDetectedConfig]:
@@ -248,7 +240,7 @@ class FleetloopBus(can.BusABC):
         """Take one packet; False if none came in time."""
         if self._owes and not (wait_s is not None and wait_s <= 0.0):
             self._owes = False
-            self._flush(wire.DONE)
+            self._flush(DONE)
         elif self._outbox:
             self._flush(0)
         if self._closed_because is not None:
@@ -263,12 +255,12 @@ class FleetloopBus(can.BusABC):
         return True
 
     def _take(self, data: bytes) -> None:
-        packet = wire.decode(data)
-        if packet is not None and packet[0] == wire.FRAMES:
+        packet = decode(data)
+        if packet is not None and packet[0] == FRAMES:
             _, flags, _, stamp_ns, frames, _, self._gone, before_ns, _ = packet
             self._stamp_ns = stamp_ns
-            self._owes = self._synchronous and not flags & wire.MORE
-            timestamp, channel, is_rx = stamp_ns / 1e9, self.channel, not flags & wire.OWN
+            self._owes = self._synchronous and not flags & MORE
+            timestamp, channel, is_rx = stamp_ns / 1e9, self.channel, not flags & OWN
             put = self._inbox.append
             if before_ns:
                 for (can_id, content), ago_ns in zip(frames, before_ns, strict=True):
@@ -277,12 +269,12 @@ class FleetloopBus(can.BusABC):
                 return
             for can_id, content in frames:
                 put(to_message(can_id, content, timestamp, channel, is_rx))
-        elif packet is not None and packet.kind == wire.BYE:
+        elif packet is not None and packet.kind == BYE:
             self._closed_because = packet.text
             raise self._closed()
-        elif packet is not None and packet.kind == wire.LOST:
-            self.lost += packet.room
-            _LOG.warning("bus %r: %d frames lost: not read in time", self.channel, packet.room)
+        elif packet is not None and packet.kind == LOST:
+            self.lost += packet.credit
+            _LOG.warning("bus %r: %d frames lost: not read in time", self.channel, packet.credit)
         elif not data:
             raise self._gone_with(None)
 
@@ -330,7 +322,7 @@ class FleetloopBus(can.BusABC):
 
     def _flush(self, flags: int) -> None:
         frames, self._outbox = self._outbox, []
-        data = wire.encode_frames(flags, self._stamp_ns, frames)
+        data = encode_frames(flags, self._stamp_ns, frames)
         try:
             self._send_now(data)
         except BlockingIOError:
@@ -341,7 +333,9 @@ class FleetloopBus(can.BusABC):
 
     def _send_late(self, data: bytes, timeout: float | None) -> None:
         deadline = time.monotonic() + (PATIENCE_S if timeout is None else timeout)
-        while (left_s := deadline - time.monotonic()) > 0.0 and self._line.await_writable(left_s):
+        while (left_s := deadline - time.monotonic()) > 0.0 and self._transport.await_writable(
+            left_s
+        ):
             try:
                 self._send_now(data)
             except BlockingIOError:

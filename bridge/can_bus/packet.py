@@ -99,7 +99,7 @@ class Packet(NamedTuple):
     stamp_ns: int
     frames: tuple[Frame, ...]
     text: str
-    room: int = 0
+    credit: int = 0
     before_ns: tuple[int, ...] = ()  # of each frame; empty: all of them ended at `stamp_ns`
     flawed: int = 0  # frames that were none of classic CAN
 
@@ -119,21 +119,21 @@ def encode_frames(flags: int, stamp_ns: int, frames: Sequence[Frame]) -> bytes:
     return _HEADER.pack(FRAMES, flags, count, 0, stamp_ns) + b"".join(body)
 
 
-def encode_stamped(flags: int, stamp_ns: int, frames: Sequence[Stamped], room: int) -> bytes:
+def encode_stamped(flags: int, stamp_ns: int, frames: Sequence[Stamped], credit: int) -> bytes:
     """A FRAMES packet of frames that ended at or before `stamp_ns`, each at its own time."""
     count = len(frames)
     body = [_FRAME.pack(can_id, len(data), data) for _, (can_id, data) in frames]
     before = [min(stamp_ns - end_ns, LONGEST_BEFORE_NS) for end_ns, _ in frames]
-    header = _HEADER.pack(FRAMES, flags, count, room & 0xFFFF_FFFF, stamp_ns)
+    header = _HEADER.pack(FRAMES, flags, count, credit & 0xFFFF_FFFF, stamp_ns)
     return header + b"".join(body) + struct.pack(f"<{count}I", *before)
 
 
-def split(flags: int, stamp_ns: int, frames: Sequence[Stamped], room: int) -> Iterator[bytes]:
+def split(flags: int, stamp_ns: int, frames: Sequence[Stamped], credit: int) -> Iterator[bytes]:
     """The same in as many packets as it takes, at least one."""
     last = max(len(frames) - 1, 0) // MAX_FRAMES * MAX_FRAMES
     for first in range(0, last + 1, MAX_FRAMES):
         more = MORE if first < last else 0
-        yield encode_stamped(flags | more, stamp_ns, frames[first : first + MAX_FRAMES], room)
+        yield encode_stamped(flags | more, stamp_ns, frames[first : first + MAX_FRAMES], credit)
 
 
 def frames_in(packet: bytes) -> int:
@@ -150,10 +150,10 @@ def encode_text(
     flags: int = 0,
     count: int = 0,
     stamp_ns: int = 0,
-    room: int = 0,
+    credit: int = 0,
 ) -> bytes:
     """A packet of any other kind."""
-    return _HEADER.pack(kind, flags, count, room, stamp_ns) + text.encode()[:1024]
+    return _HEADER.pack(kind, flags, count, credit, stamp_ns) + text.encode()[:1024]
 
 
 def encode_lost(frames: int) -> bytes:
@@ -165,23 +165,25 @@ def decode(packet: bytes) -> Packet | None:
     """The packet in the bytes, None if there is none."""
     size = len(packet)
     if size == _TWO.size and packet[0] == FRAMES and packet[2] == 2 and packet[3] == 0:
-        kind, flags, count, room, stamp, id_1, n_1, data_1, id_2, n_2, data_2 = _TWO.unpack(packet)
+        kind, flags, count, credit, stamp, id_1, n_1, data_1, id_2, n_2, data_2 = _TWO.unpack(
+            packet
+        )
         if n_1 <= MAX_DATA and n_2 <= MAX_DATA and id_1 <= ID_MASK_11 and id_2 <= ID_MASK_11:
             both = (_new(Frame, (id_1, data_1[:n_1])), _new(Frame, (id_2, data_2[:n_2])))
-            return _new(Packet, (kind, flags, count, stamp, both, "", room, (), 0))
+            return _new(Packet, (kind, flags, count, stamp, both, "", credit, (), 0))
     if size == _ONE.size and packet[0] == FRAMES and packet[2] == 1 and packet[3] == 0:
-        kind, flags, count, room, stamp, can_id, n, data = _ONE.unpack(packet)
+        kind, flags, count, credit, stamp, can_id, n, data = _ONE.unpack(packet)
         if n <= MAX_DATA and can_id <= ID_MASK_11:
             one = (_new(Frame, (can_id, data[:n])),)
-            return _new(Packet, (kind, flags, count, stamp, one, "", room, (), 0))
+            return _new(Packet, (kind, flags, count, stamp, one, "", credit, (), 0))
     if size < _HEADER.size:
         return None
-    kind, flags, count, room, stamp = _HEADER.unpack_from(packet)
+    kind, flags, count, credit, stamp = _HEADER.unpack_from(packet)
     body = packet[_HEADER.size :]
     if kind == FRAMES:
-        return _decode_frames(Packet(kind, flags, count, stamp, (), "", room), body)
+        return _decode_frames(Packet(kind, flags, count, stamp, (), "", credit), body)
     if HELLO <= kind <= LOST:
-        return Packet(kind, flags, count, stamp, (), body.decode("utf-8", "replace"), room)
+        return Packet(kind, flags, count, stamp, (), body.decode("utf-8", "replace"), credit)
     return None
 
 

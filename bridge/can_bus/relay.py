@@ -1,23 +1,17 @@
-"""The relay: lets guests from other machines onto the buses of a run, in the router's process.
+"""The relay: connects remote clients (guests) to the buses of a run, in the router's process.
 
-    guest ── up ──► router ── window ──► Unix socket ──► hub
-          ◄─ down ─        ◄─ window ──             ◄──
+    guest ── up ──► router ── credit ──► Unix socket ──► hub
+          ◄─ down ─        ◄─ credit ──             ◄──
 
-A guest's packets go to the hub over a Unix socket of its own, and the hub's to the guest, verbatim:
-to the hub a guest is a client like any other. The router's access control binds the `user` in a
-guest's keys to its login; the relay lets a user onto the buses that it was granted, and says why it
-refuses.
+The relay forwards packets verbatim; to the hub a guest is a client like any other. The router binds
+the `user` in a guest's keys to its login; the relay opens only the buses granted to the user. One
+thread serves all guests and never blocks. Credit (`flow_control`) bounds the packets under way in
+both directions; packets that a guest doesn't read stay with the hub, which keeps and counts them.
 
-Nothing waits here. Both ways a window (`bridge.can_bus.flow_control`) bounds what is on its way: a
-guest whose hub is busy sees its transmit buffer full, and what a guest doesn't read stays with the
-hub, which keeps and counts it as it does for all its clients. So one thread serves all guests.
-
-A guest that leaves says goodbye behind its last packet and is told when all before it has reached
-the hub; one whose liveliness token goes has left. The bus's end goes to every guest with its
-reason, and the relay waits a little until they have it.
-
-Whatever a guest says, in whatever order, ends at most its own line: keys that are no line's and
-packets that nobody waits for are dropped, and what is held for a user is bounded.
+A guest leaves with a BYE, confirmed when the hub has all its packets, or with its liveliness token.
+At the end of a bus every guest gets the reason and may confirm it for `GOODBYE_S`. Unknown keys
+and unexpected packets are dropped, at worst with the connection of their guest. Longer than 350
+lines: a guest's state and the loop that moves its packets are one protocol.
 """
 
 import contextlib
@@ -31,14 +25,19 @@ import time
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import zenoh
 
-from bridge.can_bus import packet as wire
 from bridge.can_bus import sockets
 from bridge.can_bus.flow_control import Receiver, Sender
+from bridge.can_bus.packet import (
+    BYE,
+    HELLO,
+    MAX_BYTES,
+    REFUSED,
+    encode_text,
+)
 from bridge.network import keys
 from bridge.network.link import Publisher
 from bridge.network.zenoh_link import ZenohLink
@@ -57,7 +56,7 @@ MAX_LINES = 32
 MAX_HELD_BYTES = 16 * 1024 * 1024
 """What may wait here of one user; who keeps to its lines' windows never gets there."""
 _EVENT_BYTES = 256
-_BYE = bytes((wire.BYE,))
+_BYE = bytes((BYE,))
 _HANG_UP = select.EPOLLHUP | select.EPOLLERR
 _log = logging.getLogger(__name__)
 
@@ -71,14 +70,24 @@ class _Event(NamedTuple):
 class Guest:
     """A guest that has said hello. Nothing here waits."""
 
-    __slots__ = ("awaits", "down", "leaving", "place", "room", "sock", "taken", "told", "waiting")
+    __slots__ = (
+        "awaits",
+        "down",
+        "leaving",
+        "place",
+        "receiver",
+        "sender",
+        "sock",
+        "told",
+        "waiting",
+    )
 
     def __init__(self, place: str, sock: socket.socket, down: Publisher) -> None:
         self.place = place
         self.sock = sock
         self.down = down
-        self.room = Sender()  # of the way down
-        self.taken = Receiver()  # of the way up
+        self.sender = Sender()  # of the way down
+        self.receiver = Receiver()  # of the way up
         self.waiting: deque[bytes] = deque()  # the hub has no room for these yet
         self.leaving = self.told = False  # it said goodbye; it was told of the end
         self.awaits = READ
@@ -93,8 +102,8 @@ class Guest:
             except OSError:
                 self.waiting.clear()  # the hub has gone; its last words are still to be read
                 return True
-            if (room := self.taken.take(self.waiting.popleft())) is not None:
-                self.down.put(room)
+            if (credit := self.receiver.consume(self.waiting.popleft())) is not None:
+                self.down.put(credit)
         return True
 
     def pull(self, most: int | None) -> bool:
@@ -102,9 +111,9 @@ class Guest:
 
         None: all that is there, room or not: the hub's last words are as many as a socket holds.
         """
-        while most is None or (most > 0 and self.room.has_room()):
+        while most is None or (most > 0 and self.sender.has_credit()):
             try:
-                packet = self.sock.recv(wire.MAX_BYTES)
+                packet = self.sock.recv(MAX_BYTES)
             except BlockingIOError:
                 return True
             except ConnectionResetError:
@@ -114,18 +123,18 @@ class Guest:
             if not packet:
                 return False
             self.told |= packet[:1] == _BYE
-            self.room.send(packet)
+            self.sender.spend(packet)
             self.down.put(packet)
             most = most and most - 1
         return True
 
     def wants(self) -> int:
         """What to wait for at the hub's socket."""
-        read = READ if self.room.has_room() and not self.leaving else 0
+        read = READ if self.sender.has_credit() and not self.leaving else 0
         return read | (WRITE if self.waiting else 0)
 
 
-class Relay:
+class Relay(contextlib.AbstractContextManager["Relay"]):
     """Joins guests and hub; a context manager.
 
     Args:
@@ -176,15 +185,7 @@ class Relay:
             wake, self._wake = self._wake, -1
         os.close(wake)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     # --- on Zenoh's threads ----------------------------------------------------------------------
@@ -264,17 +265,17 @@ class Relay:
         kind = packet[0] if packet else 0
         if guest is None:
             # Who isn't alive has left: what it said before it left may come later than its end.
-            if kind == wire.HELLO and place in self._alive and self._over_at is None:
+            if kind == HELLO and place in self._alive and self._over_at is None:
                 self._join(place, packet)
-            elif kind == wire.BYE:
+            elif kind == BYE:
                 self._unheard.discard(place)
             return
-        if kind == wire.HELLO or guest.leaving:
+        if kind == HELLO or guest.leaving:
             return  # a hello that was said again
-        if kind == wire.BYE:
+        if kind == BYE:
             guest.leaving = True
-        elif not guest.room.hear(packet):
-            if len(packet) > wire.MAX_BYTES or not guest.taken.arrive(packet):
+        elif not guest.sender.grant(packet):
+            if len(packet) > MAX_BYTES or not guest.receiver.arrive(packet):
                 self._end(guest, "you sent more than there was room for")
                 return
             guest.waiting.append(packet)
@@ -301,13 +302,13 @@ class Relay:
         granted = self._granted.get(user, ())
         here = ", ".join(self._buses)
         if run not in ("", self._folder.name):
-            self._refuse(down, f"no run {run!r} is here but {self._folder.name!r}; buses: {here}")
+            _refuse(down, f"no run {run!r} is here but {self._folder.name!r}; buses: {here}")
         elif bus not in self._buses:
-            self._refuse(down, f"no bus {bus!r} is up; buses here: {here}")
+            _refuse(down, f"no bus {bus!r} is up; buses here: {here}")
         elif ALL_BUSES not in granted and bus not in granted:
-            self._refuse(down, f"{user!r} may open {', '.join(granted) or 'no bus'}, not {bus!r}")
+            _refuse(down, f"{user!r} may open {', '.join(granted) or 'no bus'}, not {bus!r}")
         elif sum(_user_of(other) == user for other in self._guests) >= MAX_LINES:
-            self._refuse(down, f"{user!r} has {MAX_LINES} lines open already")
+            _refuse(down, f"{user!r} has {MAX_LINES} lines open already")
         else:
             sock = None
             try:
@@ -319,12 +320,9 @@ class Relay:
             except OSError as error:
                 if sock is not None:
                     sock.close()
-                self._refuse(down, f"the bus doesn't answer: {error}")
+                _refuse(down, f"the bus doesn't answer: {error}")
                 return
             self._guests[place] = self._by_fd[sock.fileno()] = Guest(place, sock, down)
-
-    def _refuse(self, down: Publisher, reason: str) -> None:
-        down.put(wire.encode_text(wire.REFUSED, reason))
 
     def _leave(self, place: str) -> None:
         """A guest is no more: what it said before still reaches the hub, what it hears is lost."""
@@ -343,7 +341,7 @@ class Relay:
     def _end(self, guest: Guest, reason: str) -> None:
         """Leave the hub in a guest's name; it is told why, if the hub hasn't said so."""
         if not guest.told:
-            guest.down.put(wire.encode_text(wire.BYE, reason))
+            guest.down.put(encode_text(BYE, reason))
         if not guest.leaving:
             self._unheard.add(guest.place)
         self._part(guest)
@@ -353,6 +351,10 @@ class Relay:
             del self._by_fd[guest.sock.fileno()]
             self._epoll.unregister(guest.sock)
             guest.sock.close()
+
+
+def _refuse(down: Publisher, reason: str) -> None:
+    down.put(encode_text(REFUSED, reason))
 
 
 def _user_of(place: str) -> str:

@@ -8,18 +8,21 @@ import contextlib
 import select
 import socket
 import struct
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 
-from bridge.can_bus import packet as wire
+from bridge.can_bus import sockets
+from bridge.can_bus.packet import MAX_BYTES, WELCOME, Packet, decode
 from bridge.waiting import readable
+from configs.errors import InfrastructureError, ScenarioError
 
 FINE_S = 0.05
 """Waits below this are kept to the microsecond; the kernel's own bound counts in its ticks."""
 _TIMEVAL = struct.Struct("ll")
 
 
-class Line(Protocol):
+class Transport(Protocol):
     """One client's connection to a hub."""
 
     def send(self, packet: bytes) -> None:
@@ -36,6 +39,10 @@ class Line(Protocol):
 
     def close(self) -> None:
         """Leave; what was sent arrives, and who waits in another thread wakes. Idempotent."""
+
+
+class JoinError(OSError):
+    """A client could not join a bus; the text has the reason."""
 
 
 class UnixTransport:
@@ -85,15 +92,15 @@ class UnixTransport:
             if wait_s is None or wait_s >= FINE_S:
                 if wait_s != self._bound_s:
                     self._limit(wait_s)
-                return self._recv(wire.MAX_BYTES)
+                return self._recv(MAX_BYTES)
             if wait_s > 0.0:
                 readable([self._socket], wait_s)
-            return self._recv(wire.MAX_BYTES, socket.MSG_DONTWAIT)
+            return self._recv(MAX_BYTES, socket.MSG_DONTWAIT)
         except BlockingIOError:
             return None
         except ConnectionResetError:
             # The hub closed with something of ours unread; what it said is still to be read.
-            return self._recv(wire.MAX_BYTES, socket.MSG_DONTWAIT)
+            return self._recv(MAX_BYTES, socket.MSG_DONTWAIT)
         except ValueError as error:  # a descriptor of −1
             raise OSError("the line is closed") from error
 
@@ -111,6 +118,46 @@ class UnixTransport:
         """Let the kernel bound a receive: one system call instead of two."""
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, _timeval(wait_s))
         self._bound_s = wait_s
+
+
+def connect(
+    channel: str, hello: bytes, timeout_s: float, remote: Mapping[str, str]
+) -> tuple[Transport, Packet]:
+    """Join a bus: its transport, and the WELCOME of its hub.
+
+    Args:
+        channel: bus, run/bus or path of a socket.
+        hello: the client's HELLO packet.
+        timeout_s: bound of the whole handshake.
+        remote: options of a client on another machine (`credentials`); empty on this machine.
+
+    Raises:
+        JoinError: no such bus, no answer in time, or the hub refused; the text begins ": " or
+            " refused: ".
+    """
+    transport: Transport | None = None
+    try:
+        if remote:
+            # Only remote clients pay for loading Zenoh.
+            from bridge.can_bus.credentials import network_of
+            from bridge.can_bus.zenoh_transport import ZenohTransport
+
+            transport = ZenohTransport(network_of(remote), channel, hello, timeout_s)
+        else:
+            transport = UnixTransport(sockets.find(channel), hello, timeout_s)
+        data = transport.receive(timeout_s)
+    except (OSError, ValueError, InfrastructureError, ScenarioError) as error:
+        if transport is not None:
+            transport.close()
+        late = isinstance(error, TimeoutError) and not remote
+        raise JoinError(f": {'no answer in time' if late else error}") from error
+    answer = decode(data) if data else None
+    if answer is not None and answer.kind == WELCOME:
+        return transport, answer
+    transport.close()
+    if data is None:
+        raise JoinError(": no answer in time")
+    raise JoinError(f" refused: {answer.text if answer else 'it closed without a word'}")
 
 
 def _timeval(wait_s: float | None) -> bytes:

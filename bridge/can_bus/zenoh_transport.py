@@ -22,17 +22,21 @@ from collections import deque
 
 import zenoh
 
-from bridge.can_bus import packet as wire
 from bridge.can_bus.flow_control import Receiver, Sender
+from bridge.can_bus.packet import (
+    BYE,
+    REFUSED,
+    encode_text,
+)
 from bridge.network import keys
-from bridge.network.zenoh_link import open_client
+from bridge.network.client import open_client
 from configs.brief import NetworkLink
 from configs.errors import InfrastructureError
 
 BACKLOG = 100_000
 CLOSE_S = 1.0
 _FIRST_HELLO_S, _LAST_HELLO_S = 0.01, 0.2
-_ENDS = frozenset({wire.BYE, wire.REFUSED})
+_ENDS = frozenset({BYE, REFUSED})
 
 
 class ZenohTransport:
@@ -50,7 +54,7 @@ class ZenohTransport:
         self._packets: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._lock = threading.Lock()  # packets and descriptor change together
         self._news = threading.Condition(self._lock)
-        self._room, self._taken = Sender(), Receiver()
+        self._sender, self._receiver = Sender(), Receiver()
         self._held: deque[bytes] = deque()  # past the backlog: no room is given back for them yet
         self._broken = ""
         self._ended = threading.Event()
@@ -102,12 +106,12 @@ class ZenohTransport:
             if self._readable < 0 or self._broken:
                 return None
             answer = None
-            if not self._room.hear(packet):
+            if not self._sender.grant(packet):
                 self._keep(packet)
-                if kind == wire.BYE:
+                if kind == BYE:
                     answer = packet  # heard
                 elif self._packets.qsize() < BACKLOG:
-                    answer = self._taken.take(packet)
+                    answer = self._receiver.consume(packet)
                 else:
                     self._held.append(packet)
             if kind in _ENDS:
@@ -141,16 +145,17 @@ class ZenohTransport:
         with self._lock:
             if self._broken or self._readable < 0:
                 raise OSError(self._broken or "the line is closed")
-            if not self._room.has_room():
+            if not self._sender.has_credit():
                 raise BlockingIOError
-            self._room.send(packet)
+            self._sender.spend(packet)
         self._say(packet)
 
     def await_writable(self, timeout_s: float) -> bool:
         """Wait until there is room to send, or the line is broken."""
         with self._news:
             return self._news.wait_for(
-                lambda: self._room.has_room() or bool(self._broken) or self._readable < 0, timeout_s
+                lambda: self._sender.has_credit() or bool(self._broken) or self._readable < 0,
+                timeout_s,
             )
 
     def receive(self, wait_s: float | None) -> bytes | None:
@@ -169,10 +174,10 @@ class ZenohTransport:
                 raise OSError(self._broken or "the line is closed")
             with contextlib.suppress(BlockingIOError):
                 os.eventfd_read(self._readable)
-            room = self._taken.take(self._held.popleft()) if self._held else None
-        if room is not None:
+            credit = self._receiver.consume(self._held.popleft()) if self._held else None
+        if credit is not None:
             with contextlib.suppress(OSError):  # the line's end is still to be read
-                self._say(room)
+                self._say(credit)
         return packet
 
     def _say(self, packet: bytes) -> None:
@@ -197,6 +202,6 @@ class ZenohTransport:
         os.close(readable)
         if not self._broken:
             with contextlib.suppress(OSError):
-                self._say(wire.encode_text(wire.BYE))
+                self._say(encode_text(BYE))
         self._ended.wait(CLOSE_S)
         self._link.close()

@@ -11,7 +11,7 @@ taken. A controller says at most one path state per tick, and its rows by the bl
 
 The kernel then drops what comes; hung up on, Zenoh's clients would be back at once. Whoever was cut
 off is so again at every login from then on (`bridge.network.denials`). The socket is Zenoh's, found
-by its descriptor as in `bridge.network.listening`. Messages are counted as TCP segments with data:
+by its descriptor as in `bridge.network.router`. Messages are counted as TCP segments with data:
 those that travel together count once, and cost as little.
 """
 

@@ -27,6 +27,7 @@ ROUTER_THREADS = (
     "(app: (worker_threads: 1), net: (handover: app), acc: (handover: app),"
     " rx: (worker_threads: 2), tx: (worker_threads: 1))"
 )
+WAIT_BEFORE_CLOSE = "transport/link/tx/queue/congestion_control/block/wait_before_close"
 _Kept = TypeVar("_Kept")
 
 

@@ -1,61 +1,30 @@
-"""A link over Zenoh: client sessions to one router, which enforces the graph.
+"""Zenoh links: one Zenoh session as a `bridge.network.link.Link`.
 
-Reliable, blocking, real-time priority: nothing is dropped. Express, nothing waits for a batch.
-Subscribers run on Zenoh's network thread and only queue. Every session is closed in a `with`: one
-that isn't can keep its process from ending. All are kept until it ends
-(`bridge.network.session.keep`).
+Messages are reliable, blocking, express and of real-time priority: none is dropped, none waits for
+a batch. Subscribers run on Zenoh's network thread and only queue. A session that is not closed can
+keep its process from ending, so every link is closed in a `with`; session objects are kept until
+the process ends (`bridge.network.session.keep`). `client` opens links to a router, `router` is one.
 """
 
-import contextlib
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
 import zenoh
 from zenoh.handlers import Callback, RingChannel
 
-from bridge.network import zenoh_log
-from bridge.network.access import AccessPlan
-from bridge.network.denials import Denials, directives, is_ours
-from bridge.network.floods import FloodGuard, deafen
 from bridge.network.link import ROOM_BYTES, Arrival, Dropped, Inbox, Publisher
-from bridge.network.listening import accept_many, await_first_words, hasty, loopback
-from bridge.network.login import Obstacle, obstacle, taken
-from bridge.network.session import (
-    ONE_THREAD,
-    ROUTER_THREADS,
-    few_threads,
-    keep,
-    mutual_tls,
-    open_bounded,
-    set_key,
-    settings,
-)
-from bridge.process import Stop
-from bridge.waiting import readable
-from configs.brief import LEASE_S, NetworkLink, Outside
-from configs.errors import InfrastructureError
-from configs.roles import AGENT
+from bridge.network.session import keep
 
 CLOSE_S = 1.0
-_PROBE_S = 1.0
-_FIRST_RETRY_S, _LAST_RETRY_S = 0.02, 0.3
-_ATTEMPT_S, _LISTEN_S = 5.0, 10.0
-_BLOCKED_S = 5.0
-"""Zenoh's own: a put that waits for longer closes its session."""
-_PORT_TRIES = 5
 POLLED_DEPTH = 1 << 15
-"""Messages on a key that wait for who polls, the newest: many times more than any schedule lets be
-on their way (`configs.brief.LEAD_TICKS`), so that a flood doesn't wash away what is due."""
+"""Newest messages kept on a key of a polled link: many times more than any schedule lets be under
+way (`configs.brief.LEAD_TICKS`), so that a flood doesn't displace due messages."""
 _YIELDS = 20
 _PAUSE_S, _LONGEST_PAUSE_S = 50e-6, 2e-3
-_WAIT_BEFORE_CLOSE = "transport/link/tx/queue/congestion_control/block/wait_before_close"
-UNREAD_S = 0.5
-"""Who doesn't read for this long what he asked for, while others wait to say more, is cut off."""
 
 
 class ZenohLink:
@@ -233,163 +202,3 @@ class PolledLink(ZenohLink):
         """Close the session and all that it declared."""
         self._polled.clear()
         super().close()
-
-
-class RouterLink(ZenohLink):
-    """The launcher's link: its session is the router."""
-
-    def __init__(self, session: zenoh.Session, endpoint: str, denials: Denials) -> None:
-        super().__init__(session)
-        self.endpoint = endpoint
-        self.denials = denials
-        """Whom the router refused, from its log."""
-        self._guard = FloodGuard()
-        denials.turn_away = deafen
-
-    def look_for_floods(self, ticks: int, now_s: float) -> None:
-        """Cut off controllers that say far too much; call it several times a second."""
-        controllers = self.denials.peers(AGENT.identity())
-        for peer in self._guard.look(controllers, ticks, now_s):
-            self.denials.note_flood(controllers[peer], peer)
-
-
-class StoppedError(Exception):
-    """Asked to stop before there was a session."""
-
-
-def open_client(network: NetworkLink, timeout_s: float, stop: Stop | None = None) -> ZenohLink:
-    """Connect to the router as `network.user`.
-
-    Raises:
-        InfrastructureError: nobody answers there, or the login was refused.
-        StoppedError: `stop` was requested before.
-    """
-    return ZenohLink(_client(network, timeout_s, stop))
-
-
-def open_polled(
-    network: NetworkLink,
-    timeout_s: float,
-    stop: Stop | None = None,
-    *,
-    depth: int = POLLED_DEPTH,
-) -> PolledLink:
-    """The same for who looks at given times and keeps the last `depth` messages on each key."""
-    return PolledLink(_client(network, timeout_s, stop), depth)
-
-
-def _client(network: NetworkLink, timeout_s: float, stop: Stop | None) -> zenoh.Session:
-    """Try until it opens; a refused login is told at once, who isn't there yet is waited for."""
-    wake = [] if stop is None else [stop.wake_fd]
-    deadline = time.monotonic() + timeout_s
-    pause_s = _FIRST_RETRY_S
-    while True:
-        left_s = min(max(deadline - time.monotonic(), _FIRST_RETRY_S), _ATTEMPT_S)
-        with few_threads(ONE_THREAD):
-            session = open_bounded(_login_config("client", network, left_s), left_s + 1.0)
-        if not isinstance(session, str):
-            return session
-        reason = _reason(network)
-        if reason.final or time.monotonic() + pause_s > deadline:
-            within = "" if reason.final else f" within {timeout_s:g} s"
-            raise InfrastructureError(
-                f"{network.user}: no session with the router at {network.endpoint}{within}:"
-                f" {reason.text}"
-            )
-        if readable(wake, pause_s):
-            raise StoppedError
-        pause_s = min(1.5 * pause_s, _LAST_RETRY_S)
-
-
-def _reason(network: NetworkLink) -> Obstacle:
-    """Why there is no session: Zenoh tells it peers only."""
-    config = _login_config("peer", network, _PROBE_S)
-    set_key(config, "listen/endpoints", [])
-    set_key(config, "connect/exit_on_failure", True)
-    said = open_bounded(config, _PROBE_S + 1.0)
-    if isinstance(said, str):
-        return obstacle(said, network.user)
-    said.close()
-    return obstacle("", network.user)
-
-
-def _login_config(mode: str, network: NetworkLink, timeout_s: float) -> zenoh.Config:
-    """For a single attempt."""
-    config = settings(mode, network.lease_s)
-    # A put that finds the router stopped waits for as long as the router may.
-    set_key(config, _WAIT_BEFORE_CLOSE, int(max(network.lease_s, _BLOCKED_S) * 1e6))
-    set_key(config, "connect/endpoints", [network.endpoint])
-    set_key(config, "connect/timeout_ms", 0)
-    set_key(config, "transport/unicast/open_timeout", max(int(timeout_s * 1000), 1))
-    set_key(config, "transport/auth/usrpwd/user", network.user)
-    set_key(config, "transport/auth/usrpwd/password", network.password)
-    if network.tls is not None:
-        set_key(config, "transport/link/tls", mutual_tls(network.tls, "connect"))
-    return config
-
-
-@contextlib.contextmanager
-def open_router(
-    endpoint: str | None,
-    access: AccessPlan,
-    folder: Path,
-    outside: Outside | None = None,
-    *,
-    unread_s: float = UNREAD_S,
-    lease_s: float = LEASE_S,
-) -> Iterator[RouterLink]:
-    """Be the router at `endpoint`, or at a free loopback port if None, and enforce `access`.
-
-    Those on other machines come in at `outside`. `folder` must be private: the user dictionary is
-    written there while the router opens. Who doesn't read is cut off after `unread_s`; who doesn't
-    hear the router for `lease_s` takes it for gone.
-
-    Raises:
-        InfrastructureError: an endpoint is taken or can't be listened on.
-    """
-    denials = Denials()
-    zenoh_log.begin(directives(every_message=outside is not None))
-    dictionary = folder / "users"
-    dictionary.touch(mode=0o600)
-    dictionary.write_text(access.dictionary(), "utf-8")
-    with zenoh_log.listening(denials.take, is_ours):
-        try:
-            session, at = _listen(endpoint, access, dictionary, outside, unread_s, lease_s)
-        finally:
-            dictionary.unlink()
-        with RouterLink(session, at, denials) as link:
-            yield link
-
-
-def _listen(
-    endpoint: str | None,
-    access: AccessPlan,
-    dictionary: Path,
-    outside: Outside | None,
-    unread_s: float,
-    lease_s: float,
-) -> tuple[zenoh.Session, str]:
-    tries = 1 if endpoint else _PORT_TRIES
-    reason = ""
-    for _ in range(tries):
-        at = endpoint or loopback()
-        config = settings("router", lease_s)
-        set_key(config, "listen/endpoints", [at, *([hasty(outside.endpoint)] if outside else [])])
-        if outside is not None and outside.tls is not None:
-            set_key(config, "transport/link/tls", mutual_tls(outside.tls, "listen"))
-        accept_many(config, len(access.rights))
-        set_key(config, "transport/auth/usrpwd/dictionary_file", str(dictionary))
-        config.insert_json5("access_control", access.access_control())
-        config.insert_json5("low_pass_filter", access.low_pass_filter())
-        config.insert_json5("downsampling", access.downsampling())
-        set_key(config, _WAIT_BEFORE_CLOSE, int(unread_s * 1e6))
-        with few_threads(ROUTER_THREADS):
-            session = open_bounded(config, _LISTEN_S)
-        if not isinstance(session, str):
-            await_first_words([at, *([outside.endpoint] if outside else [])])
-            return session, at
-        reason = taken(session)
-    where = " and ".join(
-        [endpoint or "any loopback port", *([outside.endpoint] if outside is not None else [])]
-    )
-    raise InfrastructureError(f"can't listen at {where}: {reason}")

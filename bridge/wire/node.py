@@ -33,7 +33,7 @@ class ErrorKind(Enum):
     ACK = "nobody acknowledged"
 
 
-class Counters:
+class NodeCounters:
     """What became of the frames of one node; accepted = sent + dropped + queued + withheld."""
 
     __slots__ = ("accepted", "dropped", "errors", "refused", "sent")
@@ -72,7 +72,7 @@ class Node:
         self.wrong_bit_rate = wrong_bit_rate
         self.confinement = Confinement()
         self.state = NodeState.ERROR_ACTIVE
-        self.counters = Counters()
+        self.counters = NodeCounters()
         self.attached = True
         self.not_before_ns = 0  # end of its suspended transmission
         self.recessive_from_ns = 0  # while it comes back from bus-off: since when it counts ...

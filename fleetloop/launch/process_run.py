@@ -28,7 +28,7 @@ from bridge.network.barrier import Hellos
 from bridge.network.link import Arrival, Link, waiting
 from bridge.network.messages import Go, LeaderSpeed, Progress
 from bridge.network.reports import LauncherReport, Report
-from bridge.network.zenoh_link import RouterLink, open_router
+from bridge.network.router import RouterLink, open_router
 from bridge.process import Stop, cpu_ns
 from configs.brief import LEASE_S, LOCAL_LEASE_S, NetworkLink
 from configs.deployment import Deployment

@@ -17,8 +17,9 @@ from pathlib import Path
 import pytest
 
 from bridge.network import access, keys
+from bridge.network.client import open_client, open_polled
 from bridge.network.messages import MOST_BYTES, PathState
-from bridge.network.zenoh_link import POLLED_DEPTH, ZenohLink, open_client, open_polled
+from bridge.network.zenoh_link import POLLED_DEPTH, ZenohLink
 from configs.brief import NetworkLink
 from configs.roles import AGENT
 
@@ -29,7 +30,7 @@ ROUTER = """
 import json, select, sys
 from pathlib import Path
 from bridge.network import access
-from bridge.network.zenoh_link import open_router
+from bridge.network.router import open_router
 
 run, robots, hears, realtime = json.loads(sys.argv[1])
 plan = access.plan(run, robots, hears, robots[:1], share_period_s=0.02 if realtime else None)
@@ -42,7 +43,7 @@ with open_router(None, plan, Path(sys.argv[2])) as router:
 DEAF = """
 import sys, threading
 import zenoh
-from bridge.network.zenoh_link import _login_config
+from bridge.network.client import _login_config
 from configs.brief import NetworkLink
 
 run, endpoint, user, password, key = sys.argv[1:]

@@ -12,7 +12,7 @@ from bridge.can_bus.hub import Hub
 from bridge.can_bus.relay import Relay
 from bridge.frame import Frame
 from bridge.network import access
-from bridge.network.zenoh_link import open_router
+from bridge.network.router import open_router
 
 RUN = "test"
 GRANTED = {"bench": ("r1",), "boss": ("*",)}

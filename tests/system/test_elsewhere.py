@@ -212,7 +212,7 @@ def test_a_wrong_password_is_refused_within_the_start_deadline(tmp_path, agents)
 INTRUDER = """
 import sys
 from bridge.network import keys
-from bridge.network.zenoh_link import open_client
+from bridge.network.client import open_client
 from configs.brief import NetworkLink
 with open_client(NetworkLink("", sys.argv[1], "bench", "word"), 10.0) as link:
     for _ in range(5):

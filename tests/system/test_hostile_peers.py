@@ -15,7 +15,8 @@ from support.processes import Run
 
 from bridge.network import keys
 from bridge.network.messages import PathState, Rows
-from bridge.network.zenoh_link import ZenohLink, open_client
+from bridge.network.client import open_client
+from bridge.network.zenoh_link import ZenohLink
 from configs.brief import NetworkLink
 from configs.roles import AGENT, identity_of
 from fleetloop.record.reader import Record
@@ -164,7 +165,7 @@ def test_ten_megabytes_and_floods_on_ones_own_keys_end_no_run_or_name_their_send
 def test_a_hearer_with_rights_that_does_not_read_stops_nobody(tmp_path, monkeypatch) -> None:
     import zenoh
 
-    from bridge.network.zenoh_link import _login_config
+    from bridge.network.client import _login_config
 
     with attacked(tmp_path, monkeypatch, "--duration", "20") as attack:
         login = NetworkLink(

@@ -37,7 +37,7 @@ def test_processes_leave_the_same_record_as_the_reference_with_all_of_it_on(
         assert (a / "can" / f"{bus}.log").read_bytes() == (b / "can" / f"{bus}.log").read_bytes()
 
 
-def test_who_only_listens_changes_nothing_and_who_says_paced_is_not_waited_for(
+def test_listeners_change_nothing_and_a_self_declared_synchronous_client_is_refused(
     tmp_path: Path, capsys
 ) -> None:
     a, b = tmp_path / "a", tmp_path / "b"
@@ -48,7 +48,7 @@ def test_who_only_listens_changes_nothing_and_who_says_paced_is_not_waited_for(
         for options in ({}, {"batched": True}, {"receive_own_messages": True}):
             listener = can.Bus(interface="fleetloop", channel=str(path), **options)
             listeners.enter_context(listener)
-        with pytest.raises(can.CanInitializationError, match="controllers that the run itself"):
+        with pytest.raises(can.CanInitializationError, match="controllers that the run started"):
             can.Bus(interface="fleetloop", channel=str(path), synchronous="r1")
         with pytest.raises(can.CanOperationError, match="end of the run"):
             while listener.recv(10.0) is not None:

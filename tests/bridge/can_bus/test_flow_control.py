@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.can_bus.flow_control import LEAST_BYTES, WINDOW_BYTES, Receiver, Sender, cost
+from bridge.can_bus.flow_control import INITIAL_CREDIT_BYTES, LEAST_BYTES, Receiver, Sender, cost
 from bridge.can_bus.packet import BYE, FRAMES, MAX_BYTES, encode_frames, encode_text
 from bridge.frame import Frame
 
@@ -13,10 +13,10 @@ ONE_FRAME = encode_frames(0, 0, (Frame(1, b"12345678"),))
 
 def test_a_window_of_single_frames_is_a_few_hundred() -> None:
     sender, sent = Sender(), 0
-    while sender.has_room():
-        sender.send(ONE_FRAME)
+    while sender.has_credit():
+        sender.spend(ONE_FRAME)
         sent += 1
-    assert sent == WINDOW_BYTES // LEAST_BYTES == 512
+    assert sent == INITIAL_CREDIT_BYTES // LEAST_BYTES == 512
 
 
 @given(st.lists(PACKETS, max_size=200), st.randoms(use_true_random=False))
@@ -26,21 +26,21 @@ def test_all_packets_get_through_in_bounded_room_whatever_the_receivers_pace(
     sender, receiver = Sender(), Receiver()
     unsent, held, rooms, taken = list(packets), [], [], 0
     while taken < len(packets):
-        moves = [m for m, able in enumerate((unsent and sender.has_room(), held, rooms)) if able]
+        moves = [m for m, able in enumerate((unsent and sender.has_credit(), held, rooms)) if able]
         assert moves, "everybody waits"
         match random.choice(moves):
             case 0:
                 packet = unsent.pop(0)
-                sender.send(packet)
+                sender.spend(packet)
                 assert receiver.arrive(packet)
                 held.append(packet)
             case 1:
                 taken += 1
-                if (room := receiver.take(held.pop(0))) is not None:
-                    rooms.append(room)
+                if (credit := receiver.consume(held.pop(0))) is not None:
+                    rooms.append(credit)
             case 2:
-                assert sender.hear(rooms.pop(0))
-        assert sum(map(cost, held)) <= WINDOW_BYTES + MAX_BYTES
+                assert sender.grant(rooms.pop(0))
+        assert sum(map(cost, held)) <= INITIAL_CREDIT_BYTES + MAX_BYTES
 
 
 def test_who_runs_ahead_is_found_out() -> None:
@@ -51,13 +51,13 @@ def test_who_runs_ahead_is_found_out() -> None:
 def test_room_that_was_never_taken_is_not_given() -> None:
     sender = Sender()
     for _ in range(512):
-        sender.send(ONE_FRAME)
-    assert sender.hear(b"\x40" + bytes(7) + b"\xff" * 8)  # claims to have taken all there ever is
+        sender.spend(ONE_FRAME)
+    assert sender.grant(b"\x40" + bytes(7) + b"\xff" * 8)  # claims to have taken all there ever is
     for _ in range(512):
-        assert sender.has_room()
-        sender.send(ONE_FRAME)
-    assert not sender.has_room()
+        assert sender.has_credit()
+        sender.spend(ONE_FRAME)
+    assert not sender.has_credit()
 
 
 def test_packets_of_the_bus_are_no_room_packets() -> None:
-    assert not any(Sender().hear(p) for p in (ONE_FRAME, encode_text(BYE), bytes((FRAMES,)), b""))
+    assert not any(Sender().grant(p) for p in (ONE_FRAME, encode_text(BYE), bytes((FRAMES,)), b""))

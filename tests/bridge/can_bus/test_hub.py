@@ -12,12 +12,26 @@ from collections.abc import Iterator
 import can
 import pytest
 
-from bridge.can_bus import hub as hub_module
-from bridge.can_bus import packet as wire
-from bridge.can_bus import sockets
+from bridge.can_bus import hub, server, sockets
 from bridge.can_bus.connection import TURN
 from bridge.can_bus.hub import Hub
-from bridge.can_bus.packet import Transmitted
+from bridge.can_bus.packet import (
+    DONE,
+    FRAMES,
+    HELLO,
+    MAX_BYTES,
+    MAX_FRAMES,
+    MORE,
+    REFUSED,
+    SYNCHRONOUS,
+    VERSION,
+    WELCOME,
+    Packet,
+    Transmitted,
+    decode,
+    encode_frames,
+    encode_text,
+)
 from bridge.frame import ERR, RTR, Frame
 
 SECRET = "told to nobody else"
@@ -27,20 +41,20 @@ CONTROLLERS = {"r1": {"r1": SECRET, "r2": "another"}}
 class Stranger:
     """A client made of a socket."""
 
-    def __init__(self, name: str = "", flags: int = 0, version: int = wire.VERSION) -> None:
+    def __init__(self, name: str = "", flags: int = 0, version: int = VERSION) -> None:
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self.socket.connect(str(sockets.socket_path(sockets.base_folder() / "hub", "r1")))
         self.socket.settimeout(5.0)
-        self.say(wire.encode_text(wire.HELLO, name, flags=flags, count=version))
+        self.say(encode_text(HELLO, name, flags=flags, count=version))
 
     def say(self, data: bytes) -> None:
         self.socket.send(data)
 
     def frames(self, *frames: Frame, flags: int = 0, stamp_ns: int = 0) -> None:
-        self.say(wire.encode_frames(flags, stamp_ns, frames))
+        self.say(encode_frames(flags, stamp_ns, frames))
 
-    def hear(self) -> wire.Packet:
-        packet = wire.decode(self.socket.recv(wire.MAX_BYTES))
+    def hear(self) -> Packet:
+        packet = decode(self.socket.recv(MAX_BYTES))
         assert packet is not None
         return packet
 
@@ -49,9 +63,9 @@ class Stranger:
         frames: list[Frame] = []
         while True:
             packet = self.hear()
-            assert packet.kind == wire.FRAMES
+            assert packet.kind == FRAMES
             frames += packet.frames
-            if not packet.flags & wire.MORE:
+            if not packet.flags & MORE:
                 return frames
 
 
@@ -63,7 +77,7 @@ class Serving:
         self.hub = Hub(sockets.listen(folder, ("r1",)), queue=queue, controllers=CONTROLLERS)
         self.strangers: list[Stranger] = []
 
-    def join(self, name: str = "", flags: int = 0, version: int = wire.VERSION) -> Stranger:
+    def join(self, name: str = "", flags: int = 0, version: int = VERSION) -> Stranger:
         stranger = Stranger(name, flags, version)
         self.strangers.append(stranger)
         self.serve()
@@ -104,8 +118,8 @@ def serving(runtime_folder) -> Iterator[Serving]:
     ],
 )
 def test_nobody_but_a_robots_own_controller_is_waited_for(serving, name: str, why: str) -> None:
-    refused = serving.join(name, wire.SYNCHRONOUS).hear()
-    assert refused.kind == wire.REFUSED
+    refused = serving.join(name, SYNCHRONOUS).hear()
+    assert refused.kind == REFUSED
     assert why in refused.text
     assert (serving.hub.clients(), serving.hub.left()) == (0, ())
     assert serving.hub.await_controllers(0.0) == ("r1", "r2")
@@ -113,7 +127,7 @@ def test_nobody_but_a_robots_own_controller_is_waited_for(serving, name: str, wh
 
 def test_a_bus_in_real_time_waits_for_nobody(runtime_folder) -> None:
     hub = Hub(sockets.listen(sockets.create_run_folder("hub"), ("r1",)))
-    refused = Stranger("r1\0" + SECRET, wire.SYNCHRONOUS)
+    refused = Stranger("r1\0" + SECRET, SYNCHRONOUS)
     for _ in range(3):
         hub.serve(0.0)
     assert "this bus has none" in refused.hear().text
@@ -123,9 +137,9 @@ def test_a_bus_in_real_time_waits_for_nobody(runtime_folder) -> None:
 
 
 def test_a_second_controller_of_a_robot_is_refused_while_the_first_is_there(serving) -> None:
-    first = serving.join(f"r1\0{SECRET}", wire.SYNCHRONOUS)
-    assert first.hear().kind == wire.WELCOME
-    second = serving.join(f"r1\0{SECRET}", wire.SYNCHRONOUS)
+    first = serving.join(f"r1\0{SECRET}", SYNCHRONOUS)
+    assert first.hear().kind == WELCOME
+    second = serving.join(f"r1\0{SECRET}", SYNCHRONOUS)
     assert "the controller of r1 is on it already" in second.hear().text
     assert serving.hub.await_controllers(0.0) == ("r2",)
     assert serving.hub.left() == ()
@@ -138,7 +152,7 @@ def test_a_stranger_that_says_a_robots_name_unpaced_and_leaves_is_not_its_contro
     serving,
 ) -> None:
     stranger = serving.join(f"r1\0{SECRET}")
-    assert stranger.hear().kind == wire.WELCOME
+    assert stranger.hear().kind == WELCOME
     stranger.socket.close()
     serving.serve()
     assert serving.hub.left() == ()
@@ -172,14 +186,14 @@ def test_the_bus_interface_says_why_it_was_refused(serving) -> None:
 
 def test_any_number_of_connections_that_say_nothing_keep_nobody_out(serving) -> None:
     silent = []
-    for _ in range(3 * hub_module.MAX_STRANGERS):
+    for _ in range(3 * server.MAX_UNIDENTIFIED):
         silent.append(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET))
         silent[-1].connect(str(sockets.socket_path(sockets.base_folder() / "hub", "r1")))
         serving.serve()
-    assert serving.join().hear().kind == wire.WELCOME
-    assert serving.join(f"r1\0{SECRET}", wire.SYNCHRONOUS).hear().kind == wire.WELCOME
+    assert serving.join().hear().kind == WELCOME
+    assert serving.join(f"r1\0{SECRET}", SYNCHRONOUS).hear().kind == WELCOME
     ended = [select.select([one], [], [], 0.0)[0] and not one.recv(1) for one in silent]
-    assert sum(map(bool, ended)) >= 2 * hub_module.MAX_STRANGERS
+    assert sum(map(bool, ended)) >= 2 * server.MAX_UNIDENTIFIED
     for one in silent:
         one.close()
 
@@ -218,10 +232,10 @@ def test_a_controller_is_asked_whatever_others_said_between_two_questions(
     runtime_folder, queue: int, count: int
 ) -> None:
     serving = Serving(queue)
-    controller = serving.join(f"r1\0{SECRET}", wire.SYNCHRONOUS)
+    controller = serving.join(f"r1\0{SECRET}", SYNCHRONOUS)
     stranger = serving.join()
     for packet in (controller, stranger):
-        assert packet.hear().kind == wire.WELCOME
+        assert packet.hear().kind == WELCOME
     said = [Frame(n % 0x800, n.to_bytes(4, "big")) for n in range(count)]
     heard: list[Frame] = []
 
@@ -233,8 +247,8 @@ def test_a_controller_is_asked_whatever_others_said_between_two_questions(
         reader.start()
         serving.hub.forward("r1", 9, [Transmitted(9, frame, key=2) for frame in said], "r1")
     else:
-        for first in range(0, count, wire.MAX_FRAMES):
-            stranger.frames(*said[first : first + wire.MAX_FRAMES])
+        for first in range(0, count, MAX_FRAMES):
+            stranger.frames(*said[first : first + MAX_FRAMES])
             serving.serve()
         reader = threading.Thread(target=read)
         reader.start()
@@ -243,14 +257,14 @@ def test_a_controller_is_asked_whatever_others_said_between_two_questions(
     while reader.is_alive():
         serving.hub.collect(0.01)
     assert heard == said
-    controller.frames(Frame(0x00E, b""), flags=wire.DONE, stamp_ns=9)
+    controller.frames(Frame(0x00E, b""), flags=DONE, stamp_ns=9)
     assert any(serving.hub.collect(0.5) for _ in range(10))
     serving.close()
 
 
 def test_replies_of_drives_to_very_many_requests_reach_the_controller(serving) -> None:
-    controller = serving.join(f"r1\0{SECRET}", wire.SYNCHRONOUS)
-    assert controller.hear().kind == wire.WELCOME
+    controller = serving.join(f"r1\0{SECRET}", SYNCHRONOUS)
+    assert controller.hear().kind == WELCOME
     replies = [Frame(n % 0x800, n.to_bytes(4, "big")) for n in range(66_000)]
     heard: list[Frame] = []
     reader = threading.Thread(target=lambda: heard.extend(controller.hear_question()))
@@ -264,7 +278,7 @@ def test_replies_of_drives_to_very_many_requests_reach_the_controller(serving) -
 def test_what_a_controller_says_is_taken_at_once_and_what_others_say_a_turn_at_a_time(
     serving,
 ) -> None:
-    controller = serving.join(f"r1\0{SECRET}", wire.SYNCHRONOUS)
+    controller = serving.join(f"r1\0{SECRET}", SYNCHRONOUS)
     stranger = serving.join()
     said = [Frame(n % 0x700, n.to_bytes(4, "big")) for n in range(10_000)]
     for first in range(0, len(said), 1000):
@@ -287,7 +301,7 @@ def test_what_a_controller_says_is_taken_at_once_and_what_others_say_a_turn_at_a
 def test_who_says_more_than_is_taken_is_not_read_until_it_is(
     serving, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hub_module, "UNTAKEN", 100)
+    monkeypatch.setattr(hub, "UNTAKEN", 100)
     flood, quiet = serving.join(), serving.join()
     flood.socket.setblocking(False)
     sent = 0
@@ -319,7 +333,7 @@ def test_what_is_no_classic_frame_is_counted_and_goes_nowhere(
 ) -> None:
     serving = Serving(queue)
     stranger, other = serving.join(), serving.join()
-    packet = bytearray(wire.encode_frames(0, 0, [Frame(1, b"a"), Frame(2, b"b"), Frame(3, b"c")]))
+    packet = bytearray(encode_frames(0, 0, [Frame(1, b"a"), Frame(2, b"b"), Frame(3, b"c")]))
     packet[32:37] = struct.pack("<IB", can_id, length)
     stranger.say(bytes(packet))
     serving.serve()
@@ -328,7 +342,7 @@ def test_what_is_no_classic_frame_is_counted_and_goes_nowhere(
         assert [frame for _, frame in serving.hub.submitted("r1")] == good
     else:
         assert serving.hub.receive("r1") == good
-        assert other.hear().kind == wire.WELCOME
+        assert other.hear().kind == WELCOME
         assert [other.hear().frames for _ in good] == [(frame,) for frame in good]
     assert serving.hub.counters("r1").garbage == 1
     assert "1 × what is no frame" in serving.hub.troubles()["r1"]

@@ -18,10 +18,17 @@ from support.cut_proxy import CutProxy
 from support.hub_running import Running
 
 from bridge.can_bus import connection, flow_control, relay, zenoh_transport
-from bridge.can_bus import packet as wire
+from bridge.can_bus.packet import (
+    BYE,
+    HELLO,
+    MAX_BYTES,
+    VERSION,
+    encode_text,
+)
 from bridge.frame import Frame
 from bridge.network import keys
-from bridge.network.zenoh_link import ZenohLink, open_client
+from bridge.network.client import open_client
+from bridge.network.zenoh_link import ZenohLink
 from configs.brief import NetworkLink
 
 OPEN = """
@@ -140,7 +147,7 @@ def test_a_guest_can_not_speak_in_anothers_name(running: Running) -> None:
     assert running.remote is not None
     settings = running.remote.settings("bench")
     network = NetworkLink("", settings["endpoint"], "bench", settings["password"])
-    hello = wire.encode_text(wire.HELLO, "x", count=wire.VERSION)
+    hello = encode_text(HELLO, "x", count=VERSION)
     with open_client(network, 5.0) as link:
         forged = keys.guest_line("boss", "f0", "r2")
         link.declare_live(f"{forged}/alive")
@@ -164,7 +171,7 @@ def raw_session(running: Running, user: str = "bench") -> Iterator[ZenohLink]:
         yield link
 
 
-HELLO = wire.encode_text(wire.HELLO, "x", count=wire.VERSION)
+HELLO_PACKET = encode_text(HELLO, "x", count=VERSION)
 
 
 @pytest.mark.parametrize(
@@ -176,7 +183,7 @@ def test_a_hello_on_the_key_of_no_line_is_nothing_to_anybody(running: Running, p
         key = f"fleetloop/@guest/bench{place}"
         if "*" not in place:  # no token can be declared on a pattern
             link.declare_live(f"{key}/alive")
-        for packet in (HELLO, wire.encode_text(wire.BYE), b"", b"\xff" * 40):
+        for packet in (HELLO_PACKET, encode_text(BYE), b"", b"\xff" * 40):
             link.publisher(f"{key}/up").put(packet)
         with running.open() as guest:  # its session's own order: all of that was heard before
             running.deliver(Frame(2, b""))
@@ -187,7 +194,7 @@ def test_a_hello_on_the_key_of_no_line_is_nothing_to_anybody(running: Running, p
 
 def test_no_packets_in_whatever_order_end_anybody_elses_line(running: Running) -> None:
     dice = random.Random(7)
-    said = [HELLO, b"", b"\x00", wire.encode_text(wire.BYE), bytes(wire.MAX_BYTES + 1)]
+    said = [HELLO_PACKET, b"", b"\x00", encode_text(BYE), bytes(MAX_BYTES + 1)]
     said += [dice.randbytes(dice.randrange(1, 200)) for _ in range(20)]
     said += [
         bytes((kind,)) + dice.randbytes(dice.randrange(40)) for kind in range(8) for _ in "abc"
@@ -299,7 +306,7 @@ def test_a_guest_that_sends_more_than_it_may_is_shown_the_door(
 ) -> None:
     with running.open() as guest, running.open("r2", "boss") as other:
         with running.lock:  # a busy hub
-            monkeypatch.setattr(flow_control.Sender, "has_room", lambda _: True)
+            monkeypatch.setattr(flow_control.Sender, "has_credit", lambda _: True)
             for n in range(3000):
                 try:
                     guest.send(frame(n))

@@ -16,7 +16,8 @@ import socket, sys, time
 from pathlib import Path
 from bridge.network import access
 from bridge.network import keys
-from bridge.network.zenoh_link import open_client, open_router
+from bridge.network.client import open_client
+from bridge.network.router import open_router
 from configs.brief import NetworkLink, Outside, TlsFiles
 from configs.errors import InfrastructureError
 

@@ -15,7 +15,8 @@ import gc, itertools, sys, threading
 from pathlib import Path
 from bridge.network import access
 from bridge.network import keys
-from bridge.network.zenoh_link import open_client, open_router
+from bridge.network.client import open_client
+from bridge.network.router import open_router
 from configs.brief import NetworkLink
 from configs.roles import AGENT
 
@@ -85,7 +86,8 @@ ROUTER = """
 import sys
 from pathlib import Path
 from bridge.network import access
-from bridge.network.zenoh_link import open_client, open_router
+from bridge.network.client import open_client
+from bridge.network.router import open_router
 from configs.brief import NetworkLink
 from configs.roles import AGENT
 from configs.errors import InfrastructureError

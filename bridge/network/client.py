@@ -1,0 +1,106 @@
+"""Client sessions: how a process connects to the router of its run.
+
+A refused login is reported at once; a router that isn't there yet is waited for. Zenoh names the
+reason of a refusal to peers only, so a refused client asks again as a peer (`login`).
+"""
+
+import time
+
+import zenoh
+
+from bridge.network.login import Obstacle, obstacle
+from bridge.network.session import (
+    ONE_THREAD,
+    WAIT_BEFORE_CLOSE,
+    few_threads,
+    mutual_tls,
+    open_bounded,
+    set_key,
+    settings,
+)
+from bridge.network.zenoh_link import POLLED_DEPTH, PolledLink, ZenohLink
+from bridge.process import Stop
+from bridge.waiting import readable
+from configs.brief import NetworkLink
+from configs.errors import InfrastructureError
+
+_PROBE_S = 1.0
+_FIRST_RETRY_S, _LAST_RETRY_S = 0.02, 0.3
+_ATTEMPT_S = 5.0
+_BLOCKED_S = 5.0
+"""Zenoh's default: a put that blocks longer closes its session."""
+
+
+class StoppedError(Exception):
+    """Asked to stop before there was a session."""
+
+
+def open_client(network: NetworkLink, timeout_s: float, stop: Stop | None = None) -> ZenohLink:
+    """Connect to the router as `network.user`.
+
+    Raises:
+        InfrastructureError: nobody answers there, or the login was refused.
+        StoppedError: `stop` was requested before.
+    """
+    return ZenohLink(_client(network, timeout_s, stop))
+
+
+def open_polled(
+    network: NetworkLink,
+    timeout_s: float,
+    stop: Stop | None = None,
+    *,
+    depth: int = POLLED_DEPTH,
+) -> PolledLink:
+    """The same for who looks at given times and keeps the last `depth` messages on each key."""
+    return PolledLink(_client(network, timeout_s, stop), depth)
+
+
+def _client(network: NetworkLink, timeout_s: float, stop: Stop | None) -> zenoh.Session:
+    """Try until it opens; a refused login is told at once, who isn't there yet is waited for."""
+    wake = [] if stop is None else [stop.wake_fd]
+    deadline = time.monotonic() + timeout_s
+    pause_s = _FIRST_RETRY_S
+    while True:
+        left_s = min(max(deadline - time.monotonic(), _FIRST_RETRY_S), _ATTEMPT_S)
+        with few_threads(ONE_THREAD):
+            session = open_bounded(_login_config("client", network, left_s), left_s + 1.0)
+        if not isinstance(session, str):
+            return session
+        reason = _reason(network)
+        if reason.final or time.monotonic() + pause_s > deadline:
+            within = "" if reason.final else f" within {timeout_s:g} s"
+            raise InfrastructureError(
+                f"{network.user}: no session with the router at {network.endpoint}{within}:"
+                f" {reason.text}"
+            )
+        if readable(wake, pause_s):
+            raise StoppedError
+        pause_s = min(1.5 * pause_s, _LAST_RETRY_S)
+
+
+def _reason(network: NetworkLink) -> Obstacle:
+    """Why there is no session: Zenoh tells it peers only."""
+    config = _login_config("peer", network, _PROBE_S)
+    set_key(config, "listen/endpoints", [])
+    set_key(config, "connect/exit_on_failure", True)
+    said = open_bounded(config, _PROBE_S + 1.0)
+    if isinstance(said, str):
+        return obstacle(said, network.user)
+    said.close()
+    return obstacle("", network.user)
+
+
+def _login_config(mode: str, network: NetworkLink, timeout_s: float) -> zenoh.Config:
+    """For a single attempt."""
+    config = settings(mode, network.lease_s)
+    # A put that finds the router stopped waits for as long as the router may.
+    set_key(config, WAIT_BEFORE_CLOSE, int(max(network.lease_s, _BLOCKED_S) * 1e6))
+    set_key(config, "connect/endpoints", [network.endpoint])
+    set_key(config, "connect/timeout_ms", 0)
+    set_key(config, "transport/unicast/open_timeout", max(int(timeout_s * 1000), 1))
+    set_key(config, "transport/auth/usrpwd/user", network.user)
+    set_key(config, "transport/auth/usrpwd/password", network.password)
+    if network.tls is not None:
+        set_key(config, "transport/link/tls", mutual_tls(network.tls, "connect"))
+    return config

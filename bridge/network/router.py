@@ -1,0 +1,186 @@
+"""The router of a run, in the launcher's process: listens, authenticates, enforces access.
+
+Without an endpoint it listens on a free port of the loopback interface. Connections without a login
+cost little and keep no other client out: handshakes are bounded in time and number, and the kernel
+holds back connections that send nothing. A client that doesn't read for `UNREAD_S` while others
+wait to send to it is disconnected.
+"""
+
+import contextlib
+import os
+import resource
+import socket
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import zenoh
+
+from bridge.network import zenoh_log
+from bridge.network.access import AccessPlan
+from bridge.network.denials import Denials, directives, is_ours
+from bridge.network.floods import FloodGuard, deafen
+from bridge.network.login import taken
+from bridge.network.session import (
+    ROUTER_THREADS,
+    WAIT_BEFORE_CLOSE,
+    few_threads,
+    mutual_tls,
+    open_bounded,
+    set_key,
+    settings,
+)
+from bridge.network.zenoh_link import ZenohLink
+from configs.brief import LEASE_S, Outside
+from configs.errors import InfrastructureError
+from configs.roles import AGENT
+
+_LISTEN_S = 10.0
+_PORT_TRIES = 5
+UNREAD_S = 0.5
+_HANDSHAKE_S, _SILENT_S, _PROBE_S = 2.0, 3600, 1.0
+_LEAST_PENDING, MOST_PENDING, _LEAST_SESSIONS = 100, 4096, 1000
+
+
+class RouterLink(ZenohLink):
+    """The launcher's link: its session is the router."""
+
+    def __init__(self, session: zenoh.Session, endpoint: str, denials: Denials) -> None:
+        super().__init__(session)
+        self.endpoint = endpoint
+        self.denials = denials
+        """Whom the router refused, from its log."""
+        self._guard = FloodGuard()
+        denials.turn_away = deafen
+
+    def look_for_floods(self, ticks: int, now_s: float) -> None:
+        """Cut off controllers that say far too much; call it several times a second."""
+        controllers = self.denials.peers(AGENT.identity())
+        for peer in self._guard.look(controllers, ticks, now_s):
+            self.denials.note_flood(controllers[peer], peer)
+
+
+@contextlib.contextmanager
+def open_router(
+    endpoint: str | None,
+    access: AccessPlan,
+    folder: Path,
+    outside: Outside | None = None,
+    *,
+    unread_s: float = UNREAD_S,
+    lease_s: float = LEASE_S,
+) -> Iterator[RouterLink]:
+    """Be the router at `endpoint`, or at a free loopback port if None, and enforce `access`.
+
+    Those on other machines come in at `outside`. `folder` must be private: the user dictionary is
+    written there while the router opens. Who doesn't read is cut off after `unread_s`; who doesn't
+    hear the router for `lease_s` takes it for gone.
+
+    Raises:
+        InfrastructureError: an endpoint is taken or can't be listened on.
+    """
+    denials = Denials()
+    zenoh_log.begin(directives(every_message=outside is not None))
+    dictionary = folder / "users"
+    dictionary.touch(mode=0o600)
+    dictionary.write_text(access.dictionary(), "utf-8")
+    with zenoh_log.listening(denials.take, is_ours):
+        try:
+            session, at = _listen(endpoint, access, dictionary, outside, unread_s, lease_s)
+        finally:
+            dictionary.unlink()
+        with RouterLink(session, at, denials) as link:
+            yield link
+
+
+def _listen(
+    endpoint: str | None,
+    access: AccessPlan,
+    dictionary: Path,
+    outside: Outside | None,
+    unread_s: float,
+    lease_s: float,
+) -> tuple[zenoh.Session, str]:
+    tries = 1 if endpoint else _PORT_TRIES
+    reason = ""
+    for _ in range(tries):
+        at = endpoint or loopback()
+        config = settings("router", lease_s)
+        set_key(config, "listen/endpoints", [at, *([hasty(outside.endpoint)] if outside else [])])
+        if outside is not None and outside.tls is not None:
+            set_key(config, "transport/link/tls", mutual_tls(outside.tls, "listen"))
+        accept_many(config, len(access.rights))
+        set_key(config, "transport/auth/usrpwd/dictionary_file", str(dictionary))
+        config.insert_json5("access_control", access.access_control())
+        config.insert_json5("low_pass_filter", access.low_pass_filter())
+        config.insert_json5("downsampling", access.downsampling())
+        set_key(config, WAIT_BEFORE_CLOSE, int(unread_s * 1e6))
+        with few_threads(ROUTER_THREADS):
+            session = open_bounded(config, _LISTEN_S)
+        if not isinstance(session, str):
+            await_first_words([at, *([outside.endpoint] if outside else [])])
+            return session, at
+        reason = taken(session)
+    where = " and ".join(
+        [endpoint or "any loopback port", *([outside.endpoint] if outside is not None else [])]
+    )
+    raise InfrastructureError(f"can't listen at {where}: {reason}")
+
+
+def loopback() -> str:
+    """A free endpoint that only this machine reaches.
+
+    Raises:
+        InfrastructureError: the machine has no loopback address.
+    """
+    reasons = []
+    for family, host in ((socket.AF_INET, "127.0.0.1"), (socket.AF_INET6, "::1")):
+        try:
+            with socket.socket(family, socket.SOCK_STREAM) as probe:
+                probe.bind((host, 0))
+                probe.listen()
+                port: int = probe.getsockname()[1]
+                socket.create_connection((host, port), _PROBE_S).close()  # its device may be down
+        except OSError as error:
+            reasons.append(f"{host}: {error.strerror}")
+        else:
+            return f"tcp/[{host}]:{port}" if ":" in host else f"tcp/{host}:{port}"
+    raise InfrastructureError(
+        f"no loopback address for the processes of a run to meet at ({', '.join(reasons)}):"
+        " ip link set lo up"
+    )
+
+
+def hasty(endpoint: str) -> str:
+    """The same with a bound on how long a handshake of TLS may take."""
+    milliseconds = int(_HANDSHAKE_S * 1e3)
+    return f"{endpoint}#tls_handshake_timeout_ms={milliseconds}" if "tls/" in endpoint else endpoint
+
+
+def accept_many(config: zenoh.Config, identities: int) -> None:
+    """Let those who open connections and say nothing keep nobody out.
+
+    Each costs a descriptor until `_HANDSHAKE_S`; those beyond the limit are hung up on, and whoever
+    means it tries again at once. They get a quarter of the descriptors at most.
+    """
+    descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    pending = min(max(descriptors // 4, 2 * identities, _LEAST_PENDING), MOST_PENDING)
+    set_key(config, "transport/unicast/accept_timeout", int(_HANDSHAKE_S * 1e3))
+    set_key(config, "transport/unicast/accept_pending", pending)
+    set_key(config, "transport/unicast/max_sessions", _LEAST_SESSIONS + 2 * identities)
+
+
+def await_first_words(endpoints: Sequence[str]) -> None:
+    """Let the kernel keep connections until their first bytes: who listens here, speaks second.
+
+    The sockets are Zenoh's, which has no setting for it; where they can't be had or the kernel
+    doesn't do it they stay as they are.
+    """
+    ports = {int(port) for at in endpoints if (port := at.rpartition(":")[2]).isdecimal()}
+    for descriptor in Path("/proc/self/fd").iterdir():
+        with contextlib.suppress(OSError):
+            if not str(descriptor.readlink()).startswith("socket:"):
+                continue
+            with socket.socket(fileno=os.dup(int(descriptor.name))) as listener:
+                listens = listener.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
+                if listens and listener.getsockname()[1] in ports:
+                    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_DEFER_ACCEPT, _SILENT_S)
