@@ -20,10 +20,10 @@ from bridge.can_bus.pythoncan import open_bus, to_message
 from bridge.launcher import follow_launcher
 from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
+from bridge.network.client import StoppedError, open_polled
 from bridge.network.link import Arrival, Link, Publisher
 from bridge.network.messages import Notice, Rows
 from bridge.network.reports import AgentReport
-from bridge.network.client import StoppedError, open_polled
 from bridge.network.zenoh_link import POLLED_DEPTH
 from bridge.process import (
     Stop,

@@ -17,10 +17,10 @@ from bridge.clock import implausible_start, monotonic_of
 from bridge.launcher import follow_launcher
 from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
+from bridge.network.client import StoppedError, open_client
 from bridge.network.link import Arrival, Link, Publisher, waiting
 from bridge.network.messages import Go, Notice, PoseFix, Progress, Rows
 from bridge.network.reports import PlantReport
-from bridge.network.client import StoppedError, open_client
 from bridge.process import (
     Stop,
     cpu_ns,

@@ -14,8 +14,8 @@ from support.addresses import free_port
 from support.processes import Run
 
 from bridge.network import keys
-from bridge.network.messages import PathState, Rows
 from bridge.network.client import open_client
+from bridge.network.messages import PathState, Rows
 from bridge.network.zenoh_link import ZenohLink
 from configs.brief import NetworkLink
 from configs.roles import AGENT, identity_of
