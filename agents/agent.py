@@ -69,7 +69,7 @@ class Agent:
         self._neighbours = Neighbours(brief.hears, brief.coordination, self._h)
         self._coordinator = Coordinator(brief.coordination, self._h, brief.hears_leader)
         start = brief.coordination
-        self._coordination = CoordinationState(start.v_hat_0, start.mu_0, start.s_0)
+        self._coordination = CoordinationState(start.v_hat_0, start.mu_0, brief.s_0)
         self.heard_since = self._drives.heard_since
         """Whether both encoder frames came after a bus time [ns]."""
         self._astray = False  # the path variable would be beyond reach

@@ -15,7 +15,7 @@ the robot's motion at all.
 from math import isfinite, nan
 from typing import NamedTuple
 
-from configs.brief import Coordination
+from configs.sections import Coordination
 
 Matrix = list[list[float]]
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path

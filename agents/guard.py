@@ -190,7 +190,7 @@ class Guard:
         """Disarm for good; latched at the drives if the scenario wants that."""
         self.phase = Phase.DONE
         frames = self.drives.disarm()
-        if self._brief.host.estop_on_exit:
+        if self._brief.host.on_exit == "estop":
             return [*frames, *self.drives.estop()]
         return frames
 

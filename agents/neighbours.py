@@ -20,7 +20,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from configs.brief import Coordination
+from configs.sections import Coordination
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 

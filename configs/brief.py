@@ -2,8 +2,9 @@
 
 A scenario file is read and checked once, by `configs.scenario`; every process then gets its brief:
 frozen dataclasses of floats, ints, strings and tuples, with all defaults filled in and nothing left
-to check. This module imports nothing but the standard library, so a controller process starts in a
-fraction of a second, and the pure core (paths, laws, plant) takes its parameters as these types.
+to check. A section of the file that a process needs whole is in its brief as it is; one that needs
+more (nanoseconds, defaults that other sections decide) is extended by a subclass.
+No library is imported here, so a controller process starts in a fraction of a second.
 
 An `AgentBrief` holds no plant parameter: the controller knows r and b of its robot (Assumption 2.3)
 and learns the rest. Angles are
@@ -13,7 +14,10 @@ radians, wheel order is (right, left), times are integer nanoseconds.
 from dataclasses import dataclass, field
 from math import inf
 
+from configs.host import Host
+from configs.powertrain import Encoder, Motor, Supply
 from configs.reach import Reach
+from configs.sections import Body, Bus, Coordination, Disturbance, Drive, Mounting, Pose
 
 Settings = tuple[tuple[str, str | int | float | bool], ...]
 """Keyword arguments as sorted pairs, so that a brief stays hashable and immutable."""
@@ -163,20 +167,6 @@ class Gains:
     torque_limit_wheel_N_m: float  # of the robust law
 
 
-@dataclass(frozen=True, slots=True)
-class Coordination:
-    """Equations (38), (40), (45): gains, start values, and how long a silent neighbour counts."""
-
-    p: float  # [1/s]
-    q: float  # [1/s²]
-    s_0: float
-    mu_0: float
-    v_hat_0: float
-    age_limit_s: float  # a neighbour's value is extrapolated at most this far
-    silence_limit_s: float  # after this long a silent neighbour leaves the sums
-    ahead_limit_s: float = 0.5  # in real time: who is dated further ahead isn't believed
-
-
 def when(tick: int, period_ns: int) -> str:
     """A tick in words."""
     return f"tick {tick} (t = {tick * period_ns * 1e-9:.3f} s)"
@@ -231,19 +221,6 @@ class Schedule:
         """Bus time of a tick: nanoseconds since power-up, 0 at the first tick of the countdown."""
         return (tick + self.countdown_ticks) * self.period_ns
 
-    def tick_of(self, bus_time_ns: int) -> int:
-        """The tick at or before a bus time."""
-        return bus_time_ns // self.period_ns - self.countdown_ticks
-
-
-@dataclass(frozen=True, slots=True)
-class Mounting:
-    """How the drives sit on the wheels: wheel angle = sign × shaft angle / gear ratio."""
-
-    right_sign: int = 1  # -1: positive torque at the shaft turns the wheel backwards
-    left_sign: int = 1
-    gear_ratio: float = 1.0  # motor revolutions per wheel revolution
-
 
 @dataclass(frozen=True, slots=True)
 class DriveLink:
@@ -255,37 +232,24 @@ class DriveLink:
     encoder_period_ns: int
     velocity_limit_shaft_rev_s: float  # of the motor shaft
     current_limit_A: float
+    mounting: Mounting
     heartbeat_period_ns: int = 100_000_000
     encoder_age_limit_ns: int = 50_000_000  # older: the drive has dropped out
     heartbeat_age_limit_ns: int = 500_000_000  # older: the drive has dropped out
-    mounting: Mounting = Mounting()
 
 
-@dataclass(frozen=True, slots=True)
-class HostLimits:
-    """What a controller allows itself, whatever the law asks; at the wheels."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HostLimits(Host):
+    """Section [host] as a controller obeys it: no limit is an infinite one."""
 
-    pose_age_limit_ns: int  # 0: none
     torque_limit_wheel_N_m: float = inf
     torque_slew_limit_wheel_N_m_s: float = inf
     encoder_mismatch_limit_wheel_rad: float = inf
     pose_mismatch_limit_m: float = inf
-    dry_run: bool = False  # everything but torque
-    estop_on_exit: bool = False  # else idle
-    rearm: bool = False
-    rearm_after_ns: int = 500_000_000  # all must have been well for this long
-    rearm_attempts: int = 3
-    rearm_limit_ns: int = 1_000_000_000  # longest wait for closed loop
+    pose_age_limit_ns: int  # 0: none
+    rearm_after_ns: int = 500_000_000
+    rearm_limit_ns: int = 1_000_000_000
     bus_error_limit_ns: int = 0  # 0: an error of the bus ends the controller
-
-
-@dataclass(frozen=True, slots=True)
-class Pose:
-    """A pose in the world: x forward, y left, θ counter-clockwise from world x."""
-
-    x_m: float
-    y_m: float
-    theta_rad: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,6 +297,7 @@ class AgentBrief:
     wheels: Wheels
     gains: Gains
     coordination: Coordination
+    s_0: float  # the path variable at t = 0 [m]
     reach: Reach  # what neighbours can say
     path: ReferencePath
     offset: FormationOffset
@@ -352,62 +317,35 @@ class AgentBrief:
 # --- the plant ------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Body:
-    """Physical parameters of one robot, equations (2)-(4)."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WheelDisturbance(Disturbance):
+    """Section [disturbance] of one robot, for t ≥ 0."""
 
-    wheel_radius_m: float
-    half_track_m: float  # b
-    com_offset_m: float  # a
-    body_mass_kg: float
-    wheel_mass_kg: float
-    body_inertia_kg_m2: float  # I_c, about the vertical through the centre of mass
-    wheel_axle_inertia_kg_m2: float  # I_w
-    wheel_diameter_inertia_kg_m2: float  # I_m
-    damping_right_wheel_N_m_s: float  # d_11
-    damping_left_wheel_N_m_s: float  # d_22
-    wheels_in_mass: int  # m = m_c + n m_w: 1 as printed in the paper, 2 physically
-
-
-@dataclass(frozen=True, slots=True)
-class Disturbance:
-    """Δ_i(t) = amplitude [sin(rate t + phase), cos(rate t + phase)] on (right, left) for t ≥ 0."""
-
-    amplitude_wheel_N_m: float
-    rate_rad_s: float
     phase_rad: float
 
 
-@dataclass(frozen=True, slots=True)
-class DriveModel:
-    """The emulated drive behind each wheel: limits and cyclic messages of an ODrive axis."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveModel(Drive):
+    """Section [drive] as an emulated drive obeys it.
 
-    protocol: str
-    torque_constant_N_m_A: float
-    current_limit_A: float
-    velocity_limit_shaft_rev_s: float
-    velocity_gain_shaft_N_m_s_rev: float
-    overspeed_ratio: float
+    The limits are those of the preset. Values that no file sets are the vendor's defaults.
+    """
+
     torque_limiters: bool  # False: torque reaches the wheel as commanded (ideal drive)
+    serial_number: int  # of the right drive; the left one has the next number
+    firmware_version: tuple[int, int, int] = (0, 6, 10)
+    command_latency_ns: tuple[int, int] = (0, 0)  # from a frame's end until firmware acts on it
     heartbeat_period_ns: int
     encoder_period_ns: int
-    torques_period_ns: int  # 0: only on request
-    watchdog_ns: int  # 0: off
-    zero_torque_on_disarm: bool
-    serial_number: int  # of the right drive; the left one has the next number
-    command_latency_ns: tuple[int, int] = (0, 0)  # from a frame's end until firmware acts on it
-    error_period_ns: int = 0  # cyclic messages; 0: only on request
+    torques_period_ns: int  # cyclic messages, this and the next five; 0: only on request
+    error_period_ns: int = 0
     iq_period_ns: int = 0
     temperature_period_ns: int = 0
-    bus_period_ns: int = 0  # voltage and current
+    bus_voltage_period_ns: int = 0
     powers_period_ns: int = 0
-    firmware: tuple[int, int, int] = (0, 6, 10)
+    watchdog_ns: int  # 0: off
     boot_ns: int = 0  # silent for so long after a reboot
-    calibrated: bool = True  # at power-up
     calibration_ns: int = 2_000_000_000  # each of motor and encoder
-    estop_blocks_arming: bool = True  # until errors are cleared
-    position_gain_1_s: float = 20.0
-    velocity_integrator_gain_shaft_N_m_rev: float = 1.0 / 3.0
     velocity_ramp_shaft_rev_s2: float = 1.0
     torque_ramp_shaft_N_m_s: float = 0.01
     input_filter_bandwidth_1_s: float = 2.0
@@ -415,55 +353,15 @@ class DriveModel:
     trajectory_accel_shaft_rev_s2: float = 0.5
     trajectory_decel_shaft_rev_s2: float = 0.5
     current_margin_A: float = 8.0  # above the limit in force, then it disarms
-    derate_from_C: float = 100.0  # the current limit falls linearly
-    derate_to_C: float = 120.0  # to nothing; 5 K above, it disarms
-    under_voltage_V: float = 10.0
-    over_voltage_V: float = 30.0
-    spinout_power_W: float = 10.0  # 0: not detected
 
 
-@dataclass(frozen=True, slots=True)
-class MotorModel:
-    """The motor behind a drive, with its power stage: see `plant.motor`."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotorModel(Motor):
+    """Section [motor] with what it inherits from [drive]: see `plant.motor`."""
 
     torque_constant_N_m_A: float  # of the motor
-    assumed_torque_constant_N_m_A: float  # set in the drive
     current_limit_A: float  # of the power stage
-    current_loop_s: float  # time constant
-    compute_delay_s: float
-    winding_resistance_ohm: float  # heat is R i²
-    fet_resistance_ohm: float
-    viscous_friction_shaft_N_m_s: float
-    coulomb_friction_shaft_N_m: float
-    ambient_C: float
-    motor_thermal_resistance_K_W: float
-    motor_thermal_time_s: float
-    fet_thermal_resistance_K_W: float
-    fet_thermal_time_s: float
-    torque_noise_shaft_N_m: float  # rms, of the drive's estimate
-    current_quantum_A: float  # of the drive's measurement; 0: none
-
-
-@dataclass(frozen=True, slots=True)
-class EncoderModel:
-    """The encoder on a motor's shaft, and the drive's estimator behind it: see `plant.encoder`."""
-
-    counts_per_shaft_rev: int
-    index: bool
-    noise_counts: float  # rms
-    pll_bandwidth_rad_s: float
-    pll_rate_Hz: float
-
-
-@dataclass(frozen=True, slots=True)
-class SupplyModel:
-    """The source that feeds both drives of a robot: see `plant.supply`."""
-
-    voltage_V: float  # open circuit
-    resistance_ohm: float
-    absorbs: bool  # False: braking charges the bus capacitor instead
-    capacitance_F: float
-    standby_W: float  # of each drive
+    assumed_torque_constant_N_m_A: float  # set in the drive
 
 
 @dataclass(frozen=True, slots=True)
@@ -471,18 +369,15 @@ class PowertrainModel:
     """What lies between a robot's drives and its wheels."""
 
     motor: MotorModel
-    encoder: EncoderModel
-    supply: SupplyModel
+    encoder: Encoder
+    supply: Supply
     seed: int  # of the robot's noise
 
 
-@dataclass(frozen=True, slots=True)
-class WireModel:
-    """How a bus is emulated that has a bit rate: see `bridge.wire.wire`."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WireModel(Bus):
+    """Section [bus] of buses with a bit rate: see `bridge.wire.wire`."""
 
-    bitrate_bit_s: int
-    txqueuelen: int  # frames in a host's transmit queue
-    tx_mailboxes: int  # frames in a drive's controller
     restart_ns: int | None  # a host starts to recover from bus-off this much later; None: never
     drive_restart_ns: int | None
 
@@ -494,15 +389,15 @@ class RobotBrief:
     robot: str
     bus: str
     body: Body
-    disturbance: Disturbance
+    disturbance: WheelDisturbance
     drive: DriveModel
     powertrain: PowertrainModel | None  # None: ideal motors and encoders
     right_node: int
     left_node: int
+    mounting: Mounting
     pose: Pose
     v_m_s: float
     omega_rad_s: float
-    mounting: Mounting = Mounting()
 
 
 @dataclass(frozen=True, slots=True)

@@ -115,6 +115,11 @@ def changed(section: _P, changes: Parameters) -> _P:
     return replace(section, **{k: v for k, v in given.items() if v is not None})  # type: ignore[type-var]
 
 
+def extended(made: type[_P], section: Parameters, **derived: Any) -> _P:
+    """A subclass of the section's type: what the section has, and what is derived."""
+    return made(**{key.name: getattr(section, key.name) for key in fields(section)} | derived)  # type: ignore[arg-type]
+
+
 def as_tuples(value: Any) -> Any:
     """Parsed TOML with its arrays as tuples, as `Parameters` have them."""
     if isinstance(value, dict):

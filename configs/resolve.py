@@ -7,14 +7,10 @@ from configs import sections
 from configs.brief import (
     OURS,
     AgentBrief,
-    Body,
     CirclePath,
-    Coordination,
     CosinePath,
-    Disturbance,
     DriveLink,
     DriveModel,
-    EncoderModel,
     FigureEightPath,
     FormationOffset,
     Gains,
@@ -22,10 +18,8 @@ from configs.brief import (
     LeaderBrief,
     LinePath,
     MotorModel,
-    Mounting,
     NetworkLink,
     PlantBrief,
-    Pose,
     PowertrainModel,
     ReferencePath,
     RobotBrief,
@@ -33,12 +27,13 @@ from configs.brief import (
     Settings,
     SplinePath,
     StructureOffset,
-    SupplyModel,
     VaryingOffset,
+    WheelDisturbance,
     Wheels,
     WireModel,
     WorldOffset,
 )
+from configs.parameters import extended
 from configs.reach import Reach, reach_of
 from configs.scenario import Scenario
 from configs.splines import Ends, chord_lengths, quintic_spline
@@ -89,7 +84,6 @@ def agent_brief(
     robot = next(robot for robot in scenario.robot if robot.name == name)
     control = scenario.control_of(robot)
     body = scenario.body_of(robot)
-    coordination = scenario.coordination
     graph = scenario.topology
     drive = _drive_model(scenario, 0)
     ticks = schedule(scenario, speed, profile=profile)
@@ -98,16 +92,8 @@ def agent_brief(
         law=control.law,
         wheels=Wheels(body.wheel_radius_m, body.half_track_m),
         gains=gains_of(control),
-        coordination=Coordination(
-            p=coordination.p,
-            q=coordination.q,
-            s_0=robot.s_0,
-            mu_0=coordination.mu_0,
-            v_hat_0=coordination.v_hat_0,
-            age_limit_s=coordination.age_limit_s,
-            silence_limit_s=coordination.silence_limit_s,
-            ahead_limit_s=coordination.ahead_limit_s,
-        ),
+        coordination=scenario.coordination,
+        s_0=robot.s_0,
         reach=reach(scenario),
         path=reference_path(scenario.path),
         offset=formation_offset(robot.offset),
@@ -156,7 +142,7 @@ def _drive_link(scenario: Scenario, robot: sections.Robot, drive: DriveModel) ->
         heartbeat_period_ns=drive.heartbeat_period_ns,
         encoder_age_limit_ns=round(encoder_age_s * 1e9),
         heartbeat_age_limit_ns=round(host.heartbeat_age_limit_s * 1e9),
-        mounting=Mounting(**asdict(scenario.mounting_of(robot))),
+        mounting=scenario.mounting_of(robot),
     )
 
 
@@ -167,21 +153,23 @@ def _host_limits(scenario: Scenario, *, ours: bool) -> HostLimits:
         delay_s = scenario.localisation.delay_s or clock.control_period_s
         pose_age_s = max(POSE_AGE_LIMIT_S, delay_s + 5 * clock.localisation_period_s)
     fixes = scenario.localisation.source != "odometry"
-    return HostLimits(
-        pose_age_limit_ns=round(pose_age_s * 1e9) if fixes else 0,
+    return extended(
+        HostLimits,
+        host,
         torque_limit_wheel_N_m=_or_none(host.torque_limit_wheel_N_m),
         torque_slew_limit_wheel_N_m_s=_or_none(host.torque_slew_limit_wheel_N_m_s),
         encoder_mismatch_limit_wheel_rad=_or_none(host.encoder_mismatch_limit_wheel_rad),
         pose_mismatch_limit_m=_or_none(host.pose_mismatch_limit_m),
-        dry_run=host.dry_run,
-        estop_on_exit=host.on_exit == "estop",
-        rearm=host.rearm,
-        rearm_after_ns=round(host.rearm_after_s * 1e9),
-        rearm_attempts=host.rearm_attempts,
-        rearm_limit_ns=round(host.rearm_limit_s * 1e9),
+        pose_age_limit_ns=_ns(pose_age_s) if fixes else 0,
+        rearm_after_ns=_ns(host.rearm_after_s),
+        rearm_limit_ns=_ns(host.rearm_limit_s),
         # Our own bus fails when the plant is gone, and doesn't come back.
-        bus_error_limit_ns=0 if ours else round(host.bus_error_limit_s * 1e9),
+        bus_error_limit_ns=0 if ours else _ns(host.bus_error_limit_s),
     )
+
+
+def _ns(seconds: float) -> int:
+    return round(seconds * 1e9)
 
 
 def _or_none(limit: float | None) -> float:
@@ -219,12 +207,11 @@ def wire_model(scenario: Scenario) -> WireModel | None:
     bus = scenario.bus
     if bus.timing == "ideal":
         return None
-    return WireModel(
-        bitrate_bit_s=bus.bitrate_bit_s,
-        txqueuelen=bus.txqueuelen,
-        tx_mailboxes=bus.tx_mailboxes,
-        restart_ns=None if bus.restart_s is None else round(bus.restart_s * 1e9),
-        drive_restart_ns=None if bus.drive_restart_s is None else round(bus.drive_restart_s * 1e9),
+    return extended(
+        WireModel,
+        bus,
+        restart_ns=None if bus.restart_s is None else _ns(bus.restart_s),
+        drive_restart_ns=None if bus.drive_restart_s is None else _ns(bus.drive_restart_s),
     )
 
 
@@ -269,60 +256,47 @@ def formation_offset(offset: sections.Offset) -> FormationOffset:
 
 
 def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief:
-    disturbance = robot.disturbance or scenario.disturbance
     return RobotBrief(
         robot=robot.name,
         bus=scenario.bus_of(robot.name),
-        body=Body(**asdict(scenario.body_of(robot))),
-        disturbance=Disturbance(
-            disturbance.amplitude_wheel_N_m, disturbance.rate_rad_s, float(number)
+        body=scenario.body_of(robot),
+        disturbance=extended(
+            WheelDisturbance, robot.disturbance or scenario.disturbance, phase_rad=float(number)
         ),
         drive=_drive_model(scenario, number),
         powertrain=_powertrain_model(scenario, number),
         right_node=scenario.nodes_of(robot.name)[0],
         left_node=scenario.nodes_of(robot.name)[1],
-        pose=Pose(robot.pose.x_m, robot.pose.y_m, robot.pose.theta_rad),
+        pose=robot.pose,
         v_m_s=robot.v_m_s,
         omega_rad_s=robot.omega_rad_s,
-        mounting=Mounting(**asdict(scenario.mounting_of(robot))),
+        mounting=scenario.mounting_of(robot),
     )
 
 
 def _drive_model(scenario: Scenario, number: int) -> DriveModel:
     drive = scenario.drive
     limited = drive.preset != "ideal"
-    return DriveModel(
-        protocol=drive.protocol,
-        torque_constant_N_m_A=drive.torque_constant_N_m_A,
+    return extended(
+        DriveModel,
+        drive,
         current_limit_A=drive.current_limit_A if limited else UNLIMITED,
         velocity_limit_shaft_rev_s=drive.velocity_limit_shaft_rev_s if limited else UNLIMITED,
-        velocity_gain_shaft_N_m_s_rev=drive.velocity_gain_shaft_N_m_s_rev,
-        overspeed_ratio=drive.overspeed_ratio,
         torque_limiters=limited,
-        heartbeat_period_ns=round(drive.heartbeat_period_s * 1e9),
-        encoder_period_ns=round((drive.encoder_period_s or scenario.clock.control_period_s) * 1e9),
-        torques_period_ns=round(drive.torques_period_s * 1e9),
-        watchdog_ns=round(drive.watchdog_s * 1e9),
-        zero_torque_on_disarm=drive.zero_torque_on_disarm,
-        velocity_integrator_gain_shaft_N_m_rev=drive.velocity_integrator_gain_shaft_N_m_rev,
-        position_gain_1_s=drive.position_gain_1_s,
-        command_latency_ns=_latency_ns(drive),
         serial_number=SERIAL_NUMBER + 2 * number,
-        error_period_ns=round(drive.error_period_s * 1e9),
-        iq_period_ns=round(drive.iq_period_s * 1e9),
-        temperature_period_ns=round(drive.temperature_period_s * 1e9),
-        bus_period_ns=round(drive.bus_voltage_period_s * 1e9),
-        powers_period_ns=round(drive.powers_period_s * 1e9),
-        firmware=_version(drive.firmware),
-        boot_ns=round(drive.boot_s * 1e9),
-        calibrated=drive.calibrated,
-        calibration_ns=round(drive.calibration_s * 1e9),
-        estop_blocks_arming=drive.estop_blocks_arming,
-        under_voltage_V=drive.under_voltage_V,
-        over_voltage_V=drive.over_voltage_V,
-        derate_from_C=drive.derate_from_C,
-        derate_to_C=drive.derate_to_C,
-        spinout_power_W=drive.spinout_power_W,
+        firmware_version=_version(drive.firmware),
+        command_latency_ns=_latency_ns(drive),
+        heartbeat_period_ns=_ns(drive.heartbeat_period_s),
+        encoder_period_ns=_ns(drive.encoder_period_s or scenario.clock.control_period_s),
+        torques_period_ns=_ns(drive.torques_period_s),
+        error_period_ns=_ns(drive.error_period_s),
+        iq_period_ns=_ns(drive.iq_period_s),
+        temperature_period_ns=_ns(drive.temperature_period_s),
+        bus_voltage_period_ns=_ns(drive.bus_voltage_period_s),
+        powers_period_ns=_ns(drive.powers_period_s),
+        watchdog_ns=_ns(drive.watchdog_s),
+        boot_ns=_ns(drive.boot_s),
+        calibration_ns=_ns(drive.calibration_s),
     )
 
 
@@ -335,7 +309,7 @@ def _latency_ns(drive: sections.Drive) -> tuple[int, int]:
     if drive.preset != "realistic":
         return 0, 0
     least_s, most_s = drive.command_latency_s
-    return round(least_s * 1e9), round(most_s * 1e9)
+    return _ns(least_s), _ns(most_s)
 
 
 def _powertrain_model(scenario: Scenario, number: int) -> PowertrainModel | None:
@@ -343,15 +317,15 @@ def _powertrain_model(scenario: Scenario, number: int) -> PowertrainModel | None
     if drive.preset != "realistic":
         return None
     constant, limit = motor.torque_constant_N_m_A, motor.current_limit_A
-    inherited = {"torque_constant_N_m_A", "current_limit_A"}
     return PowertrainModel(
-        motor=MotorModel(
+        motor=extended(
+            MotorModel,
+            motor,
             torque_constant_N_m_A=drive.torque_constant_N_m_A if constant is None else constant,
-            assumed_torque_constant_N_m_A=drive.torque_constant_N_m_A,
             current_limit_A=drive.current_limit_A if limit is None else limit,
-            **{k: v for k, v in asdict(motor).items() if k not in inherited},
+            assumed_torque_constant_N_m_A=drive.torque_constant_N_m_A,
         ),
-        encoder=EncoderModel(**asdict(scenario.encoder)),
-        supply=SupplyModel(**asdict(scenario.supply)),
+        encoder=scenario.encoder,
+        supply=scenario.supply,
         seed=(scenario.seed << 9) + number,  # at most 256 robots
     )

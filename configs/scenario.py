@@ -19,7 +19,7 @@ from configs.sections import (
     Bus,
     Clock,
     Control,
-    CoordinationSection,
+    Coordination,
     Cosine,
     Disturbance,
     Drive,
@@ -57,7 +57,7 @@ class Scenario(BaseModel):
     leader: Leader = Leader()
     graph: GraphSection = GraphSection(generator="chain")
     control: Control = Control()
-    coordination: CoordinationSection = CoordinationSection()
+    coordination: Coordination = Coordination()
     localisation: Localisation = Localisation()
     bus: Bus = Bus()
     drive: Drive = Drive()

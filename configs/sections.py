@@ -221,7 +221,7 @@ class Control(Parameters):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CoordinationSection(Parameters):
+class Coordination(Parameters):
     """Equations (38), (40), (45)."""
 
     p: Positive = 2.0

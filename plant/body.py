@@ -18,7 +18,8 @@ from collections.abc import Callable
 from math import cos, sin
 from typing import NamedTuple
 
-from configs.brief import Body, Disturbance
+from configs.brief import WheelDisturbance
+from configs.sections import Body
 from plant.divergence import FASTEST_WHEEL_RAD_S
 
 Accelerations = Callable[[float, float, float, float], tuple[float, float]]
@@ -39,7 +40,7 @@ class State(NamedTuple):
 class RigidBody:
     """Constants of (4) for one robot."""
 
-    def __init__(self, body: Body, disturbance: Disturbance) -> None:
+    def __init__(self, body: Body, disturbance: WheelDisturbance) -> None:
         r, b, a = body.wheel_radius_m, body.half_track_m, body.com_offset_m
         mass = body.body_mass_kg + body.wheels_in_mass * body.wheel_mass_kg
         inertia = (

@@ -30,7 +30,7 @@ from enum import Enum
 from math import copysign, isfinite, pi
 from random import Random
 
-from configs.brief import EncoderModel
+from configs import powertrain
 
 PER_RADIAN = 1.0 / (2.0 * pi)
 """Revolutions per radian; also rev/s per rad/s."""
@@ -76,7 +76,7 @@ class Encoder:
         "_velocity",
     )
 
-    def __init__(self, model: EncoderModel, random: Random) -> None:
+    def __init__(self, model: powertrain.Encoder, random: Random) -> None:
         self._model = model
         self._random = random
         self._phase = random.random()

@@ -6,8 +6,8 @@ Its rows in the record have its last pose, and NaN for everything that isn't mea
 from math import nan
 
 from bridge.network.messages import PoseFix
-from configs.brief import Pose
 from configs.reach import within_world
+from configs.sections import Pose
 from configs.signals import PLANT_SIGNALS
 
 _UNKNOWN = (nan,) * (len(PLANT_SIGNALS) - 4)

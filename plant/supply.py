@@ -27,7 +27,7 @@ that is in contact is far below a substep and left out.
 from enum import Enum
 from math import sqrt
 
-from configs.brief import SupplyModel
+from configs import powertrain
 
 
 class SupplyFault(Enum):
@@ -45,7 +45,7 @@ class Supply:
 
     __slots__ = ("_model", "_open_circuit_V", "bus_V", "left_A", "right_A", "shortage_W")
 
-    def __init__(self, model: SupplyModel) -> None:
+    def __init__(self, model: powertrain.Supply) -> None:
         self._model = model
         self._open_circuit_V = model.voltage_V
         self.bus_V = model.voltage_V

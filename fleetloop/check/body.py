@@ -1,16 +1,13 @@
 """The inertias of a robot as its wheels feel them, as `plant.body` has them."""
 
-from dataclasses import asdict
-
-from configs.brief import Body as BodyModel
-from configs.brief import Disturbance
+from configs.brief import WheelDisturbance
 from configs.sections import Body
 from plant.body import RigidBody
 
 
 def robot_body(body: Body) -> RigidBody:
     """The rigid body of (2)-(4), undisturbed."""
-    return RigidBody(BodyModel(**asdict(body)), Disturbance(0.0, 0.0, 0.0))
+    return RigidBody(body, WheelDisturbance(phase_rad=0.0))
 
 
 def inertias(body: Body) -> tuple[float, float]:

@@ -79,7 +79,7 @@ def _axis_messages(robot: RobotBrief, node: int, period_ns: int) -> list[Message
         Command.GET_ERROR: (drive.error_period_ns, [bytes(8)]),
         Command.GET_IQ: (drive.iq_period_ns, others),
         Command.GET_TEMPERATURE: (drive.temperature_period_ns, others),
-        Command.GET_BUS_VOLTAGE_CURRENT: (drive.bus_period_ns, others),
+        Command.GET_BUS_VOLTAGE_CURRENT: (drive.bus_voltage_period_ns, others),
         Command.GET_POWERS: (drive.powers_period_ns, others),
     }
     messages = []

@@ -7,13 +7,11 @@ import pytest
 
 from agents.coordination import CoordinationState, Coordinator, matrix_exponential
 from agents.neighbours import Neighbours
-from configs.brief import Coordination
 from configs.loading import load
 from configs.scenario import Scenario
+from configs.sections import Coordination
 
-GAINS = Coordination(
-    p=2.0, q=1.0, s_0=0.0, mu_0=0.0, v_hat_0=0.0, age_limit_s=2.0, silence_limit_s=2.0
-)
+GAINS = Coordination(p=2.0, q=1.0, mu_0=0.0, v_hat_0=0.0, age_limit_s=2.0, silence_limit_s=2.0)
 H = 0.001
 
 

@@ -3,11 +3,9 @@
 import pytest
 
 from agents.neighbours import Neighbours
-from configs.brief import Coordination
+from configs.sections import Coordination
 
-LIMITS = Coordination(
-    p=2.0, q=1.0, s_0=0.0, mu_0=0.0, v_hat_0=0.0, age_limit_s=0.5, silence_limit_s=1.0
-)
+LIMITS = Coordination(p=2.0, q=1.0, mu_0=0.0, v_hat_0=0.0, age_limit_s=0.5, silence_limit_s=1.0)
 MS = 1_000_000
 HALF = 0.0005
 

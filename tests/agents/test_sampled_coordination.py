@@ -14,12 +14,10 @@ import pytest
 
 from agents.coordination import CoordinationState, Coordinator
 from agents.neighbours import Neighbours
-from configs.brief import Coordination
+from configs.sections import Coordination
 
 P, Q = 2.0, 1.0
-LIMITS = Coordination(
-    p=P, q=Q, s_0=0.0, mu_0=0.0, v_hat_0=0.0, age_limit_s=10.0, silence_limit_s=10.0
-)
+LIMITS = Coordination(p=P, q=Q, mu_0=0.0, v_hat_0=0.0, age_limit_s=10.0, silence_limit_s=10.0)
 H_S = 0.02
 V, LAST_V, MU, S, LAST_S = range(5)
 OWN = V, MU, S

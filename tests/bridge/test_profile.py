@@ -3,14 +3,15 @@
 import time
 
 from bridge.profile import PARTS, Sampler
-from configs.brief import Body, Disturbance
+from configs.brief import WheelDisturbance
+from configs.sections import Body
 from plant.body import RigidBody, State
 from plant.integrate import rk4
 
 
 def test_time_spent_in_the_plant_is_the_plants() -> None:
-    body = Body(0.04, 0.1, 0.02, 2.3, 0.28, 0.01, 0.0056, 0.002, 0.02, 0.02, 1)
-    robot = RigidBody(body, Disturbance(0.0, 0.0, 0.0))
+    body = Body()
+    robot = RigidBody(body, WheelDisturbance(phase_rad=0.0))
     state = State(0.0, 0.0, 0.0, 0.5, 0.1, 0.0, 0.0)
     sampler = Sampler()
     with sampler:

@@ -4,10 +4,11 @@ from math import inf
 
 import pytest
 
-from configs.brief import HostLimits, Mounting, NetworkLink
+from configs.brief import HostLimits, NetworkLink
 from configs.errors import ScenarioError
 from configs.loading import load
 from configs.resolve import agent_brief, plant_brief
+from configs.sections import Mounting
 
 NETWORK = NetworkLink("t", "", "", "")
 
@@ -39,7 +40,7 @@ def test_slow_localisation_and_slow_control_have_longer_limits() -> None:
 def test_plant_and_controller_are_told_the_same_mounting_robot_by_robot() -> None:
     overrides = ("mounting.gear_ratio=9.0", "robot.r2.mounting.left_sign=-1")
     scenario = load("two_robots", overrides)
-    expected = {"r1": Mounting(1, 1, 9.0), "r2": Mounting(1, -1, 9.0)}
+    expected = {"r1": Mounting(gear_ratio=9.0), "r2": Mounting(left_sign=-1, gear_ratio=9.0)}
     for robot in plant_brief(scenario, network=NETWORK).robots:
         assert robot.mounting == expected[robot.robot]
         assert brief(*overrides, robot=robot.robot).drives.mounting == expected[robot.robot]

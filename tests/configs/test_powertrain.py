@@ -46,7 +46,7 @@ def test_the_realistic_preset_has_the_limits_of_the_limited_one() -> None:
     (limited, *_), (realistic, *_) = (
         robots("two_robots", f"drive.preset='{preset}'") for preset in ("limited", "realistic")
     )
-    assert replace(realistic.drive, command_latency_ns=(0, 0)) == limited.drive
+    assert replace(realistic.drive, preset="limited", command_latency_ns=(0, 0)) == limited.drive
     assert realistic.drive.command_latency_ns == (100_000, 1_100_000)
     assert realistic.drive.torque_limiters
 

@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from configs.brief import Body, Disturbance
+from configs.brief import WheelDisturbance
+from configs.sections import Body
 from plant.body import RigidBody, State
 from plant.divergence import FARTHEST, FASTEST_WHEEL_RAD_S
 from plant.integrate import rk4
 
-ETSRO = Body(0.04, 0.1, 0.02, 2.3, 0.28, 0.01, 0.0056, 0.002, 0.02, 0.02, 1)
-CALM = Disturbance(0.0, 0.5, 0.0)
+ETSRO = Body()
+CALM = WheelDisturbance(amplitude_wheel_N_m=0.0, rate_rad_s=0.5, phase_rad=0.0)
 REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -87,7 +88,10 @@ def test_damping_with_unequal_sides_never_adds_energy(right, left, v, omega) -> 
 
 
 def test_the_step_is_of_fourth_order() -> None:
-    robot = RigidBody(replace(ETSRO, damping_left_wheel_N_m_s=0.01), Disturbance(0.02, 9.0, 0.3))
+    robot = RigidBody(
+        replace(ETSRO, damping_left_wheel_N_m_s=0.01),
+        WheelDisturbance(amplitude_wheel_N_m=0.02, rate_rad_s=9.0, phase_rad=0.3),
+    )
     start = REST._replace(v=0.5, omega=2.0)
     fine = run(robot, start, 0.06, 0.02, 0.512, 0.001)
     errors = [abs(run(robot, start, 0.06, 0.02, 0.512, step).y - fine.y) for step in (0.064, 0.032)]
@@ -101,13 +105,17 @@ def test_wheel_angles_follow_from_what_the_body_did() -> None:
 
 
 def test_the_disturbance_is_a_sine_and_a_cosine_from_t_0_on() -> None:
-    robot = RigidBody(ETSRO, Disturbance(0.1, 0.5, 2.0))
+    robot = RigidBody(
+        ETSRO, WheelDisturbance(amplitude_wheel_N_m=0.1, rate_rad_s=0.5, phase_rad=2.0)
+    )
     assert robot.disturbance(3.0) == pytest.approx((0.1 * sin(3.5), 0.1 * cos(3.5)))
     assert robot.disturbance(-0.1) == (0.0, 0.0)
 
 
 def test_a_disturbance_acts_like_the_opposite_torque() -> None:
-    held = Disturbance(0.05, 0.0, pi / 4)  # constant, equal on both wheels
+    held = WheelDisturbance(
+        amplitude_wheel_N_m=0.05, rate_rad_s=0.0, phase_rad=pi / 4
+    )  # constant, equal on both wheels
     torque = 0.05 * sin(pi / 4)
     pushed = run(RigidBody(ETSRO, held), REST, 0.0, 0.0, 1.0)
     driven = run(RigidBody(ETSRO, CALM), REST, -torque, -torque, 1.0)

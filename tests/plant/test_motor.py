@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.powertrain_parts import INERTIA, MODEL, motor, motor_model, supply
 
-from configs.brief import Body, Disturbance
+from configs.brief import WheelDisturbance
+from configs.sections import Body
 from plant.body import RigidBody, State
 from plant.integrate import rk4
 from plant.motor import IdealMotor, Motor, MotorFault
@@ -198,7 +199,7 @@ def test_friction_never_pushes_a_wheel_the_way_it_goes(
         assert abs(friction) <= 5e-3 + 2e-4 * abs(speed) + 1e-12
 
 
-ETSRO = Body(0.04, 0.1, 0.0, 2.3, 0.28, 0.01, 0.0056, 0.002, 0.0, 0.0, 1)
+ETSRO = Body(com_offset_m=0.0, damping_right_wheel_N_m_s=0.0, damping_left_wheel_N_m_s=0.0)
 
 
 @pytest.mark.parametrize("com_offset_m", [0.0, 0.02])
@@ -206,7 +207,10 @@ ETSRO = Body(0.04, 0.1, 0.0, 2.3, 0.28, 0.01, 0.0056, 0.002, 0.0, 0.0, 1)
 def test_friction_at_both_wheels_of_a_body_never_adds_energy(
     com_offset_m: float, v: float, omega: float, step_s: float
 ) -> None:
-    robot = RigidBody(replace(ETSRO, com_offset_m=com_offset_m), Disturbance(0.0, 0.0, 0.0))
+    robot = RigidBody(
+        replace(ETSRO, com_offset_m=com_offset_m),
+        WheelDisturbance(phase_rad=0.0),
+    )
     inertia = min(robot.mbar_1, robot.mbar_2)
     model, source = motor_model(coulomb_friction_shaft_N_m=0.05), supply()
     right = Motor(model, inertia, source, Random(1))
@@ -225,7 +229,7 @@ def test_friction_at_both_wheels_of_a_body_never_adds_energy(
 
 
 def test_a_robot_on_two_wheels_stops_and_does_not_chatter() -> None:
-    robot = RigidBody(ETSRO, Disturbance(0.0, 0.0, 0.0))
+    robot = RigidBody(ETSRO, WheelDisturbance(phase_rad=0.0))
     inertia = min(robot.mbar_1, robot.mbar_2)
     wheels = [Motor(motor_model(), inertia, supply(), Random(n)) for n in (1, 2)]
     state = State(0.0, 0.0, 0.0, 0.2, 1.0, 0.0, 0.0)

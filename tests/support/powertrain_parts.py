@@ -4,7 +4,7 @@ from dataclasses import replace
 from random import Random
 from typing import Any
 
-from configs.brief import EncoderModel, MotorModel, NetworkLink, PowertrainModel, SupplyModel
+from configs.brief import MotorModel, NetworkLink, PowertrainModel
 from configs.loading import load
 from configs.resolve import plant_brief
 from plant.encoder import Encoder
@@ -34,10 +34,8 @@ def motor(seed: int = 1, supply: Supply | None = None, **changes: Any) -> Motor:
 
 
 def encoder(seed: int = 1, **changes: Any) -> Encoder:
-    model: EncoderModel = replace(MODEL.encoder, **changes)
-    return Encoder(model, Random(seed))
+    return Encoder(replace(MODEL.encoder, **changes), Random(seed))
 
 
 def supply(**changes: Any) -> Supply:
-    model: SupplyModel = replace(MODEL.supply, **changes)
-    return Supply(model)
+    return Supply(replace(MODEL.supply, **changes))

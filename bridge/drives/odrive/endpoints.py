@@ -122,9 +122,9 @@ def _input_position(axis: Axis, value: float) -> None:
 def _rows() -> Iterator[tuple[str, str, Read] | tuple[str, str, Read, Write]]:
     yield "vbus_voltage", "f", reports.bus_voltage
     yield "ibus", "f", reports.bus_current
-    yield "fw_version_major", "B", lambda axis: axis.model.firmware[0]
-    yield "fw_version_minor", "B", lambda axis: axis.model.firmware[1]
-    yield "fw_version_revision", "B", lambda axis: axis.model.firmware[2]
+    yield "fw_version_major", "B", lambda axis: axis.model.firmware_version[0]
+    yield "fw_version_minor", "B", lambda axis: axis.model.firmware_version[1]
+    yield "fw_version_revision", "B", lambda axis: axis.model.firmware_version[2]
     yield "axis0.active_errors", "I", lambda axis: axis.errors
     yield "axis0.disarm_reason", "I", lambda axis: axis.disarm_reason
     yield "axis0.procedure_result", "B", lambda axis: axis.result
@@ -201,7 +201,7 @@ def answer(axis: Axis, data: bytes, now_ns: int) -> bytes | None:
             return None
         if not endpoint.write(axis, struct.unpack(f"<{endpoint.code}", value)[0], now_ns):
             return None
-        if axis.model.firmware < ANSWERS_WRITES:
+        if axis.model.firmware_version < ANSWERS_WRITES:
             return None
     elif opcode != _READ:
         return None

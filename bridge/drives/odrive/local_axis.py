@@ -234,7 +234,7 @@ class OdriveNode(Axis):
         if len(data) < f.SDO.size:
             return None
         if f.SDO.unpack_from(data)[1] in functions.FUNCTIONS:
-            confirms = self.model.firmware >= endpoints.ANSWERS_WRITES
+            confirms = self.model.firmware_version >= endpoints.ANSWERS_WRITES
             return functions.answer(self, data, now_ns, confirms=confirms)
         return endpoints.answer(self, data, now_ns)
 

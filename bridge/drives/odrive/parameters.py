@@ -52,7 +52,7 @@ class Parameters:
                 Command.GET_ENCODER_ESTIMATES: model.encoder_period_ns,
                 Command.GET_IQ: model.iq_period_ns,
                 Command.GET_TEMPERATURE: model.temperature_period_ns,
-                Command.GET_BUS_VOLTAGE_CURRENT: model.bus_period_ns,
+                Command.GET_BUS_VOLTAGE_CURRENT: model.bus_voltage_period_ns,
                 Command.GET_TORQUES: model.torques_period_ns,
                 Command.GET_POWERS: model.powers_period_ns,
             },

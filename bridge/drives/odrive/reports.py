@@ -30,7 +30,7 @@ def floats(first: float, second: float) -> bytes:
 
 def version(axis: Axis) -> bytes:
     """Get_Version; a released firmware."""
-    return f.VERSION.pack(PROTOCOL_VERSION, *HARDWARE, *axis.model.firmware, 0)
+    return f.VERSION.pack(PROTOCOL_VERSION, *HARDWARE, *axis.model.firmware_version, 0)
 
 
 def heartbeat(axis: Axis) -> bytes:

@@ -30,7 +30,7 @@ def driven(scenario: Scenario, ticks: int) -> np.ndarray:
     ears = {b.robot: Neighbours(b.hears, b.coordination, h) for b in briefs}
     minds = {b.robot: Coordinator(b.coordination, h, b.hears_leader) for b in briefs}
     states = {
-        b.robot: CoordinationState(b.coordination.v_hat_0, b.coordination.mu_0, b.coordination.s_0)
+        b.robot: CoordinationState(b.coordination.v_hat_0, b.coordination.mu_0, b.s_0)
         for b in briefs
     }
     rows = []

@@ -15,6 +15,7 @@ from bridge.drives.odrive.local_axis import OdriveNode
 from bridge.drives.odrive.remote_axis import OdriveClient
 from bridge.frame import RTR, Frame
 from configs.brief import DriveLink, DriveModel
+from configs.sections import Mounting
 
 MODEL = DriveModel(
     protocol="odrive",
@@ -31,7 +32,7 @@ MODEL = DriveModel(
     zero_torque_on_disarm=False,
     serial_number=0x3858_0000_0000,
 )
-LINK = DriveLink("odrive", 0, 1, 1_000_000, 10.0, 10.0)
+LINK = DriveLink("odrive", 0, 1, 1_000_000, 10.0, 10.0, Mounting())
 
 
 @cache

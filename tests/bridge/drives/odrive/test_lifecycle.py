@@ -230,7 +230,7 @@ def test_endpoints_say_what_messages_say() -> None:
 
 def test_writing_is_answered_from_firmware_0_6_11_on_and_acts_before() -> None:
     path = "axis0.controller.config.vel_gain"
-    old, new = axis(), axis(firmware=(0, 6, 11))
+    old, new = axis(), axis(firmware_version=(0, 6, 11))
     assert write(old, path, 0.5) == []
     (reply,) = write(new, path, 0.5)
     assert struct.unpack("<BHBf", reply.data) == (0, NUMBER[path], 0, 0.5)
@@ -273,7 +273,7 @@ def test_a_watchdog_that_is_turned_on_counts_from_then_on() -> None:
     ids=["1 byte", "3 bytes", "unknown", "opcode 2", "read-only", "NaN", "short value"],
 )
 def test_endpoint_requests_that_make_no_sense_get_no_answer_and_change_nothing(data) -> None:
-    node = axis(firmware=(0, 6, 11))
+    node = axis(firmware_version=(0, 6, 11))
     assert tell(node, Command.RX_SDO, data) == []
     assert not node.hear(Frame(f.identifier(NODE, Command.RX_SDO) | RTR, bytes(8)), 0)
     assert read(node, "axis0.controller.config.vel_gain") == pytest.approx(1 / 6)
@@ -306,7 +306,7 @@ def test_functions_are_called_by_writing_their_arguments_and_answered_with_their
     assert struct.unpack("<BHBf", reply.data) == (0, 1029, 0, 0.0)
     assert call(axis(), "get_adc_voltage", b"\1\0") == []
     assert call(axis(), "clear_errors") == []
-    (confirmation,) = call(axis(firmware=(0, 6, 11)), "clear_errors")
+    (confirmation,) = call(axis(firmware_version=(0, 6, 11)), "clear_errors")
     assert confirmation.data == struct.pack("<BHB4x", 0, 1028, 0)
     assert tell(axis(), Command.RX_SDO, struct.pack("<BHB", 0, 1028, 0)) == []  # it is no value
 
@@ -352,7 +352,7 @@ def test_every_cyclic_message_has_its_period() -> None:
         error_period_ns=50 * MS,
         iq_period_ns=20 * MS,
         temperature_period_ns=100 * MS,
-        bus_period_ns=25 * MS,
+        bus_voltage_period_ns=25 * MS,
         torques_period_ns=5 * MS,
         powers_period_ns=200 * MS,
     )

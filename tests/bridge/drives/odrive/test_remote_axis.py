@@ -12,9 +12,10 @@ from bridge.drives.odrive.frames import AxisError, AxisState, Command, identifie
 from bridge.drives.odrive.local_axis import OdriveNode
 from bridge.drives.odrive.remote_axis import OdriveClient
 from bridge.frame import EFF, ERR, RTR, Frame
-from configs.brief import DriveLink, DriveModel, Mounting, NetworkLink
+from configs.brief import DriveLink, DriveModel, NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief
+from configs.sections import Mounting
 
 MS = 1_000_000
 MODEL = replace(
@@ -25,7 +26,7 @@ MODEL = replace(
     encoder_period_ns=1 * MS,
     watchdog_ns=100 * MS,
 )
-LINK = DriveLink("odrive", 0, 1, 1 * MS, 10.0, 10.0)
+LINK = DriveLink("odrive", 0, 1, 1 * MS, 10.0, 10.0, Mounting())
 
 
 class Robot:
@@ -312,7 +313,11 @@ def test_a_resting_drive_is_told_idle_again_only_while_it_is_not(robot: Robot) -
     left=st.floats(-5.0, 5.0),
 )
 def test_mounting_turns_wheel_values_into_shaft_values_and_back(signs, ratio, right, left) -> None:
-    robot = Robot(link=replace(LINK, mounting=Mounting(*signs, ratio)))
+    robot = Robot(
+        link=replace(
+            LINK, mounting=Mounting(right_sign=signs[0], left_sign=signs[1], gear_ratio=ratio)
+        )
+    )
     robot.axes[0].feed(right, 2 * right)
     robot.axes[1].feed(left, 2 * left)
     robot.tick()
