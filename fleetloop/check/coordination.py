@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from agents.coordination import matrix_exponential
 from configs.graph import Graph
-from configs.resolve import leader_brief
 from configs.scenario import Scenario
+from fleetloop.results.summary import leader_speed
 
 Matrix = NDArray[np.float64]
 STEP_S = 0.02
@@ -124,7 +124,7 @@ def forecast(scenario: Scenario) -> Forecast:
     state[:, 0], state[:, 1] = gains.v_hat_0, gains.mu_0
     state[:, 2] = [robot.s_0 for robot in scenario.robot]
     times: Matrix = np.arange(steps, dtype=np.float64) * step_s
-    speeds = _speeds(scenario, times)
+    speeds = leader_speed(scenario)(np.round(times * 1e9))
     states = np.empty((steps, count, 3))
     heard = np.zeros((count, 2))
     for n in range(steps):
@@ -141,14 +141,6 @@ def forecast(scenario: Scenario) -> Forecast:
             heard = heard + heard[:, :1] * np.array([0.0, step_s])
     v_hat, mu, s = (states[:, :, n] for n in range(3))
     return Forecast(times, s, v_hat + mu, v_hat, speeds)
-
-
-def _speeds(scenario: Scenario, times: Matrix) -> Matrix:
-    """v_r at every instant."""
-    steps = leader_brief(scenario).speed_steps
-    index = np.searchsorted([t_ns * 1e-9 for t_ns, _ in steps], times + 1e-9, side="right") - 1
-    speeds: Matrix = np.array([speed for _, speed in steps])[index]
-    return speeds
 
 
 def _one_step(graph: Graph, p: float, q: float, step_s: float, *, ageing: bool) -> Matrix:

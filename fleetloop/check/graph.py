@@ -15,17 +15,14 @@ from configs.graph import Graph
 from configs.scenario import Scenario
 from fleetloop.check.coordination import Forecast, Matrix, delay_margin_s, radii
 from fleetloop.check.finding import Finding, Level
+from fleetloop.settling import FINAL_S, LOST_M, SETTLE_BAND
 
-SETTLED_M = 0.05
-"""As in a run's summary: a spread within this has settled."""
-SETTLED_M_S, SETTLED_PART = 0.05, 0.1
-"""Speed estimates within this of v_r, and within this part of it, have settled."""
-FINAL_S, FINAL_PART = 5.0, 0.25
-"""The end of a run, its last part if it is short: there all should have settled."""
+SETTLED_PART = 0.1
+"""Speed estimates have settled within this part of v_r as well, if that is less."""
+FINAL_PART = 0.25
+"""The end of a short run, as a part of it: there all should have settled."""
 _EFOLDS = 3.0
 """An error that grows for less than this many time constants stays small in a short run."""
-LOST_M = 0.5
-"""Path variables that are farther apart at the end, and were not at the start, are lost."""
 LARGE_FLEET = 100
 """The map from share to share isn't computed for more robots."""
 BACKWARDS_M = 0.05
@@ -162,12 +159,12 @@ def _leader(scenario: Scenario) -> list[Finding]:
 
 def _agreement(scenario: Scenario, ahead: Forecast) -> Finding:
     """When the path variables will have agreed, by the coordination alone."""
-    return _settling(scenario, ahead, ahead.spread, "max s_i − min s_i", "m", SETTLED_M)
+    return _settling(scenario, ahead, ahead.spread, "max s_i − min s_i", "m", SETTLE_BAND)
 
 
 def _speed_estimates(scenario: Scenario, ahead: Forecast) -> Finding:
     """When all have the leader's speed: on dense graphs they agree long before."""
-    settled = min(SETTLED_M_S, SETTLED_PART * float(np.abs(ahead.v_r).max()))
+    settled = min(SETTLE_BAND, SETTLED_PART * float(np.abs(ahead.v_r).max()))
     return _settling(scenario, ahead, ahead.speed_error, "max |v̂_i − v_r|", "m/s", settled)
 
 

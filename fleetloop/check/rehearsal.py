@@ -20,14 +20,14 @@ from configs.signals import AGENT_SIGNALS
 from fleetloop.check.finding import Finding
 from fleetloop.launch.in_process import InProcessRun
 from fleetloop.record.writer import Source
+from fleetloop.settling import LOST_M, SETTLE_BAND
 
 WORK_S = 1.5
 """Processor time that is meant to be enough, on an ordinary machine."""
 _TICK_S, _SUBSTEP_S, _WIRE_S = 40e-6, 20e-6, 250e-6
 """Of a robot: a tick, a step of its motors and encoders, a tick on a bus with bit timing."""
 FINAL_S = 4.0
-SETTLED_M, LOST_M = 0.05, 0.5
-"""Errors at the end that are said, and that are an error."""
+"""Its end, where errors should be small: shorter than a run's, as a rehearsal is."""
 _TITLE = "rehearsal"
 _ROW = np.dtype([(signal.name, "<f8") for signal in AGENT_SIGNALS])
 
@@ -115,14 +115,14 @@ def _errors(scenario: Scenario, notebook: _Notebook, said: str, *, whole: bool) 
     last = {robot: part[_final(part, period_s) :] for robot, part in rows.items() if len(part)}
     for robot, part in last.items():
         error, before = _off(part), _off(rows[robot][:1])
-        settled = error <= SETTLED_M if whole else error <= max(before, LOST_M)
+        settled = error <= SETTLE_BAND if whole else error <= max(before, LOST_M)
         if settled:
             continue
         text = f"{said}: {error:.2g} m off its path at the end, {before:.2g} m at the start"
         found.append(
             Finding("error" if whole and error > LOST_M else "warning", _TITLE, text, (robot,))
         )
-    if whole and (apart := _apart(last)) > SETTLED_M:
+    if whole and (apart := _apart(last)) > SETTLE_BAND:
         text = f"{said}: path variables {apart:.2g} m apart at the end"
         found.append(Finding("warning", _TITLE, text))
     return found

@@ -15,11 +15,8 @@ from configs.scenario import Scenario
 from fleetloop.record.reader import Record
 from fleetloop.results import expectations
 from fleetloop.results.expectations import judge, spread, why_not_checked
+from fleetloop.settling import FINAL_S, SETTLE_BAND
 
-SETTLE_BAND = 0.05
-"""An error has settled when it stays within this: [m], [rad]."""
-FINAL_S = 5.0
-"""What is called final is the greatest of this last part of a robot's rows, or of all of them."""
 ERRORS = ("x_e_m", "y_e_m", "theta_e_rad")
 _PACKAGES = ("fleetloop", "eclipse-zenoh", "python-can", "numpy", "msgpack", "mcap", "pydantic")
 

@@ -11,7 +11,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from bridge.profile import PARTS
-from fleetloop.results.summary import ERRORS, FINAL_S, Summary
+from fleetloop.results.summary import ERRORS, Summary
+from fleetloop.settling import FINAL_S
 from fleetloop.terminal import ResultConsole, say
 
 _MARKS = {True: "held", False: "FAILED", None: "not reached"}
