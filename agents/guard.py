@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 from agents.limits import TorqueLimiter
 from agents.rearming import Rearming
-from bridge.drives import DRIVES, DriveClient
+from bridge.drives import protocol
 from bridge.drives.dry_run import DryRun
+from bridge.drives.interface import DriveClient
 from bridge.frame import Frame
 from configs.brief import AgentBrief
 from configs.errors import InfrastructureError
@@ -61,7 +62,7 @@ class Guard:
 
     def __init__(self, brief: AgentBrief) -> None:
         host, schedule = brief.host, brief.schedule
-        client = DRIVES[brief.drives.protocol].client(brief.drives)
+        client = protocol(brief.drives.protocol).client(brief.drives)
         self.drives: DriveClient = DryRun(client) if host.dry_run else client
         self.phase = Phase.ARMING
         self.begun = False

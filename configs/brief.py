@@ -14,7 +14,9 @@ radians, wheel order is (right, left), times are integer nanoseconds.
 from dataclasses import dataclass, field
 from math import inf
 
+from configs.drives import NO_OPTIONS
 from configs.host import Host
+from configs.parameters import Parameters
 from configs.powertrain import Encoder, Motor, Supply
 from configs.reach import Reach
 from configs.sections import Body, Bus, Coordination, Disturbance, Drive, Mounting, Pose
@@ -226,7 +228,7 @@ class Schedule:
 class DriveLink:
     """How a controller reaches the two drives of its robot."""
 
-    protocol: str  # a key of bridge.drives.DRIVES
+    protocol: str  # as `configs.drives.load` takes it
     right_node: int
     left_node: int
     encoder_period_ns: int
@@ -236,6 +238,7 @@ class DriveLink:
     heartbeat_period_ns: int = 100_000_000
     encoder_age_limit_ns: int = 50_000_000  # older: the drive has dropped out
     heartbeat_age_limit_ns: int = 500_000_000  # older: the drive has dropped out
+    own: Parameters = NO_OPTIONS  # the protocol's own keys
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -353,6 +356,7 @@ class DriveModel(Drive):
     trajectory_accel_shaft_rev_s2: float = 0.5
     trajectory_decel_shaft_rev_s2: float = 0.5
     current_margin_A: float = 8.0  # above the limit in force, then it disarms
+    own: Parameters = NO_OPTIONS  # the protocol's own keys
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

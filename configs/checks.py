@@ -6,9 +6,13 @@ from collections.abc import Iterator
 from math import ceil, floor, inf
 from typing import NamedTuple
 
+from pydantic import ValidationError
+
+from configs.drives import options_of
+from configs.errors import ScenarioError
 from configs.graph import parse_edge
 from configs.scenario import ETSRO, Scenario
-from configs.sections import Expect
+from configs.sections import Drive, Expect
 from configs.signals import expectable
 
 MAX_NODE = 62
@@ -124,6 +128,7 @@ _WHOLE_MILLISECONDS = (
 
 def _drives(scenario: Scenario) -> Iterator[Problem]:
     drive = scenario.drive
+    yield from _protocol(drive)
     if drive.right_node == drive.left_node:
         yield Problem("drive.left_node", drive.left_node, "must differ from drive.right_node")
     else:
@@ -156,6 +161,19 @@ def _drives(scenario: Scenario) -> Iterator[Problem]:
             f"must be below half of encoder.pll_rate_Hz = {encoder.pll_rate_Hz:g}, as drives want"
             " it: twice the bandwidth times the loop period is a gain below 1",
         )
+
+
+def _protocol(drive: Drive) -> Iterator[Problem]:
+    """The protocol exists, and its own keys are right."""
+    try:
+        options_of(drive)
+    except ValidationError as error:
+        for item in error.errors(include_url=False):
+            key = ".".join(map(str, ("drive", "options", *item["loc"])))
+            unknown = item["type"] == "unexpected_keyword_argument"
+            yield Problem(key, item["input"], "unknown key" if unknown else item["msg"])
+    except ScenarioError as error:
+        yield Problem("drive.protocol", drive.protocol, str(error))
 
 
 def _encoder_period(scenario: Scenario) -> Iterator[Problem]:

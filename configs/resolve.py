@@ -33,6 +33,7 @@ from configs.brief import (
     WireModel,
     WorldOffset,
 )
+from configs.drives import options_of
 from configs.parameters import extended
 from configs.reach import Reach, reach_of
 from configs.scenario import Scenario
@@ -143,6 +144,7 @@ def _drive_link(scenario: Scenario, robot: sections.Robot, drive: DriveModel) ->
         encoder_age_limit_ns=round(encoder_age_s * 1e9),
         heartbeat_age_limit_ns=round(host.heartbeat_age_limit_s * 1e9),
         mounting=scenario.mounting_of(robot),
+        own=drive.own,
     )
 
 
@@ -297,6 +299,7 @@ def _drive_model(scenario: Scenario, number: int) -> DriveModel:
         watchdog_ns=_ns(drive.watchdog_s),
         boot_ns=_ns(drive.boot_s),
         calibration_ns=_ns(drive.calibration_s),
+        own=options_of(drive),
     )
 
 

@@ -338,7 +338,12 @@ class Bus(Parameters):
 class Drive(Parameters):
     """The drives, two per robot."""
 
-    protocol: Literal["odrive"] = "odrive"
+    protocol: str = parameter("odrive", "odrive, or module:ROW of a protocol of your own")
+    options: dict[str, str | int | float | bool] = field(
+        default_factory=dict,
+        hash=False,
+        metadata={"description": "the keys of a protocol of your own"},
+    )
     preset: Literal["ideal", "limited", "realistic"] = parameter(
         "ideal",
         "ideal: torque as commanded; limited: with the limits below; realistic: these,"

@@ -13,8 +13,8 @@ Drives, motors and encoders are at the motor shaft, the body and what is recorde
 
 from collections.abc import Iterable, Sequence
 
-from bridge.drives import DRIVES, DriveNode
-from bridge.drives.feeling import Feeling
+from bridge.drives import protocol
+from bridge.drives.interface import DriveMeasurements, DriveNode
 from bridge.frame import Frame
 from configs.brief import PowertrainModel, RobotBrief, when
 from plant.body import RigidBody, State
@@ -49,7 +49,7 @@ class EmulatedRobot:
     )
 
     def __init__(self, brief: RobotBrief) -> None:
-        node = DRIVES[brief.drive.protocol].node
+        node = protocol(brief.drive.protocol).node
         self.brief = brief
         self._body = RigidBody(brief.body, brief.disturbance)
         self._right = node(brief.drive, brief.right_node, brief.drive.serial_number)
@@ -214,7 +214,9 @@ class RealisticRobot(EmulatedRobot):
             (self._left, train.left_motor, supply.left_A),
         ):
             torque, current = motor.sense()
-            drive.feel(Feeling(torque, current, motor.fet_C, motor.motor_C, supply.bus_V, amps))
+            drive.take_measurements(
+                DriveMeasurements(torque, current, motor.fet_C, motor.motor_C, supply.bus_V, amps)
+            )
 
 
 def emulated_robot(brief: RobotBrief) -> EmulatedRobot:

@@ -1,8 +1,8 @@
-"""A client that only listens: everything but torque, for a robot whose wheels must not turn.
+"""A drive client that only listens, for a robot whose wheels must not turn: a dry run.
 
-It hears and judges the drives like the client that it wraps, says `armed` once nothing is wrong
-with them, and answers every order with no frame at all, so somebody else may go on driving the
-robot meanwhile. `sent` is what would have been sent.
+It hears and judges the drives like the client that it wraps, is `armed` once nothing is wrong with
+them, and sends no frame, so another controller may drive the robot meanwhile. `sent` is what the
+wrapped client would have sent.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from bridge.frame import Frame
 
 if TYPE_CHECKING:
-    from bridge.drives import DriveClient
+    from bridge.drives.interface import DriveClient
 
 _NOTHING: tuple[Frame, ...] = ()
 

@@ -1,4 +1,4 @@
-"""What one can know of a bus by listening to it for a while: rate, load, nodes.
+"""Rate, load and nodes of a bus, from listening to it for a while.
 
     frame rate = frames / T     load = Σ bits / (T · bit rate)     T: bus time that passed [s]
 
@@ -9,17 +9,17 @@ Bus time is the scenario's: in lockstep it passes faster or slower than the wall
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from bridge.drives.odrive.frames import BITS, Command, decode_heartbeat, error_names
-from bridge.frame import EFF, ERR, RTR, Frame
+from bridge.drives import protocols
+from bridge.drives.interface import NodeSeen
+from bridge.frame import ERR, Frame
 from bridge.wire.bits import frame_bits
-from fleetloop.can.cansimple import LAYOUTS, decode
 
 ERROR_FRAME_BITS = 20
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A node that was seen; `state` and `errors` are empty until its heartbeat came."""
+    """A node of a drive protocol; `state` and `errors` are empty until a frame says them."""
 
     node: int
     state: str
@@ -33,7 +33,7 @@ class Census:
     bit_rate: int
     frames: int = 0
     error_frames: int = 0
-    other_frames: int = 0  # not CANSimple's
+    other_frames: int = 0  # of no drive protocol
     _bits: int = 0
     _first_ns: int = -1
     _last_ns: int = -1
@@ -54,20 +54,10 @@ class Census:
         self._last_ns = max(self._last_ns, stamp_ns)
         if frame.can_id & ERR:
             self.error_frames += 1
-        elif frame.can_id & EFF or (frame.can_id & (1 << BITS) - 1) not in LAYOUTS:
+        elif (seen := _seen(frame)) is None:
             self.other_frames += 1
-        else:
-            self._see(frame)
-
-    def _see(self, frame: Frame) -> None:
-        can_id, data = frame
-        node, command = (can_id & 0x7FF) >> BITS, can_id & (1 << BITS) - 1
-        if command == Command.HEARTBEAT and not can_id & RTR and data:
-            message = decode(frame)
-            state = str(message.values[1].value) if message is not None else ""
-            self._nodes[node] = Node(node, state, error_names(decode_heartbeat(data).errors))
-        elif node not in self._nodes:
-            self._nodes[node] = Node(node, "", "")
+        elif seen.state or seen.node not in self._nodes:
+            self._nodes[seen.node] = Node(*seen)
 
     @property
     def seconds(self) -> float:
@@ -93,5 +83,10 @@ class Census:
 
     @property
     def nodes(self) -> Sequence[Node]:
-        """CANSimple nodes that spoke or were spoken to, by number."""
+        """Nodes that sent frames or were sent some, by number."""
         return [self._nodes[number] for number in sorted(self._nodes)]
+
+
+def _seen(frame: Frame) -> NodeSeen | None:
+    """The node that a frame concerns, by the first protocol that knows it."""
+    return next(filter(None, (row.node_seen(frame) for row in protocols())), None)

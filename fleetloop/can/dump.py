@@ -18,10 +18,10 @@ from datetime import datetime
 from typing import TextIO
 
 from bridge.can_bus import sockets
+from bridge.drives import protocols
 from bridge.frame import EFF, Frame
 from configs.errors import ScenarioError
 from fleetloop.can import error_frames, filters, text
-from fleetloop.can.cansimple import words
 from fleetloop.can.client import Heard, Listener, open_bus
 from fleetloop.can.filters import Filter
 from fleetloop.launch.signals import interruptible
@@ -114,7 +114,7 @@ class Printer:
     def _with_words(self, shown: str, frame: Frame) -> str:
         if self._options.explain_errors:
             shown += "".join(f"\n\t{line}" for line in error_frames.explain(frame))
-        if self._options.decode and (said := words(frame)):
+        if self._options.decode and (said := _words(frame)):
             columns = text.long_columns(indent=self._indent)
             shown = f"{shown:<{columns}}   {said}"
         return shown
@@ -207,3 +207,8 @@ def _descriptor(stream: TextIO) -> int | None:
         return stream.fileno()
     except (io.UnsupportedOperation, ValueError):
         return None
+
+
+def _words(frame: Frame) -> str:
+    """A frame in words, by the first drive protocol that knows it; "" if none does."""
+    return next(filter(None, (row.words(frame) for row in protocols())), "")

@@ -1,32 +1,20 @@
-"""What a scenario asks of its buses: load, worst-case response times, and whether that can be.
+"""Load and worst-case response times of a scenario's buses, against what a wire carries.
 
-Per robot and bus: two heartbeats and two encoder frames from the drives, two torque frames from the
-controller every period, and what else of the drives the scenario makes cyclic. Typical lengths are
-those of moving wheels; worst cases are `bridge.wire.response_time`'s. Robots that share a bus are
-taken together.
+The cyclic messages of drives and controllers are those of the drive protocol's row. Typical lengths
+are those of moving wheels; worst cases are `bridge.wire.response_time`'s. Robots that share a bus
+are taken together.
 """
 
 from collections.abc import Iterable, Sequence
 from statistics import fmean
 
-from bridge.drives.odrive.frames import (
-    HEARTBEAT,
-    ONE_FLOAT,
-    TWO_FLOATS,
-    AxisState,
-    Command,
-    identifier,
-)
+from bridge.drives import protocol
 from bridge.frame import Frame
 from bridge.wire.bits import frame_bits
 from bridge.wire.response_time import Analysis, Message, analyse
 from configs.brief import RobotBrief
 from configs.scenario import Scenario
 from fleetloop.check.finding import Finding
-
-_SAMPLES = 64
-_TYPICAL_REV_S = 2.4  # a wheel of 4 cm radius at 0.6 m/s
-_TYPICAL_N_M = 0.05
 
 
 def bus_findings(scenario: Scenario, robots: Sequence[RobotBrief]) -> list[Finding]:
@@ -49,45 +37,18 @@ def bus_findings(scenario: Scenario, robots: Sequence[RobotBrief]) -> list[Findi
 
 def bus_messages(robots: Iterable[RobotBrief], period_ns: int) -> list[Message]:
     """All periodic messages of the robots of one bus, torques every `period_ns`."""
-    return [
-        message
-        for robot in robots
-        for node in (robot.right_node, robot.left_node)
-        for message in _axis_messages(robot, node, period_ns)
-    ]
-
-
-def _axis_messages(robot: RobotBrief, node: int, period_ns: int) -> list[Message]:
-    drive = robot.drive
-    heartbeat = HEARTBEAT.pack(0, AxisState.CLOSED_LOOP_CONTROL, 0, 0, 0)
-    moving = [_TYPICAL_REV_S * (1 + 0.001 * n) for n in range(_SAMPLES)]
-    torques = [_TYPICAL_N_M * (1 + 0.01 * n) for n in range(_SAMPLES)]
-    cyclic: dict[Command, tuple[int, Sequence[bytes]]] = {
-        Command.HEARTBEAT: (drive.heartbeat_period_ns, [heartbeat]),
-        Command.GET_ENCODER_ESTIMATES: (
-            drive.encoder_period_ns,
-            [TWO_FLOATS.pack(0.0024 * n, speed) for n, speed in enumerate(moving, 1)],
-        ),
-        Command.SET_INPUT_TORQUE: (period_ns, [ONE_FLOAT.pack(torque) for torque in torques]),
-        Command.GET_TORQUES: (
-            drive.torques_period_ns,
-            [TWO_FLOATS.pack(torque, torque * 1.003) for torque in torques],
-        ),
-    }
-    others = [TWO_FLOATS.pack(24.0 - 0.01 * n, 0.3 + 0.003 * n) for n in range(_SAMPLES)]
-    more: dict[Command, tuple[int, Sequence[bytes]]] = {
-        Command.GET_ERROR: (drive.error_period_ns, [bytes(8)]),
-        Command.GET_IQ: (drive.iq_period_ns, others),
-        Command.GET_TEMPERATURE: (drive.temperature_period_ns, others),
-        Command.GET_BUS_VOLTAGE_CURRENT: (drive.bus_voltage_period_ns, others),
-        Command.GET_POWERS: (drive.powers_period_ns, others),
-    }
     messages = []
-    for command, (every_ns, samples) in (cyclic | more).items():
-        if every_ns:
-            can_id = identifier(node, command)
-            mean = fmean(frame_bits(Frame(can_id, data)) for data in samples)
-            messages.append(Message(can_id, len(samples[0]), every_ns, mean))
+    for robot in robots:
+        mounting = robot.mounting
+        cyclic_messages = protocol(robot.drive.protocol).cyclic_messages
+        for node, sign in (
+            (robot.right_node, mounting.right_sign),
+            (robot.left_node, mounting.left_sign),
+        ):
+            gear = sign * mounting.gear_ratio
+            for can_id, every_ns, payloads in cyclic_messages(robot.drive, node, period_ns, gear):
+                mean = fmean(frame_bits(Frame(can_id, data)) for data in payloads)
+                messages.append(Message(can_id, len(payloads[0]), every_ns, mean))
     return messages
 
 

@@ -23,7 +23,7 @@ from heapq import heappop, heappush
 from random import Random
 
 from bridge.can_bus.packet import Key, Submitted, Transmitted
-from bridge.drives import DriveNode
+from bridge.drives.interface import DriveNode
 from bridge.frame import Frame
 from bridge.telemetry import FROM_DRIVE, Tap
 from bridge.wire.confinement import NodeState

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridge.drives import DRIVES
+from bridge.drives import protocol
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import Command, identifier
 from bridge.frame import Frame
@@ -20,7 +20,7 @@ def driven(*overrides: str) -> tuple[tuple[float, ...], tuple[float, ...], Emula
     """What the host reads, what is recorded, and the robot, after 0.1 s of torque."""
     scenario = load("two_robots", overrides)
     robot = emulated_robot(plant_brief(scenario, network=NETWORK).robots[0])
-    client = DRIVES["odrive"].client(agent_brief(scenario, "r1", network=NETWORK, bus=()).drives)
+    client = protocol("odrive").client(agent_brief(scenario, "r1", network=NETWORK, bus=()).drives)
     for frame in (*client.torque(0.2, 0.1), *CLOSE):
         robot.hear(frame, 0)
     for k in range(50):

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from bridge.drives.feeling import Feeling
+from bridge.drives.interface import DriveMeasurements
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisState, Command
-from bridge.drives.odrive.local_axis import OdriveNode
+from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import Frame
 from configs.brief import DriveModel
 
@@ -26,7 +26,7 @@ MODEL = DriveModel(
     zero_torque_on_disarm=False,
     serial_number=0xABCDEF,
 )
-HEALTHY = Feeling(
+HEALTHY = DriveMeasurements(
     torque_shaft_N_m=0.0, current_A=0.0, fet_C=30.0, motor_C=float("nan"), bus_V=24.0, bus_A=0.0
 )
 

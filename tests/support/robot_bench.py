@@ -5,7 +5,7 @@ from dataclasses import replace
 from agents.agent import Agent
 from agents.guard import Phase
 from bridge.drives.odrive.frames import AxisState, Command, identifier
-from bridge.drives.odrive.local_axis import OdriveNode
+from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import Frame
 from bridge.network.messages import PathState, PoseFix
 from bridge.telemetry import AGENT_ROW, RowBuffer

@@ -8,42 +8,42 @@ from collections.abc import Callable, Mapping
 
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import Command
-from bridge.drives.odrive.machine import Axis
+from bridge.drives.odrive.local_axis import LocalAxis
 from bridge.drives.odrive.parameters import FLOAT32_MAX, acceptable
 
-Setter = Callable[[Axis, bytes, int], bool]
-"""Axis, data, bus time; False if the data were ignored."""
+Setter = Callable[[LocalAxis, bytes, int], bool]
+"""LocalAxis, data, bus time; False if the data were ignored."""
 
 
-def _axis_state(axis: Axis, data: bytes, now_ns: int) -> bool:
+def _axis_state(axis: LocalAxis, data: bytes, now_ns: int) -> bool:
     (asked,) = f.ONE_U32.unpack(f.padded(data, 4))
     axis.request(asked, now_ns)
     return True
 
 
-def _controller_mode(axis: Axis, data: bytes, _: int) -> bool:
+def _controller_mode(axis: LocalAxis, data: bytes, _: int) -> bool:
     axis.set_modes(*f.TWO_U32.unpack(f.padded(data, 8)))
     return True
 
 
-def _input_pos(axis: Axis, data: bytes, now_ns: int) -> bool:
+def _input_pos(axis: LocalAxis, data: bytes, now_ns: int) -> bool:
     position, velocity, torque = f.INPUT_POS.unpack(f.padded(data, 8))
     axis.set_position(position, velocity * 1e-3, torque * 1e-3, now_ns)
     return True
 
 
-def _input_vel(axis: Axis, data: bytes, now_ns: int) -> bool:
+def _input_vel(axis: LocalAxis, data: bytes, now_ns: int) -> bool:
     velocity, torque = f.decode_floats(data)
     axis.set_velocity(velocity, torque, now_ns)
     return True
 
 
-def _input_torque(axis: Axis, data: bytes, now_ns: int) -> bool:
+def _input_torque(axis: LocalAxis, data: bytes, now_ns: int) -> bool:
     axis.set_torque(f.decode_float(data), now_ns)
     return True
 
 
-def _limits(axis: Axis, data: bytes, _: int) -> bool:
+def _limits(axis: LocalAxis, data: bytes, _: int) -> bool:
     """An infinite limit is none: hosts say so."""
     velocity, current = f.decode_floats(data)
     if not (velocity >= 0.0 and current >= 0.0):
@@ -54,24 +54,24 @@ def _limits(axis: Axis, data: bytes, _: int) -> bool:
     return True
 
 
-def _absolute_position(axis: Axis, data: bytes, _: int) -> bool:
+def _absolute_position(axis: LocalAxis, data: bytes, _: int) -> bool:
     return axis.move_origin(f.decode_float(data))
 
 
-def _clear_errors(axis: Axis, data: bytes, now_ns: int) -> bool:  # noqa: ARG001
+def _clear_errors(axis: LocalAxis, data: bytes, now_ns: int) -> bool:  # noqa: ARG001
     axis.clear_errors()
     return True
 
 
 def _one(name: str) -> Setter:
-    def act(axis: Axis, data: bytes, _: int) -> bool:
+    def act(axis: LocalAxis, data: bytes, _: int) -> bool:
         return axis.parameters.put(name, f.decode_float(data))
 
     return act
 
 
 def _two(first: str, second: str) -> Setter:
-    def act(axis: Axis, data: bytes, _: int) -> bool:
+    def act(axis: LocalAxis, data: bytes, _: int) -> bool:
         a, b = f.decode_floats(data)
         if not (acceptable(a) and acceptable(b)):
             return False

@@ -18,7 +18,7 @@ from bridge.drives.odrive import frames as f
 from bridge.drives.odrive import reports
 from bridge.drives.odrive.frames import AxisState, Command
 from bridge.drives.odrive.functions import FUNCTIONS, Value
-from bridge.drives.odrive.machine import Axis
+from bridge.drives.odrive.local_axis import LocalAxis
 from bridge.drives.odrive.parameters import FLOAT32_MAX
 
 ANSWERS_WRITES = (0, 6, 11)
@@ -27,9 +27,9 @@ _READ, _WRITE = 0, 1
 _MS_NS = 1_000_000
 _NAMES = {"f": "float", "?": "bool", "B": "uint8", "I": "uint32"}
 _Json = dict[str, object]
-Read = Callable[[Axis], float]
-Write = Callable[[Axis, float, int], bool]
-"""Axis, value, bus time; False if it isn't taken."""
+Read = Callable[[LocalAxis], float]
+Write = Callable[[LocalAxis, float, int], bool]
+"""LocalAxis, value, bus time; False if it isn't taken."""
 
 
 class Endpoint(NamedTuple):
@@ -43,10 +43,10 @@ class Endpoint(NamedTuple):
 
 
 def _parameter(path: str, name: str) -> tuple[str, str, Read, Write]:
-    def read(axis: Axis) -> float:
+    def read(axis: LocalAxis) -> float:
         return float(getattr(axis.parameters, name))
 
-    def write(axis: Axis, value: float, _: int) -> bool:
+    def write(axis: LocalAxis, value: float, _: int) -> bool:
         taken = axis.parameters.put(name, value)
         axis.apply()
         return taken
@@ -54,7 +54,7 @@ def _parameter(path: str, name: str) -> tuple[str, str, Read, Write]:
     return path, "f", read, write
 
 
-def _integrator_limit(axis: Axis, value: float, _: int) -> bool:
+def _integrator_limit(axis: LocalAxis, value: float, _: int) -> bool:
     """An infinite limit is none, as drives are delivered."""
     if not value >= 0.0:
         return False
@@ -63,22 +63,22 @@ def _integrator_limit(axis: Axis, value: float, _: int) -> bool:
 
 
 def _period(name: str, command: Command) -> tuple[str, str, Read, Write]:
-    def read(axis: Axis) -> float:
+    def read(axis: LocalAxis) -> float:
         return axis.parameters.period_ns[command] // _MS_NS
 
-    def write(axis: Axis, value: float, _: int) -> bool:
+    def write(axis: LocalAxis, value: float, _: int) -> bool:
         axis.parameters.period_ns[command] = int(value) * _MS_NS
         return True
 
     return f"axis0.config.can.{name}_msg_rate_ms", "I", read, write
 
 
-def _state(axis: Axis, value: float, now_ns: int) -> bool:
+def _state(axis: LocalAxis, value: float, now_ns: int) -> bool:
     axis.request(int(value), now_ns)
     return True
 
 
-def _enable_watchdog(axis: Axis, value: float, now_ns: int) -> bool:
+def _enable_watchdog(axis: LocalAxis, value: float, now_ns: int) -> bool:
     """It counts from now on."""
     if value and not axis.parameters.watchdog_enabled:
         axis.fed_ns = now_ns
@@ -88,7 +88,7 @@ def _enable_watchdog(axis: Axis, value: float, now_ns: int) -> bool:
 
 
 def _modes(which: str) -> Write:
-    def write(axis: Axis, value: float, _: int) -> bool:
+    def write(axis: LocalAxis, value: float, _: int) -> bool:
         p = axis.parameters
         chosen = {"control_mode": p.control_mode, "input_mode": p.input_mode, which: int(value)}
         axis.set_modes(**chosen)
@@ -97,8 +97,8 @@ def _modes(which: str) -> Write:
     return write
 
 
-def _input(write: Callable[[Axis, float], None]) -> Write:
-    def checked(axis: Axis, value: float, _: int) -> bool:
+def _input(write: Callable[[LocalAxis, float], None]) -> Write:
+    def checked(axis: LocalAxis, value: float, _: int) -> bool:
         if not -FLOAT32_MAX <= value <= FLOAT32_MAX:
             return False
         write(axis, value)
@@ -107,15 +107,15 @@ def _input(write: Callable[[Axis, float], None]) -> Write:
     return checked
 
 
-def _input_torque(axis: Axis, value: float) -> None:
+def _input_torque(axis: LocalAxis, value: float) -> None:
     axis.input_torque_shaft = value
 
 
-def _input_velocity(axis: Axis, value: float) -> None:
+def _input_velocity(axis: LocalAxis, value: float) -> None:
     axis.controller.input_velocity = value
 
 
-def _input_position(axis: Axis, value: float) -> None:
+def _input_position(axis: LocalAxis, value: float) -> None:
     axis.controller.move_to(value)
 
 
@@ -188,7 +188,7 @@ ENDPOINTS: Mapping[int, Endpoint] = {n: Endpoint(n, *row) for n, row in enumerat
 """Values by number; new ones go to the end, so that numbers stay."""
 
 
-def answer(axis: Axis, data: bytes, now_ns: int) -> bytes | None:
+def answer(axis: LocalAxis, data: bytes, now_ns: int) -> bytes | None:
     """What TxSdo says to an RxSdo with a number; None if nothing."""
     opcode, number, _ = f.SDO.unpack_from(data)
     endpoint = ENDPOINTS.get(number)
@@ -243,7 +243,7 @@ def _described(value: Value | None) -> list[_Json]:
     return [] if value is None else [{"name": value.name, "type": _NAMES[value.code]}]
 
 
-def _packed(endpoint: Endpoint, axis: Axis) -> bytes:
+def _packed(endpoint: Endpoint, axis: LocalAxis) -> bytes:
     value = endpoint.read(axis)
     if endpoint.code == "f":
         return reports.floats(value, 0.0)[:4]

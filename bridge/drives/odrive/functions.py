@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from bridge.drives.odrive.frames import SDO, RebootAction
 
 if TYPE_CHECKING:
-    from bridge.drives.odrive.local_axis import OdriveNode
+    from bridge.drives.odrive.node import OdriveNode
 
 FIRST = 1024
 """Numbers of functions begin here, so that values may be added before them."""

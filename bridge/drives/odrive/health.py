@@ -15,7 +15,7 @@ thermistor.cpp, motor.cpp, controller.cpp; names of the errors are 0.6's.
 
 from math import exp, pi
 
-from bridge.drives.feeling import Feeling
+from bridge.drives.interface import DriveMeasurements
 from bridge.drives.odrive.frames import AxisError
 from configs.brief import DriveModel
 
@@ -31,29 +31,29 @@ def derating(celsius: float, model: DriveModel) -> float:
     return 1.0 if celsius <= model.derate_from_C else (model.derate_to_C - celsius) / span
 
 
-def current_limit(feeling: Feeling, limit_A: float, model: DriveModel) -> float:
+def current_limit(measurements: DriveMeasurements, limit_A: float, model: DriveModel) -> float:
     """The current limit in force [A]."""
-    factor = derating(feeling.fet_C, model)
-    if feeling.motor_C == feeling.motor_C:
-        factor = min(factor, derating(feeling.motor_C, model))
+    factor = derating(measurements.fet_C, model)
+    if measurements.motor_C == measurements.motor_C:
+        factor = min(factor, derating(measurements.motor_C, model))
     return limit_A * factor
 
 
-def conditions(feeling: Feeling, limit_in_force_A: float, model: DriveModel) -> int:
+def conditions(measurements: DriveMeasurements, limit_in_force_A: float, model: DriveModel) -> int:
     """What must disarm the drive now, as bits of `AxisError`."""
     hottest_C = model.derate_to_C + TRIP_K
     bits = 0
-    if feeling.fet_C != feeling.fet_C:
+    if measurements.fet_C != measurements.fet_C:
         bits |= AxisError.THERMISTOR_DISCONNECTED.value
-    elif feeling.fet_C >= hottest_C:
+    elif measurements.fet_C >= hottest_C:
         bits |= AxisError.INVERTER_OVER_TEMP.value
-    if feeling.motor_C >= hottest_C:
+    if measurements.motor_C >= hottest_C:
         bits |= AxisError.MOTOR_OVER_TEMP.value
-    if not feeling.bus_V >= model.under_voltage_V:
+    if not measurements.bus_V >= model.under_voltage_V:
         bits |= AxisError.DC_BUS_UNDER_VOLTAGE.value
-    elif feeling.bus_V > model.over_voltage_V:
+    elif measurements.bus_V > model.over_voltage_V:
         bits |= AxisError.DC_BUS_OVER_VOLTAGE.value
-    if not abs(feeling.current_A) <= limit_in_force_A + model.current_margin_A:
+    if not abs(measurements.current_A) <= limit_in_force_A + model.current_margin_A:
         bits |= AxisError.CURRENT_LIMIT_VIOLATION.value
     return bits
 
@@ -71,11 +71,11 @@ class SpinoutDetector:
         """Forget the past: what arming does."""
         self._electrical_W = self._mechanical_W = 0.0
 
-    def detects(self, feeling: Feeling, velocity_rev_s: float, dt_s: float) -> bool:
+    def detects(self, measurements: DriveMeasurements, velocity_rev_s: float, dt_s: float) -> bool:
         """Take what was measured over `dt_s`."""
         keep = exp(-_POWER_BANDWIDTH_RAD_S * dt_s)
-        mechanical = feeling.torque_shaft_N_m * velocity_rev_s * 2.0 * pi
-        electrical = feeling.bus_V * feeling.bus_A
+        mechanical = measurements.torque_shaft_N_m * velocity_rev_s * 2.0 * pi
+        electrical = measurements.bus_V * measurements.bus_A
         self._mechanical_W = mechanical + keep * (self._mechanical_W - mechanical)
         self._electrical_W = electrical + keep * (self._electrical_W - electrical)
         if not self._threshold_W > 0.0:

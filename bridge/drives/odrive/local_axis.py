@@ -1,288 +1,304 @@
-"""The emulated ODrive on its bus: an axis (`axis`) with CANSimple around it, firmware 0.6.
+"""The axis behind the messages: its states, why it disarms, and the torque that it asks for.
 
-    message         what it does                                          where
-    Get_...         answered to a remote or empty frame, and cyclic       `reports`
-    Set_..., Clear  acts; a remote frame is ignored                       `commands`
-    Estop           acts, whatever the frame                              `axis`
-    RxSdo           reads or writes an endpoint, TxSdo answers            `endpoints`
-                    calls a function                                      `functions`
-    Address         asked: says node id and serial number
-                    our serial number or 0: takes the node id
-                    our node id, somebody else's number: goes to 0x3F
-    Reboot 0, 1, 2  only in IDLE: silent for a while, then powered up with the saved parameters;
-                    1 saves the present ones first, 2 the vendor's
-    Reboot 3, DFU   only in IDLE: gone from the bus for good
+    state         on                                          to            result
+    IDLE          CLOSED_LOOP asked                           CLOSED_LOOP   SUCCESS
+    IDLE          the same, errors active or modes unknown    IDLE          DISARMED
+    IDLE          the same, motor or encoder not calibrated   IDLE          NOT_CALIBRATED
+    IDLE          calibration asked (3, 4, 6, 7)              calibrating   BUSY
+    calibrating   its time is over                            IDLE          SUCCESS
+    calibrating   IDLE asked                                  IDLE          CANCELLED
+    any           HOMING asked                                IDLE          HOMING_WITHOUT_ENDSTOP
+    any           a procedure asked that isn't emulated       IDLE          INVALID_STATE
+    CLOSED_LOOP   IDLE asked                                  IDLE          SUCCESS
+    not IDLE      e-stop, watchdog, overspeed, bad input,     IDLE          DISARMED
+                  or what `health` finds
 
-A drive at 0x3F is unaddressed: it sends nothing cyclic, hears nothing but Address, and answers that
-after a random delay, as all its like do with the same identifier. Address is heard at 0x3F by all.
-Frames of other nodes, 29-bit and error frames, unknown commands and the drive's own messages are
-ignored; none of these, no request and no endpoint feeds the watchdog.
+Errors stay until cleared, and what caused them raises them again. Only CLOSED_LOOP makes torque;
+calibration takes its time and turns nothing. Asking for CLOSED_LOOP in CLOSED_LOOP and asking for
+state 0 change nothing.
 
-A message that is late is sent once; its next is due at the next multiple of its period.
+Kept as the field has it: without a watchdog the last torque acts for ever; inputs sent while idle
+are stored and act on arming (position inputs don't: arming begins where the axis is), unless
+`zero_torque_on_disarm`. The watchdog is fed by set-points and by arming. Firmware 0.6; where its
+documentation is silent, 0.5.6's source.
 """
 
-from collections.abc import Sequence
-from random import Random
+from math import isfinite
 
-from bridge.drives.odrive import endpoints, functions
-from bridge.drives.odrive import frames as f
-from bridge.drives.odrive.calibration import NEVER
-from bridge.drives.odrive.commands import SETTERS
-from bridge.drives.odrive.frames import AxisState, Command, RebootAction
-from bridge.drives.odrive.machine import Axis
+from bridge.drives.interface import DriveMeasurements
+from bridge.drives.odrive import calibration, control, health
+from bridge.drives.odrive.calibration import NEVER, Calibration
+from bridge.drives.odrive.control import Controller
+from bridge.drives.odrive.frames import AxisError, AxisState, ControlMode, InputMode
+from bridge.drives.odrive.frames import ProcedureResult as Result
 from bridge.drives.odrive.parameters import FLOAT32_MAX, Parameters
-from bridge.drives.odrive.reports import REPORTS, address, floats
-from bridge.frame import EFF, ERR, RTR, Frame
 from configs.brief import DriveModel
 
-ANSWER_WITHIN_NS = 20_000_000
-"""An unaddressed drive answers Address after up to this."""
-_NONE: Sequence[Frame] = ()
-_UNPACK_FLOAT = f.ONE_FLOAT.unpack
-_PACK_TWO = f.TWO_FLOATS.pack
-_new = tuple.__new__  # of a frame, past its constructor: this is the hot path
 
-
-class OdriveNode(Axis):
-    """One axis on the bus."""
+class LocalAxis:
+    """One axis. Told the time, never asks for it."""
 
     __slots__ = (
-        "_answers_ns",
-        "_boots_ns",
-        "_cyclic_ns",
-        "_encoder_id",
-        "_next_encoder_ns",
-        "_next_other_ns",
-        "_random",
-        "_saved",
-        "ignored",
-        "setpoint_id",
+        "_conditions",
+        "_lasting",
+        "_offset",
+        "_plain",
+        "_silence_ns",
+        "_spinout",
+        "_torque_limit",
+        "_unmeasured_s",
+        "calibration",
+        "controller",
+        "demand",
+        "disarm_reason",
+        "errors",
+        "fed_ns",
+        "input_torque_shaft",
+        "measurements",
+        "model",
+        "parameters",
+        "position",
+        "result",
+        "serial",
+        "state",
+        "velocity",
     )
 
-    _next_encoder_ns: int
-    _next_other_ns: int
+    def __init__(self, model: DriveModel, serial: int) -> None:
+        self.model = model
+        self.serial = serial
+        self._lasting = AxisError(0)  # what nothing clears
 
-    def __init__(self, model: DriveModel, node_id: int, serial_number: int) -> None:
-        super().__init__(model, serial_number)
-        self._random = Random(serial_number)
-        self._saved = Parameters.of(model, node_id)
-        self.ignored = 0
-        self._boot(0)
+    def power_up(self, parameters: Parameters) -> None:
+        """Idle, without errors, with these parameters."""
+        self.parameters = parameters
+        self.controller = Controller(parameters)
+        self.state = AxisState.IDLE
+        self.errors, self.disarm_reason = self._lasting, AxisError(0)
+        self.result = Result.SUCCESS
+        self.input_torque_shaft = self.demand = 0.0
+        self.position = self.velocity = self._offset = 0.0
+        self.measurements: DriveMeasurements | None = None
+        self.fed_ns = 0
+        self._conditions = 0
+        self._unmeasured_s = 0.0
+        self._spinout = health.SpinoutDetector(self.model.spinout_power_W)
+        self.calibration = Calibration(self.model.calibration_ns)
+        self.apply()
 
-    def _boot(self, now_ns: int) -> None:
-        """Power up; everything cyclic is due at once."""
-        self.power_up(self._saved.copy())
-        self._boots_ns = self._answers_ns = NEVER
-        self._cyclic_ns = dict.fromkeys(self.parameters.period_ns, now_ns)
-        self._plan()
-
-    @property
-    def node_id(self) -> int:
-        """The address on the bus."""
-        return self.parameters.node_id
-
-    # --- the hot path ----------------------------------------------------------------------------
-
-    def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
-        """Take one frame from the bus; return the replies."""
-        can_id, data = frame
-        if can_id == self.setpoint_id and len(data) == 4:
-            if now_ns - self.fed_ns > self._silence_ns:
-                self.supervise(now_ns)
-            (torque,) = _UNPACK_FLOAT(data)
-            if -FLOAT32_MAX <= torque <= FLOAT32_MAX:
-                self.fed_ns = now_ns
-                self.input_torque_shaft = torque
-            else:
-                self.set_torque(torque, now_ns)
-            return _NONE
-        if can_id & (EFF | ERR) or now_ns < self._boots_ns != NEVER:
-            return _NONE
-        if self._boots_ns != NEVER:
-            self._boot(now_ns)
-        return self._hear(frame, now_ns)
-
-    def due(self, now_ns: int) -> Sequence[Frame]:
-        """Frames due until this instant; the watchdog is looked at first."""
-        if not self._plain or now_ns - self.fed_ns > self._silence_ns:
-            self.supervise(now_ns)
-        encoder = now_ns >= self._next_encoder_ns
-        if now_ns < self._next_other_ns:
-            if not encoder:
-                return _NONE
-            period_ns = self.parameters.period_ns[Command.GET_ENCODER_ESTIMATES]
-            self._next_encoder_ns = (now_ns // period_ns + 1) * period_ns
-            return (self._encoder_estimates(),)
-        return self._due(now_ns)
-
-    @property
-    def next_due_ns(self) -> int:
-        """The earliest bus time at which `due` has something to do."""
-        next_ns = min(self._next_encoder_ns, self._next_other_ns)
-        return min(next_ns, self.fed_ns + self._silence_ns + 1)
-
-    def feedback(self, now_ns: int) -> Frame:
-        """The encoder frame out of its turn; the next cyclic one comes a period later."""
-        period_ns = self.parameters.period_ns[Command.GET_ENCODER_ESTIMATES]
-        if period_ns:
-            self._next_encoder_ns = now_ns + 2 * period_ns
-        return self._encoder_estimates()
-
-    def _encoder_estimates(self) -> Frame:
-        try:
-            data = _PACK_TWO(self.position, self.velocity)
-        except OverflowError:  # a robot that diverges
-            data = floats(self.position, self.velocity)
-        return _new(Frame, (self._encoder_id, data))
-
-    # --- what is due -----------------------------------------------------------------------------
-
-    def _due(self, now_ns: int) -> Sequence[Frame]:
-        """Everything but an encoder frame alone."""
-        if now_ns >= self._boots_ns:
-            self._boot(now_ns)
-        self.supervise(now_ns)
-        frames = []
-        if now_ns >= self._answers_ns:
-            self._answers_ns = NEVER
-            frames.append(self._frame(Command.ADDRESS, address(self)))
-        self._cyclic_ns[Command.GET_ENCODER_ESTIMATES] = self._next_encoder_ns
-        if self._speaks:
-            for command, period_ns in self.parameters.period_ns.items():
-                if period_ns and now_ns >= self._cyclic_ns[command]:
-                    self._cyclic_ns[command] = (now_ns // period_ns + 1) * period_ns
-                    frames.append(self._frame(command, REPORTS[command](self)))
-        self._plan()
-        return frames
-
-    @property
-    def _speaks(self) -> bool:
-        return self._boots_ns == NEVER and self.parameters.node_id != f.UNADDRESSED
-
-    def _plan(self) -> None:
-        """Note what the present address and periods mean for the hot path."""
-        node, next_ns, encoder_ns = self.parameters.node_id, NEVER, NEVER
-        if self._speaks:
-            for command, period_ns in self.parameters.period_ns.items():
-                if not period_ns:
-                    continue
-                if command is Command.GET_ENCODER_ESTIMATES:
-                    encoder_ns = self._cyclic_ns[command]
-                else:
-                    next_ns = min(next_ns, self._cyclic_ns[command])
-        self._encoder_id = f.identifier(node, Command.GET_ENCODER_ESTIMATES)
-        self.setpoint_id = f.identifier(node, Command.SET_INPUT_TORQUE) if self._speaks else -1
-        self._next_encoder_ns = encoder_ns
-        self._next_other_ns = min(
-            next_ns, self._boots_ns, self._answers_ns, self.calibration.ends_ns
+    def apply(self) -> None:
+        """Let changed parameters act."""
+        p = self.parameters
+        armed = self.state is AxisState.CLOSED_LOOP_CONTROL
+        limiters = self.model.torque_limiters
+        watched = armed and p.watchdog_enabled
+        self._silence_ns = min(round(p.watchdog_s * 1e9), NEVER) if watched else NEVER
+        self._plain = (
+            not limiters
+            and p.control_mode == ControlMode.TORQUE
+            and p.input_mode == InputMode.PASSTHROUGH
         )
+        limit_A = p.current_limit
+        if self.measurements is not None:
+            limit_A = health.current_limit(self.measurements, limit_A, self.model)
+        self._torque_limit = limit_A * self.model.torque_constant_N_m_A if limiters else None
+        if armed and not control.exists(p.control_mode, p.input_mode):
+            self.disarm(AxisError.BAD_CONFIG)
 
-    # --- what it hears ---------------------------------------------------------------------------
+    # --- the plant's end -------------------------------------------------------------------------
 
-    def _hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
-        can_id, data = frame
-        node, command = (can_id & 0x7FF) >> f.BITS, can_id & 0x1F
-        ours = self.parameters.node_id
-        if command == Command.ADDRESS and node in (ours, f.UNADDRESSED):
-            return self._on_address(frame, now_ns)
-        if node != ours or ours == f.UNADDRESSED:
-            return _NONE
-        self.supervise(now_ns)
-        report = REPORTS.get(command)
-        if report is not None:
-            if f.is_request(frame):
-                return (self._frame(command, report(self)),)
-            self.ignored += 1  # somebody imitates a drive
-            return _NONE
-        if command == Command.ESTOP:
-            self.estop()
-        elif can_id & RTR:
-            self.ignored += 1
-        elif command == Command.RX_SDO:
-            return self._on_sdo(data, now_ns)
-        elif command in (Command.REBOOT, Command.ENTER_DFU_MODE):
-            self._on_reboot(command, data, now_ns)
+    def feed(self, revolutions: float, rev_s: float) -> None:
+        """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
+        self.position = revolutions + self._offset
+        self.velocity = rev_s
+
+    def lose_estimate(self) -> None:
+        """The encoder's estimate is gone for good: disarm with that error, which nothing clears."""
+        self._lasting = AxisError.MISSING_ESTIMATE
+        self.disarm(self._lasting)
+
+    def take_measurements(self, measurements: DriveMeasurements) -> None:
+        """Take what the drive measures; derate, and disarm if that says so."""
+        self.measurements = measurements
+        model = self.model
+        limit_A = health.current_limit(measurements, self.parameters.current_limit, model)
+        if self._torque_limit is not None:
+            self._torque_limit = limit_A * model.torque_constant_N_m_A
+        armed = self.state is AxisState.CLOSED_LOOP_CONTROL
+        if armed and self._spinout.detects(measurements, self.velocity, self._unmeasured_s):
+            self.disarm(AxisError.SPINOUT_DETECTED)
+        self._unmeasured_s = 0.0
+        found = health.conditions(measurements, limit_A, model)
+        raised = found & ~self._conditions
+        self._conditions = found
+        if raised:
+            self.disarm(AxisError(raised))
+
+    def torque_demand_shaft(self, dt_s: float = 0.0) -> float:
+        """Torque asked of the motor for the next `dt_s` [N·m]; always finite, 0 unless armed."""
+        if self.state is not AxisState.CLOSED_LOOP_CONTROL:
+            return 0.0
+        if self._plain:
+            return self.input_torque_shaft
+        self._check_motion()
+        if self.state is not AxisState.CLOSED_LOOP_CONTROL:
+            return 0.0
+        self._unmeasured_s += dt_s
+        motion = self.position, self.velocity
+        torque = self.controller.step(dt_s, self.input_torque_shaft, motion, self._torque_limit)
+        if not -FLOAT32_MAX <= torque <= FLOAT32_MAX:
+            self.disarm(AxisError.BAD_CONFIG)
+            return 0.0
+        self.demand = torque
+        return torque
+
+    @property
+    def effective_torque_shaft(self) -> float:
+        """The torque that it asks for now, without going on [N·m]."""
+        if self._plain and self.state is AxisState.CLOSED_LOOP_CONTROL:
+            return self.input_torque_shaft
+        return self.demand
+
+    # --- supervision -----------------------------------------------------------------------------
+
+    def supervise(self, now_ns: int) -> None:
+        """Look at the watchdog, the procedure that runs, and the motion."""
+        if now_ns - self.fed_ns > self._silence_ns:
+            self.disarm(AxisError.WATCHDOG_TIMER_EXPIRED)
+        while now_ns >= self.calibration.ends_ns:
+            self.calibration.end(self.parameters)
+            self.state = self.calibration.state
+            if self.state is AxisState.IDLE:
+                self.result = Result.SUCCESS
+        if self.state is AxisState.CLOSED_LOOP_CONTROL and not self._plain:
+            self._check_motion()
+
+    def disarm(self, error: AxisError) -> None:
+        """Raise an error; stop whatever runs."""
+        self.errors |= error
+        if self.state is not AxisState.IDLE:
+            self.disarm_reason = error
+            self.result = Result.DISARMED
+            self._to_idle()
+
+    def estop(self) -> None:
+        """Stop; whether arming then needs Clear_Errors is a setting."""
+        if self.model.estop_blocks_arming:
+            self.errors |= AxisError.ESTOP_REQUESTED
+        self.disarm_reason |= AxisError.ESTOP_REQUESTED
+        if self.state is not AxisState.IDLE:
+            self.result = Result.DISARMED
+            self._to_idle()
+
+    def clear_errors(self) -> None:
+        """Forget errors but those whose cause is still measured."""
+        self.errors = AxisError(self._conditions) | self._lasting
+        self.disarm_reason = AxisError(0)
+
+    def _check_motion(self) -> None:
+        model = self.model
+        fastest = model.overspeed_ratio * self.parameters.velocity_limit
+        if not isfinite(self.position + self.velocity):
+            self.disarm(AxisError.MISSING_ESTIMATE)
+        elif model.torque_limiters and abs(self.velocity) > fastest:
+            self.disarm(AxisError.VELOCITY_LIMIT_VIOLATION)
+
+    # --- what it is told -------------------------------------------------------------------------
+
+    def set_torque(self, torque: float, now_ns: int) -> None:
+        """Take a torque input [N·m]. NaN disarms, and so does ∞ where nothing limits it."""
+        if torque != torque or not (self.model.torque_limiters or isfinite(torque)):
+            self.input_torque_shaft = 0.0
+            self.disarm(AxisError.BAD_CONFIG)
+            return
+        self.fed_ns = now_ns
+        self.input_torque_shaft = min(max(torque, -FLOAT32_MAX), FLOAT32_MAX)
+
+    def set_velocity(self, velocity: float, torque: float, now_ns: int) -> None:
+        """Take a velocity input [rev/s] and its feed-forward, the torque input from now on."""
+        if velocity != velocity:
+            torque = velocity
         else:
-            setter = SETTERS.get(command)
-            if setter is None or not setter(self, data, now_ns):
-                self.ignored += 1
-        self._replan()
-        return _NONE
+            self.controller.input_velocity = min(max(velocity, -FLOAT32_MAX), FLOAT32_MAX)
+        self.set_torque(torque, now_ns)
 
-    def _frame(self, command: int, data: bytes) -> Frame:
-        return _new(Frame, (self.parameters.node_id << f.BITS | command, data))
+    def set_position(self, position: float, velocity: float, torque: float, now_ns: int) -> None:
+        """Take a position input [rev] and feed-forwards, the other inputs from now on."""
+        if position != position:
+            torque = position
+        else:
+            self.controller.move_to(min(max(position, -FLOAT32_MAX), FLOAT32_MAX))
+        self.set_velocity(velocity, torque, now_ns)
 
-    def _replan(self) -> None:
-        self._cyclic_ns[Command.GET_ENCODER_ESTIMATES] = self._next_encoder_ns
-        self._plan()
+    def set_modes(self, control_mode: int, input_mode: int) -> None:
+        """Choose control and input mode. Those that don't exist disarm: now, or on arming."""
+        p = self.parameters
+        if (control_mode, input_mode) != (p.control_mode, p.input_mode):
+            p.control_mode, p.input_mode = control_mode, input_mode
+            self.controller.reset(self.position)
+            self.apply()
 
-    def _on_sdo(self, data: bytes, now_ns: int) -> Sequence[Frame]:
-        before = dict(self.parameters.period_ns)
-        said = self._answer(data, now_ns)
-        self._cyclic_ns[Command.GET_ENCODER_ESTIMATES] = self._next_encoder_ns
-        for command, period_ns in self.parameters.period_ns.items():
-            if period_ns and period_ns != before[command]:
-                self._cyclic_ns[command] = (now_ns // period_ns + 1) * period_ns
-        self._plan()
-        if said is None:
-            self.ignored += len(data) < f.SDO.size
-            return _NONE
-        return (self._frame(Command.TX_SDO, said),)
-
-    def _answer(self, data: bytes, now_ns: int) -> bytes | None:
-        """What TxSdo says to an RxSdo; None if nothing."""
-        if len(data) < f.SDO.size:
-            return None
-        if f.SDO.unpack_from(data)[1] in functions.FUNCTIONS:
-            confirms = self.model.firmware_version >= endpoints.ANSWERS_WRITES
-            return functions.answer(self, data, now_ns, confirms=confirms)
-        return endpoints.answer(self, data, now_ns)
-
-    def _on_reboot(self, command: int, data: bytes, now_ns: int) -> None:
-        action = f.padded(data, 1)[0] if command == Command.REBOOT else RebootAction.ENTER_DFU_MODE
-        self.ignored += not self.restart(action, now_ns)
-
-    def restart(self, action: int, now_ns: int) -> bool:
-        """What a `RebootAction` does; False if it does nothing, as while the axis isn't idle."""
-        if self.state is not AxisState.IDLE or action > RebootAction.ENTER_DFU_MODE:
+    def move_origin(self, position: float) -> bool:
+        """Call the present position `position` [rev]; False if that is no number."""
+        if not isfinite(position) or not isfinite(self.position):
             return False
-        match action:
-            case RebootAction.SAVE_CONFIGURATION:
-                self._saved = self.parameters.copy()
-            case RebootAction.ERASE_CONFIGURATION:
-                self._saved = Parameters.of(self.model, self._saved.node_id)
-        silent = action == RebootAction.ENTER_DFU_MODE
-        self._boots_ns = 2 * NEVER if silent else now_ns + self.model.boot_ns
-        self._answers_ns = NEVER
-        if self._boots_ns <= now_ns:
-            self._boot(now_ns)
+        self._offset += position - self.position
+        self.position = position
         return True
 
-    def _on_address(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
-        data = frame.data
-        if f.is_request(frame):
-            if self._speaks:
-                return (self._frame(Command.ADDRESS, address(self)),)
-            if self._answers_ns == NEVER:
-                self._answers_ns = now_ns + self._random.randint(1, ANSWER_WITHIN_NS)
-                self._replan()
-            return _NONE
-        if len(data) < 7:
-            self.ignored += 1
-            return _NONE
-        node, serial = data[0], int.from_bytes(data[1:7], "little")
-        if node <= f.UNADDRESSED and serial in (0, self.serial):
-            self._readdress(node, now_ns)
-        elif node == self.parameters.node_id:
-            self._readdress(f.UNADDRESSED, now_ns)
-        return _NONE
-
-    def _readdress(self, node: int, now_ns: int) -> None:
-        if node == self.parameters.node_id:
+    def request(self, asked: int, now_ns: int) -> None:
+        """Change the state, if that can be."""
+        if asked == AxisState.UNDEFINED:
             return
-        self.parameters.node_id = node
-        self._answers_ns = NEVER
-        for command, period_ns in self.parameters.period_ns.items():
-            if period_ns:
-                self._cyclic_ns[command] = (now_ns // period_ns + 1) * period_ns
-        self._plan()
+        if asked == AxisState.CLOSED_LOOP_CONTROL == self.state:
+            return
+        calibrating = self.calibration.runs
+        self._to_idle()
+        match asked:
+            case AxisState.IDLE:
+                self.result = Result.CANCELLED if calibrating else Result.SUCCESS
+            case AxisState.STARTUP_SEQUENCE:
+                self.result = Result.SUCCESS
+            case AxisState.HOMING:
+                self.result = Result.HOMING_WITHOUT_ENDSTOP
+            case AxisState.CLOSED_LOOP_CONTROL:
+                self._arm(now_ns)
+            case _ if calibration.exists(asked):
+                self._calibrate(asked, now_ns)
+            case _:
+                self.result = Result.INVALID_STATE
+
+    def _arm(self, now_ns: int) -> None:
+        p = self.parameters
+        if not control.exists(p.control_mode, p.input_mode):
+            self.errors |= AxisError.BAD_CONFIG
+        if self.errors:
+            self.result = Result.DISARMED
+        elif not (p.motor_calibrated and p.encoder_calibrated):
+            self.result = Result.NOT_CALIBRATED
+        else:
+            self.result = Result.SUCCESS
+            self.disarm_reason = AxisError(0)
+            self.state = AxisState.CLOSED_LOOP_CONTROL
+            self.fed_ns = now_ns
+            self._unmeasured_s = 0.0
+            self._spinout.reset()
+            self.controller.reset(self.position)
+            self.apply()
+
+    def _calibrate(self, asked: int, now_ns: int) -> None:
+        if self.errors:
+            self.result = Result.DISARMED
+        elif not self.calibration.begin(asked, self.parameters, now_ns):
+            self.result = Result.NOT_CALIBRATED
+        else:
+            self.result = Result.BUSY
+            self.state = self.calibration.state
+
+    def _to_idle(self) -> None:
+        self.state = AxisState.IDLE
+        self.demand = 0.0
+        self._silence_ns = NEVER
+        self.calibration.cancel()
+        if self.model.zero_torque_on_disarm:
+            self.input_torque_shaft = self.controller.input_velocity = 0.0

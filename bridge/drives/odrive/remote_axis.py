@@ -1,312 +1,165 @@
-"""The controller's end of the two ODrive axes of a robot, as on hardware.
+"""What a host knows of one ODrive axis, from its frames alone.
 
-    step       one a call of `arm`
-    CLEAR      both: Set_Axis_State IDLE, Clear_Errors, Set_Input_Torque 0
-    SET        both: Set_Limits, Set_Controller_Mode torque / passthrough, Set_Input_Torque 0
-    CLOSE      both: Set_Axis_State CLOSED_LOOP, again every `RETRY_NS`; then torque 0 every call
-    armed      both heartbeats said CLOSED_LOOP without errors after that
+    angle, speed    of the wheel, from the newest encoder frame whose numbers are finite
+    trouble         why its wheel must not be driven: errors, an e-stop seen on its way to it, two
+                    senders of its telemetry
+    heard_ns        bus time of its newest heartbeat, stamp_ns of its newest encoder frame
 
-It begins once both drives are there, and anew when one isn't any more, or when a passing error came
-up at CLOSE (`bridge.drives.odrive.axis.PASSING`). Torque 0 goes out before every arm: a drive keeps
-the last torque it was sent, and it acts on arming. `disarm` begins anew: nothing leads from a fault
-back to torque but these steps. A drive that drops out, falls silent, is stopped by somebody, or
-whose identifiers two senders use, is a `fault` of the robot: the other wheel must not go on alone.
-
-Positive torque drives forward on both wheels. Revolutions of the shaft become radians of the wheel
-here, and torques at the wheel torques at the shaft, nowhere else.
+Answers to somebody else's requests are told from a second sender by counting the requests.
 """
 
-from collections.abc import Callable, Sequence
-from enum import Enum, auto
-from functools import partial
+from math import pi
 
 from bridge.drives.odrive import frames as f
-from bridge.drives.odrive.axis import NEVER, Axis
-from bridge.drives.odrive.frames import AxisState, Command, ControlMode, InputMode
-from bridge.frame import RTR, Frame
+from bridge.drives.odrive.cadence import LIMIT, Cadence
+from bridge.drives.odrive.frames import AxisError, AxisState, Command, ProcedureResult
+from bridge.frame import Frame
 from configs.brief import DriveLink
 
-RETRY_NS = 200_000_000
-REPEAT_NS = 50_000_000
-"""How often a drive that should be idle, and says that it isn't, is told again."""
-FLOAT32_MAX = 3.4e38
-_FOREIGN = (
-    Command.SET_AXIS_STATE,
-    Command.SET_CONTROLLER_MODE,
-    Command.SET_INPUT_POS,
-    Command.SET_INPUT_VEL,
-    Command.SET_INPUT_TORQUE,
-    Command.SET_LIMITS,
-)
-_PACK_TWO = f.TWO_FLOATS.pack
-_new = tuple.__new__  # of a frame, past its constructor: this is the hot path
-_UNPACK_TWO = f.TWO_FLOATS.unpack
-
-Motion = tuple[float, float, float, float]
-"""(right, left) wheel angle [rad], then (right, left) wheel speed [rad/s]."""
-_Hearer = Callable[[bytes | bytearray, int], None]
+NEVER = -(1 << 62)
+PASSING = AxisError.WATCHDOG_TIMER_EXPIRED | AxisError.INITIALIZING
+"""Errors that say no more than that drive and host had lost each other: a host may clear them by
+itself. All others, an e-stop above all, are a person's to clear."""
 
 
-class _Step(Enum):
-    CLEAR = auto()
-    SET = auto()
-    CLOSE = auto()
+class RemoteAxis:
+    """One drive and the wheel that it turns."""
 
+    __slots__ = (
+        "_doubled",
+        "_encoder_cadence",
+        "_heartbeat_cadence",
+        "_heartbeats",
+        "angle_wheel_rad",
+        "closed_loop",
+        "commanded",
+        "encoder_frames",
+        "errors",
+        "heard_ns",
+        "name",
+        "node",
+        "result",
+        "speed_wheel_rad_s",
+        "stamp_ns",
+        "state",
+        "to_shaft",
+        "to_wheel",
+        "trouble",
+        "wheel_rad_per_shaft_rev",
+    )
 
-class OdriveClient:
-    """Drives the right and the left wheel of one robot."""
+    def __init__(self, name: str, node: int, sign: int, link: DriveLink) -> None:
+        ratio = link.mounting.gear_ratio
+        self.name = f"{name} drive (node {node})"
+        self.node = node
+        self.wheel_rad_per_shaft_rev = 2.0 * pi * sign / ratio
+        """Wheel angle per shaft revolution."""
+        self.to_shaft = sign / ratio
+        self.to_wheel = sign * ratio
+        """Torque at the wheel per torque at the shaft."""
+        self.angle_wheel_rad = self.speed_wheel_rad_s = 0.0
+        self.stamp_ns = NEVER
+        self.heard_ns: int | None = None
+        self.state = int(AxisState.UNDEFINED)
+        self.result = 0
+        self.closed_loop = False
+        self.errors = AxisError(0)
+        self.trouble = ""
+        self.commanded = 0
+        """Set-points and modes that somebody else sent to it."""
+        self.encoder_frames = 0
+        """Less those that somebody asked for."""
+        self._heartbeats = 0
+        self._doubled = ""
+        self._encoder_cadence = Cadence(link.encoder_period_ns)
+        self._heartbeat_cadence = Cadence(link.heartbeat_period_ns)
 
-    def __init__(self, link: DriveLink) -> None:
-        self._link = link
-        self._right = Axis("right", link.right_node, link.mounting.right_sign, link)
-        self._left = Axis("left", link.left_node, link.mounting.left_sign, link)
-        self._axes = (self._right, self._left)
-        self._encoders = self._by_id(Command.GET_ENCODER_ESTIMATES)
-        self._others = self._hearers()
-        self._encoder_limit_ns = link.encoder_age_limit_ns
-        self._heartbeat_limit_ns = link.heartbeat_age_limit_ns
-        self._torque_ids = tuple(self._by_id(Command.SET_INPUT_TORQUE))
-        self._to_shaft = (self._right.to_shaft, self._left.to_shaft)
-        self._to_wheel = (self._right.to_wheel, self._left.to_wheel)
-        self._step = _Step.CLEAR
-        self._asked_ns: int | None = None
-        self._closing_ns: int | None = None
-        self._idled_ns = NEVER
-        self._well_until_ns = NEVER
-        """Both drives are in closed loop without trouble; their heartbeats count until then."""
-        self.armed = False
-        self.sent = (0.0, 0.0)
-        """(right, left) torque last sent, at the wheels [N·m], as float32 carries it."""
+    def frame(self, command: Command, data: bytes) -> Frame:
+        """A frame for this drive."""
+        return Frame(f.identifier(self.node, command), data)
 
-    def hear(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
-        """Take any frame from the bus."""
-        axis = self._encoders.get(can_id)
-        if axis is None:
-            hearer = self._others.get(can_id)
-            if hearer is not None:
-                hearer(data, now_ns)
-        elif len(data) == 8:
-            angle, speed = _UNPACK_TWO(data)
-            total = angle + speed
-            if total - total == 0.0:  # both are finite
-                axis.angle_wheel_rad = angle * axis.wheel_rad_per_shaft_rev
-                axis.speed_wheel_rad_s = speed * axis.wheel_rad_per_shaft_rev
-                axis.stamp_ns = now_ns
-                axis.encoder_frames += 1
-        elif not data:
-            axis.hear_request(Command.GET_ENCODER_ESTIMATES)
+    # --- what is heard ---------------------------------------------------------------------------
 
-    def heard_since(self, bus_ns: int) -> bool:
-        """Whether both wheels' encoder frames came after this bus time."""
-        return self._right.stamp_ns > bus_ns and self._left.stamp_ns > bus_ns
+    def hear_heartbeat(self, data: bytes | bytearray, now_ns: int) -> bool:
+        """Take a heartbeat; False if it is a request for one, or none at all."""
+        if len(data) != f.HEARTBEAT.size:
+            self._heartbeats -= not data
+            return False
+        heartbeat = f.decode_heartbeat(data)
+        self._heartbeats += 1
+        self.heard_ns = now_ns
+        self.errors = heartbeat.errors
+        self.state, self.result = heartbeat.state, heartbeat.result
+        self.closed_loop = heartbeat.state == AxisState.CLOSED_LOOP_CONTROL
+        self._look_for_a_second_sender(now_ns)
+        self._note_trouble()
+        return True
 
-    def motion(self) -> Motion | None:
-        """The newest wheel angles and speeds, None before both wheels were heard."""
-        right, left = self._right, self._left
-        if right.stamp_ns == NEVER or left.stamp_ns == NEVER:
-            return None
-        return (
-            right.angle_wheel_rad,
-            left.angle_wheel_rad,
-            right.speed_wheel_rad_s,
-            left.speed_wheel_rad_s,
-        )
+    def hear_request(self, command: Command) -> None:
+        """Somebody asked for a frame out of its turn: it is no sign of a second sender."""
+        if command is Command.HEARTBEAT:
+            self._heartbeats -= 1
+        else:
+            self.encoder_frames -= 1
 
-    # --- arming ----------------------------------------------------------------------------------
+    def hear_estop(self) -> None:
+        """Somebody stopped it: known before its next heartbeat says so."""
+        self.errors |= AxisError.ESTOP_REQUESTED
+        self.closed_loop = False
+        self._note_trouble()
 
-    def arm(self, now_ns: int) -> Sequence[Frame]:
-        """What to send next on the way to `armed`; call once per period."""
-        zero = self.torque(0.0, 0.0)
-        if any(axis.absence(now_ns, self._link) for axis in self._axes):
-            self._begin_anew()  # a drive that isn't there misses its steps
-            return zero
-        match self._step:
-            case _Step.CLEAR:
-                self._step = _Step.SET
-                return [
-                    frame
-                    for axis, nothing in zip(self._axes, zero, strict=True)
-                    for frame in (
-                        axis.frame(Command.SET_AXIS_STATE, f.ONE_U32.pack(AxisState.IDLE)),
-                        axis.frame(Command.CLEAR_ERRORS, b"\0"),
-                        nothing,
-                    )
-                ]
-            case _Step.SET:
-                self._step = _Step.CLOSE
-                limits = f.TWO_FLOATS.pack(
-                    self._link.velocity_limit_shaft_rev_s, self._link.current_limit_A
-                )
-                mode = f.TWO_U32.pack(ControlMode.TORQUE, InputMode.PASSTHROUGH)
-                return [
-                    frame
-                    for axis, nothing in zip(self._axes, zero, strict=True)
-                    for frame in (
-                        axis.frame(Command.SET_LIMITS, limits),
-                        axis.frame(Command.SET_CONTROLLER_MODE, mode),
-                        nothing,
-                    )
-                ]
-            case _Step.CLOSE:
-                if self._asked_ns is not None and now_ns - self._asked_ns < RETRY_NS:
-                    return zero
-                if self._asked_ns is None:
-                    self._closing_ns = now_ns
-                elif any(axis.errors for axis in self._axes) and self.refusal() is None:
-                    self._begin_anew()
-                    return zero
-                self._asked_ns = now_ns
-                state = f.ONE_U32.pack(AxisState.CLOSED_LOOP_CONTROL)
-                return [
-                    *zero,
-                    *(axis.frame(Command.SET_AXIS_STATE, state) for axis in self._axes),
-                ]
+    def _look_for_a_second_sender(self, now_ns: int) -> None:
+        encoder = self._encoder_cadence.judge(self.encoder_frames, now_ns)
+        heartbeat = self._heartbeat_cadence.judge(self._heartbeats, now_ns)
+        if encoder is None and heartbeat is None:
+            return
+        doubled = [
+            f"{ratio:.1f} times the {what} of one sender"
+            for what, ratio in (("encoder frames", encoder), ("heartbeats", heartbeat))
+            if ratio is not None and ratio > LIMIT
+        ]
+        self._doubled = " and ".join(doubled)
 
-    def missing(self, now_ns: int) -> str:
-        """What of each drive keeps the robot from being armed, "" if nothing does."""
-        reasons = []
-        for axis in self._axes:
-            reason = axis.absence(now_ns, self._link)
-            if not reason and axis.trouble:
-                reason = f"{axis.name}{axis.trouble}"
-            if not reason and not self.armed and not axis.closed_loop:
-                reason = axis.why_not_closed()
-            reasons.append(reason)
-        return "; ".join(filter(None, reasons))
-
-    def obstacle(self, now_ns: int) -> str | None:
-        """Why arming must not even be tried now, None if it may.
-
-        Drives that are silent, and errors that are a person's to clear, are obstacles; what a host
-        may clear by itself is `bridge.drives.odrive.axis.PASSING`.
-        """
-        for axis in self._axes:
-            if reason := axis.absence(now_ns, self._link) or axis.obstacle():
-                return reason
-        return None
-
-    def refusal(self) -> str | None:
-        """What a person has to mend before the drives may be armed again, None if nothing."""
-        return next(filter(None, (axis.obstacle() for axis in self._axes)), None)
-
-    def fault(self, now_ns: int) -> str | None:
-        """Why the wheels can't be driven now, None if they can."""
-        if now_ns <= self._well_until_ns:
-            since_ns = now_ns - self._encoder_limit_ns
-            if self._right.stamp_ns >= since_ns and self._left.stamp_ns >= since_ns:
-                return None
-        for axis in self._axes:
-            if axis.trouble:
-                return f"{axis.name}{axis.trouble}"
-            heard_ns = axis.heard_ns
-            if (
-                heard_ns is None
-                or now_ns - heard_ns > self._heartbeat_limit_ns
-                or now_ns - axis.stamp_ns > self._encoder_limit_ns
-            ):
-                return axis.absence(now_ns, self._link)
-            if self.armed and not axis.closed_loop:
-                return f"{axis.name} dropped out: left closed loop without an error"
-        return None
-
-    @property
-    def notices(self) -> tuple[str, ...]:
-        """What somebody else did to the drives: for the report."""
-        return tuple(
-            f"{axis.name}: {axis.commanded} commands of somebody else"
-            for axis in self._axes
-            if axis.commanded
-        )
-
-    # --- torque ----------------------------------------------------------------------------------
-
-    def torque(self, right_wheel_N_m: float, left_wheel_N_m: float) -> tuple[Frame, Frame]:
-        """Set-points for both wheels [N·m]; beyond float32 they saturate."""
-        to_right, to_left = self._to_shaft
-        try:
-            both = _PACK_TWO(right_wheel_N_m * to_right, left_wheel_N_m * to_left)
-        except OverflowError:
-            both = _PACK_TWO(
-                _saturated(right_wheel_N_m * to_right), _saturated(left_wheel_N_m * to_left)
+    def _note_trouble(self) -> None:
+        if self.errors:
+            self.trouble = f" dropped out: {f.error_names(self.errors)}"
+        elif self._doubled:
+            self.trouble = (
+                f": {self._doubled}: a second drive with its node id, or a drive that is configured"
+                " to send faster"
             )
-        right, left = _UNPACK_TWO(both)
-        of_right, of_left = self._to_wheel
-        self.sent = (right * of_right, left * of_left)
-        right_id, left_id = self._torque_ids
-        return _new(Frame, (right_id, both[:4])), _new(Frame, (left_id, both[4:]))
+        else:
+            self.trouble = ""
 
-    def disarm(self) -> Sequence[Frame]:
-        """Torque 0 and idle for both wheels; the way to `armed` begins anew."""
-        self.armed = False
-        self._begin_anew()
-        self._idled_ns = NEVER
-        return [*self.torque(0.0, 0.0), *self._idle(self._axes)]
+    # --- what follows ----------------------------------------------------------------------------
 
-    def rest(self, now_ns: int) -> Sequence[Frame]:
-        """Torque 0 for both wheels, and idle once more for a drive that isn't; once per period."""
-        zero = self.torque(0.0, 0.0)
-        awake = [axis for axis in self._axes if axis.closed_loop]
-        if not awake or now_ns - self._idled_ns < REPEAT_NS:
-            return zero
-        self._idled_ns = now_ns
-        return [*zero, *self._idle(awake)]
+    def ready_since(self, since_ns: int) -> bool:
+        """Whether it said after `since_ns` that it is in closed loop, and nothing is wrong."""
+        heard_ns = self.heard_ns
+        return (
+            heard_ns is not None and heard_ns > since_ns and self.closed_loop and not self.trouble
+        )
 
-    def estop(self) -> Sequence[Frame]:
-        """Emergency stop for both wheels, latched until their errors are cleared."""
-        self.armed = False
-        return [axis.frame(Command.ESTOP, b"") for axis in self._axes]
+    def absence(self, now_ns: int, link: DriveLink) -> str:
+        """Why it isn't there, "" if it is."""
+        if self.heard_ns is None:
+            return f"{self.name}: no heartbeat heard yet"
+        if now_ns - self.heard_ns > link.heartbeat_age_limit_ns:
+            return f"{self.name}: no heartbeat for {(now_ns - self.heard_ns) * 1e-9:.1f} s"
+        if self.stamp_ns == NEVER:
+            return f"{self.name}: no encoder frame heard yet"
+        if now_ns - self.stamp_ns > link.encoder_age_limit_ns:
+            return f"{self.name}: no encoder frames any more"
+        return ""
 
-    def _begin_anew(self) -> None:
-        self._step = _Step.CLEAR
-        self._asked_ns = self._closing_ns = None
+    def obstacle(self) -> str:
+        """What a person has to mend before it may be armed, "" if there is nothing."""
+        if self.trouble and not (self.errors and not self.errors & ~PASSING):
+            return f"{self.name}{self.trouble}"
+        return ""
 
-    def _idle(self, axes: Sequence[Axis]) -> list[Frame]:
-        state = f.ONE_U32.pack(AxisState.IDLE)
-        return [axis.frame(Command.SET_AXIS_STATE, state) for axis in axes]
-
-    # --- who hears what --------------------------------------------------------------------------
-
-    def _by_id(self, command: Command) -> dict[int, Axis]:
-        return {f.identifier(axis.node, command): axis for axis in self._axes}
-
-    def _hearers(self) -> dict[int, _Hearer]:
-        """What isn't an encoder frame: heartbeats, requests of others, commands of others."""
-        hearers: dict[int, _Hearer] = {}
-        for axis in self._axes:
-            hearers[f.identifier(axis.node, Command.HEARTBEAT)] = partial(self._hear_beat, axis)
-            for asked in (Command.HEARTBEAT, Command.GET_ENCODER_ESTIMATES):
-                hearers[f.identifier(axis.node, asked) | RTR] = partial(_hear_request, axis, asked)
-            for command in _FOREIGN:
-                hearers[f.identifier(axis.node, command)] = partial(_hear_command, axis)
-            for flag in (0, RTR):
-                hearers[f.identifier(axis.node, Command.ESTOP) | flag] = partial(
-                    self._hear_estop, axis
-                )
-        return hearers
-
-    def _hear_beat(self, axis: Axis, data: bytes | bytearray, now_ns: int) -> None:
-        since_ns = self._closing_ns
-        if axis.hear_heartbeat(data, now_ns) and since_ns is not None and not self.armed:
-            self.armed = self._right.ready_since(since_ns) and self._left.ready_since(since_ns)
-        self._note_well()
-
-    def _hear_estop(self, axis: Axis, _data: bytes | bytearray, _now_ns: int) -> None:
-        axis.hear_estop()
-        self._note_well()
-
-    def _note_well(self) -> None:
-        well = all(axis.closed_loop and not axis.trouble for axis in self._axes)
-        heard_ns = min(axis.heard_ns or NEVER for axis in self._axes)
-        self._well_until_ns = heard_ns + self._heartbeat_limit_ns if well else NEVER
-
-
-def _hear_request(axis: Axis, asked: Command, _data: bytes | bytearray, _now_ns: int) -> None:
-    axis.hear_request(asked)
-
-
-def _hear_command(axis: Axis, _data: bytes | bytearray, _now_ns: int) -> None:
-    axis.commanded += 1
-
-
-def _saturated(torque: float) -> float:
-    return min(max(torque, -FLOAT32_MAX), FLOAT32_MAX)
+    def why_not_closed(self) -> str:
+        """What it said of itself instead of closed loop."""
+        state = f.name_of(AxisState, self.state)
+        result = f.name_of(ProcedureResult, self.result)
+        return f"{self.name}: no closed loop reported yet; it is {state}, last result {result}"

@@ -9,7 +9,7 @@ from math import pi
 
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import Command
-from bridge.drives.odrive.machine import Axis
+from bridge.drives.odrive.local_axis import LocalAxis
 from bridge.drives.odrive.parameters import FLOAT32_MAX
 
 PROTOCOL_VERSION = 2
@@ -28,85 +28,93 @@ def floats(first: float, second: float) -> bytes:
         return _pack(_single(first), _single(second))
 
 
-def version(axis: Axis) -> bytes:
+def version(axis: LocalAxis) -> bytes:
     """Get_Version; a released firmware."""
     return f.VERSION.pack(PROTOCOL_VERSION, *HARDWARE, *axis.model.firmware_version, 0)
 
 
-def heartbeat(axis: Axis) -> bytes:
+def heartbeat(axis: LocalAxis) -> bytes:
     """Heartbeat: errors that are active or disarmed it last."""
     done = axis.controller.trajectory_done
     return f.HEARTBEAT.pack(axis.errors | axis.disarm_reason, axis.state, axis.result, done, 0)
 
 
-def error(axis: Axis) -> bytes:
+def error(axis: LocalAxis) -> bytes:
     """Get_Error."""
     return f.TWO_U32.pack(axis.errors, axis.disarm_reason)
 
 
-def address(axis: Axis) -> bytes:
+def address(axis: LocalAxis) -> bytes:
     """Address: node id and serial number, connection 0."""
     return bytes((axis.parameters.node_id, *axis.serial.to_bytes(6, "little"), 0))
 
 
-def encoder_estimates(axis: Axis) -> bytes:
+def encoder_estimates(axis: LocalAxis) -> bytes:
     """Get_Encoder_Estimates."""
     return floats(axis.position, axis.velocity)
 
 
-def iq(axis: Axis) -> bytes:
+def iq(axis: LocalAxis) -> bytes:
     """Get_Iq: set-point and measurement."""
     return floats(iq_setpoint(axis), iq_measured(axis))
 
 
-def temperature(axis: Axis) -> bytes:
+def temperature(axis: LocalAxis) -> bytes:
     """Get_Temperature: FETs and motor."""
-    feeling = axis.feeling
-    if feeling is None:
+    measurements = axis.measurements
+    if measurements is None:
         return floats(AMBIENT_C, AMBIENT_C)
-    return floats(feeling.fet_C, feeling.motor_C)
+    return floats(measurements.fet_C, measurements.motor_C)
 
 
-def bus(axis: Axis) -> bytes:
+def bus(axis: LocalAxis) -> bytes:
     """Get_Bus_Voltage_Current."""
     return floats(bus_voltage(axis), bus_current(axis))
 
 
-def torques(axis: Axis) -> bytes:
+def torques(axis: LocalAxis) -> bytes:
     """Get_Torques: target after limits, and estimate."""
     return floats(axis.effective_torque_shaft, _torque_estimate(axis))
 
 
-def powers(axis: Axis) -> bytes:
+def powers(axis: LocalAxis) -> bytes:
     """Get_Powers: electrical and mechanical."""
     return floats(bus_voltage(axis) * bus_current(axis), _mechanical_power(axis))
 
 
-def iq_setpoint(axis: Axis) -> float:
+def iq_setpoint(axis: LocalAxis) -> float:
     """Current asked for [A]."""
     return axis.effective_torque_shaft / axis.model.torque_constant_N_m_A
 
 
-def iq_measured(axis: Axis) -> float:
+def iq_measured(axis: LocalAxis) -> float:
     """Current measured [A]."""
-    return iq_setpoint(axis) if axis.feeling is None else axis.feeling.current_A
+    return iq_setpoint(axis) if axis.measurements is None else axis.measurements.current_A
 
 
-def bus_voltage(axis: Axis) -> float:
+def bus_voltage(axis: LocalAxis) -> float:
     """Voltage of the supply [V]."""
-    return NOMINAL_V if axis.feeling is None else axis.feeling.bus_V
+    return NOMINAL_V if axis.measurements is None else axis.measurements.bus_V
 
 
-def bus_current(axis: Axis) -> float:
+def bus_current(axis: LocalAxis) -> float:
     """Current from the supply [A]; negative while braking feeds it."""
-    return _mechanical_power(axis) / NOMINAL_V if axis.feeling is None else axis.feeling.bus_A
+    return (
+        _mechanical_power(axis) / NOMINAL_V
+        if axis.measurements is None
+        else axis.measurements.bus_A
+    )
 
 
-def _torque_estimate(axis: Axis) -> float:
-    return axis.effective_torque_shaft if axis.feeling is None else axis.feeling.torque_shaft_N_m
+def _torque_estimate(axis: LocalAxis) -> float:
+    return (
+        axis.effective_torque_shaft
+        if axis.measurements is None
+        else axis.measurements.torque_shaft_N_m
+    )
 
 
-def _mechanical_power(axis: Axis) -> float:
+def _mechanical_power(axis: LocalAxis) -> float:
     return _torque_estimate(axis) * axis.velocity * 2.0 * pi
 
 
@@ -114,7 +122,7 @@ def _single(value: float) -> float:
     return min(max(value, -FLOAT32_MAX), FLOAT32_MAX)
 
 
-REPORTS: Mapping[int, Callable[[Axis], bytes]] = {
+REPORTS: Mapping[int, Callable[[LocalAxis], bytes]] = {
     Command.GET_VERSION: version,
     Command.HEARTBEAT: heartbeat,
     Command.GET_ERROR: error,

@@ -10,7 +10,7 @@ from support.odrive_axis import MS, arm, asked, axis, beat, floats, modes, tell,
 
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisError, AxisState, Command, ControlMode, InputMode
-from bridge.drives.odrive.local_axis import OdriveNode
+from bridge.drives.odrive.node import OdriveNode
 from bridge.drives.odrive.trapezoid import plan
 
 UNWATCHED = {"watchdog_ns": 0}

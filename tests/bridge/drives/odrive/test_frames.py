@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.drives.odrive import frames as f
+from bridge.drives.odrive.client import OdriveClient
 from bridge.drives.odrive.frames import AxisError, Command
-from bridge.drives.odrive.local_axis import OdriveNode
-from bridge.drives.odrive.remote_axis import OdriveClient
+from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import RTR, Frame
 from configs.brief import DriveLink, DriveModel
 from configs.sections import Mounting

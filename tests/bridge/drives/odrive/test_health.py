@@ -18,13 +18,13 @@ from support.odrive_axis import (
 )
 
 from bridge.drives.odrive.frames import AxisError, AxisState, Command, ControlMode, ProcedureResult
-from bridge.drives.odrive.local_axis import OdriveNode
+from bridge.drives.odrive.node import OdriveNode
 
 
 def driven(**changes) -> OdriveNode:
     node = arm(axis(watchdog_ns=0, **changes))
     torque(node, 5.0)
-    node.feel(HEALTHY)
+    node.take_measurements(HEALTHY)
     return node
 
 
@@ -34,16 +34,16 @@ def driven(**changes) -> OdriveNode:
 @pytest.mark.parametrize("which", ["fet_C", "motor_C"])
 def test_the_current_limit_falls_linearly_with_temperature(which, celsius, factor) -> None:
     node = driven()
-    node.feel(HEALTHY._replace(**{which: celsius}))
+    node.take_measurements(HEALTHY._replace(**{which: celsius}))
     assert node.torque_demand_shaft(0.001) == pytest.approx(0.5 * factor)
     assert node.state is AxisState.CLOSED_LOOP_CONTROL
-    node.feel(HEALTHY)
+    node.take_measurements(HEALTHY)
     assert node.torque_demand_shaft(0.001) == pytest.approx(0.5)
 
 
 def test_limits_set_while_hot_are_derated() -> None:
     node = driven()
-    node.feel(HEALTHY._replace(fet_C=110.0))
+    node.take_measurements(HEALTHY._replace(fet_C=110.0))
     floats(node, Command.SET_LIMITS, 10.0, 4.0)
     assert node.torque_demand_shaft(0.001) == pytest.approx(4.0 * 0.5 * 0.05)
 
@@ -64,13 +64,13 @@ def test_limits_set_while_hot_are_derated() -> None:
 )
 def test_what_leaves_its_range_disarms_and_keeps_from_arming_while_it_lasts(changes, error) -> None:
     node = driven()
-    node.feel(HEALTHY._replace(**changes))
+    node.take_measurements(HEALTHY._replace(**changes))
     assert node.torque_demand_shaft(0.001) == 0.0
     assert beat(node)[:3] == (error, AxisState.IDLE, ProcedureResult.DISARMED)
     tell(node, Command.CLEAR_ERRORS)
     ask_state(node, AxisState.CLOSED_LOOP_CONTROL)
     assert beat(node)[:2] == (error, AxisState.IDLE)
-    node.feel(HEALTHY)
+    node.take_measurements(HEALTHY)
     assert beat(node).errors == error  # latched
     tell(node, Command.CLEAR_ERRORS)
     arm(node)
@@ -81,14 +81,14 @@ def test_what_leaves_its_range_disarms_and_keeps_from_arming_while_it_lasts(chan
 )
 def test_what_is_just_within_its_range_does_not_disarm(changes) -> None:
     node = driven()
-    node.feel(HEALTHY._replace(**changes))
+    node.take_measurements(HEALTHY._replace(**changes))
     assert node.state is AxisState.CLOSED_LOOP_CONTROL
 
 
 def test_measurements_are_told_on_the_bus() -> None:
     node = driven()
     node.feed(0.0, 2.0)
-    node.feel(
+    node.take_measurements(
         HEALTHY._replace(torque_shaft_N_m=0.4, current_A=8.0, bus_V=23.5, bus_A=2.0, motor_C=41.0)
     )
     node.torque_demand_shaft(0.001)
@@ -111,7 +111,9 @@ def felt_for(node: OdriveNode, seconds: float, velocity: float, watts: float) ->
     for k in range(round(seconds * 1000)):
         node.feed(velocity * k * 0.001, velocity)
         node.torque_demand_shaft(0.001)
-        node.feel(HEALTHY._replace(torque_shaft_N_m=0.5, current_A=10.0, bus_A=watts / 24.0))
+        node.take_measurements(
+            HEALTHY._replace(torque_shaft_N_m=0.5, current_A=10.0, bus_A=watts / 24.0)
+        )
 
 
 def test_an_encoder_whose_sign_flips_is_found_by_spinout_detection() -> None:

@@ -21,7 +21,7 @@ from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.endpoints import ENDPOINTS, flat_endpoints
 from bridge.drives.odrive.frames import AxisError, AxisState, Command, ProcedureResult
 from bridge.drives.odrive.functions import FUNCTIONS
-from bridge.drives.odrive.local_axis import ANSWER_WITHIN_NS, OdriveNode
+from bridge.drives.odrive.node import ANSWER_WITHIN_NS, OdriveNode
 from bridge.frame import RTR, Frame
 
 SECOND = 1000 * MS

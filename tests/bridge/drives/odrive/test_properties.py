@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.odrive_axis import MODEL, MS, NODE, arm, axis, torque
 
-from bridge.drives.feeling import Feeling
+from bridge.drives.interface import DriveMeasurements
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisState, Command
-from bridge.drives.odrive.local_axis import OdriveNode
+from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import RTR, Frame
 
 SET_POINTS = {Command.SET_INPUT_TORQUE, Command.SET_INPUT_VEL, Command.SET_INPUT_POS}
@@ -32,8 +32,8 @@ heard = st.builds(Frame, ours | ours | ours.map(lambda i: i | RTR) | anyone, dat
 arming = st.just(Frame(f.identifier(NODE, Command.SET_AXIS_STATE), pack("<I", 8)))
 clearing = st.just(Frame(f.identifier(NODE, Command.CLEAR_ERRORS), b"\0"))
 fed = st.tuples(values | st.floats(), values | st.floats())
-felt = st.builds(Feeling, *[values | st.floats(-200.0, 200.0)] * 6)
-healthy = st.just(Feeling(0.0, 0.0, 30.0, nan, 24.0, 0.0))
+felt = st.builds(DriveMeasurements, *[values | st.floats(-200.0, 200.0)] * 6)
+healthy = st.just(DriveMeasurements(0.0, 0.0, 30.0, nan, 24.0, 0.0))
 waits = st.integers(0, 300 * MS)
 happenings = st.lists(heard | arming | clearing | fed | felt | healthy | waits, max_size=40)
 variants = st.fixed_dictionaries(
@@ -71,8 +71,8 @@ def test_nothing_raises_or_yields_a_torque_that_is_not_finite_or_not_armed(chang
     for happening in all_:
         sent: list[Frame] = []
         match happening:
-            case Feeling():
-                node.feel(happening)
+            case DriveMeasurements():
+                node.take_measurements(happening)
             case Frame():
                 sent += node.hear(happening, now_ns)
             case int():

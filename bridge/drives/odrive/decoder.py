@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from enum import IntEnum
 from typing import NamedTuple
 
+from bridge.drives.interface import NodeSeen
 from bridge.drives.odrive import frames as odrive
 from bridge.drives.odrive.frames import Command
 from bridge.frame import EFF, ERR, RTR, Frame
@@ -184,3 +185,16 @@ def _meaning(kind: type[IntEnum], raw: int) -> str:
         return kind(raw).name
     except ValueError:
         return str(raw)
+
+
+def node_seen(frame: Frame) -> NodeSeen | None:
+    """The node that a frame concerns, with its state if it is a heartbeat; None: no CANSimple."""
+    can_id, data = frame
+    if can_id & (EFF | ERR) or (can_id & (1 << odrive.BITS) - 1) not in LAYOUTS:
+        return None
+    node, command = (can_id & 0x7FF) >> odrive.BITS, can_id & (1 << odrive.BITS) - 1
+    if command != Command.HEARTBEAT or can_id & RTR or not data:
+        return NodeSeen(node)
+    heartbeat = odrive.decode_heartbeat(data)
+    state = _meaning(odrive.AxisState, heartbeat.state)
+    return NodeSeen(node, state, odrive.error_names(heartbeat.errors))

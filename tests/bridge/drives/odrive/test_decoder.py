@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge.drives.odrive.decoder import decode, words
 from bridge.drives.odrive.frames import Command
 from bridge.frame import EFF, ERR, RTR, Frame
-from fleetloop.can.cansimple import decode, words
 
 DBC = cantools.database.load_string(
     resources.files("odrive_can").joinpath("dbc/odrive-cansimple-0.6.10.dbc").read_text(), "dbc"

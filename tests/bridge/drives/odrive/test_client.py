@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.drives.odrive import frames as f
+from bridge.drives.odrive.client import OdriveClient
 from bridge.drives.odrive.frames import AxisError, AxisState, Command, identifier
-from bridge.drives.odrive.local_axis import OdriveNode
-from bridge.drives.odrive.remote_axis import OdriveClient
+from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import EFF, ERR, RTR, Frame
 from configs.brief import DriveLink, DriveModel, NetworkLink
 from configs.loading import load

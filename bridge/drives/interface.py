@@ -1,0 +1,184 @@
+"""What all drive protocols share: both ends of a protocol, measurements, and a row of `DRIVES`.
+
+A client is at the wheels: it converts to and from the shaft by the mounting of its robot. A node is
+at the motor's shaft. Both are pure: frames in, frames out, told the time.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+from bridge.frame import Frame
+from configs.brief import DriveLink, DriveModel
+from configs.drives import NoOptions
+from configs.parameters import Parameters
+
+Motion = tuple[float, float, float, float]
+"""(right, left) wheel angle [rad], then (right, left) wheel speed [rad/s]."""
+
+
+class DriveMeasurements(NamedTuple):
+    """A drive's measurements of its motor and of the supply."""
+
+    torque_shaft_N_m: float  # the motor's, estimated
+    current_A: float  # q axis
+    fet_C: float
+    motor_C: float  # NaN: no thermistor
+    bus_V: float
+    bus_A: float
+
+
+class DriveClient(Protocol):
+    """The controller's end of the two drives of a robot."""
+
+    armed: bool
+    sent: tuple[float, float]
+    """(right, left) torque last sent, at the wheels [N·m], as the bus carries it."""
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Commands of others to the drives, in words: for the report."""
+
+    def hear(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
+        """Take any frame from the bus."""
+
+    def heard_since(self, bus_ns: int) -> bool:
+        """Whether both wheels' encoder frames came after this bus time."""
+
+    def motion(self) -> Motion | None:
+        """The newest wheel angles and speeds, None before both wheels were heard."""
+
+    def arm(self, now_ns: int) -> Sequence[Frame]:
+        """What to send next on the way to `armed`; call once per period."""
+
+    def missing(self, now_ns: int) -> str:
+        """What of each drive keeps the robot from being armed, "" if nothing does."""
+
+    def obstacle(self, now_ns: int) -> str | None:
+        """Why arming must not even be tried now, None if it may."""
+
+    def refusal(self) -> str | None:
+        """What a person has to mend before the drives may be armed again, None if nothing."""
+
+    def fault(self, now_ns: int) -> str | None:
+        """Why the wheels can't be driven now, None if they can."""
+
+    def torque(self, right_wheel_N_m: float, left_wheel_N_m: float) -> Sequence[Frame]:
+        """Set-points for both wheels [N·m]; `sent` then says what the bus carries of them."""
+
+    def rest(self, now_ns: int) -> Sequence[Frame]:
+        """Torque 0 for both wheels, and whatever keeps them disarmed; call once per period."""
+
+    def disarm(self) -> Sequence[Frame]:
+        """Torque 0 and idle for both wheels; the way to `armed` begins anew."""
+
+    def estop(self) -> Sequence[Frame]:
+        """Emergency stop for both wheels."""
+
+
+class DriveNode(Protocol):
+    """The emulated drive of one wheel."""
+
+    fed_ns: int
+    """When it last took a set-point, bus time."""
+    setpoint_id: int
+    """The identifier of the set-point that it takes at its address now; negative: it takes none."""
+
+    def feed(self, revolutions: float, rev_s: float) -> None:
+        """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
+
+    def lose_estimate(self) -> None:
+        """The encoder's estimate is gone for good: disarm with that error, which nothing clears."""
+
+    def due(self, now_ns: int) -> Sequence[Frame]:
+        """Frames due until this instant, the newest of each; the drive supervises itself first."""
+
+    def feedback(self, now_ns: int) -> Frame:
+        """The encoder frame out of its turn; the next cyclic one comes a period later."""
+
+    def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
+        """Take one frame from the bus; return the replies."""
+
+    @property
+    def input_torque_shaft(self) -> float:
+        """Torque of the last set-point at the shaft [N·m], before limits."""
+
+    @property
+    def next_due_ns(self) -> int:
+        """The earliest bus time at which `due` has something to do; after its last call."""
+
+    def take_measurements(self, measurements: DriveMeasurements) -> None:
+        """Take the drive's measurements of its motor and supply."""
+
+    def torque_demand_shaft(self, dt_s: float) -> float:
+        """Torque asked of the motor for the next `dt_s`, at its shaft [N·m]; always finite."""
+
+
+class CyclicMessage(NamedTuple):
+    """A message that is sent every period, for the load of a bus."""
+
+    can_id: int
+    period_ns: int
+    payloads: Sequence[bytes]  # typical ones: stuff bits depend on them
+
+
+class NodeSeen(NamedTuple):
+    """A node of a protocol that sent a frame or was sent one."""
+
+    node: int
+    state: str = ""  # "" unless the frame says it, as errors
+    errors: str = ""
+
+
+class Versions(NamedTuple):
+    """Versions that a drive has."""
+
+    firmware: tuple[int, int, int]
+    hardware: tuple[int, int, int]
+
+
+class VersionQuery(Protocol):
+    """Asks the first drive that is heard for its versions."""
+
+    versions: Versions | None
+    """The answer, None until it came."""
+
+    def hear(self, frame: Frame) -> Frame | None:
+        """Take a frame from the bus; return the request, once."""
+
+    @property
+    def missing(self) -> str:
+        """What has not been heard yet, in words."""
+
+
+class EndpointFile(Protocol):
+    """The vendor's file of a drive's parameters, as its scripts read it."""
+
+    def versions_of(self, firmware: str | None) -> Versions:
+        """The versions of an emulated drive; None: of the firmware that drives have by default.
+
+        Raises:
+            ValueError: no emulated drive has this firmware.
+        """
+
+    def query(self) -> VersionQuery:
+        """A question to a drive on a bus."""
+
+    def contents(self, versions: Versions) -> Mapping[str, object]:
+        """The file of these versions, for JSON."""
+
+
+class DriveProtocol(NamedTuple):
+    """A row of `configs.drives.DRIVES`: everything that belongs to one protocol."""
+
+    client: Callable[[DriveLink], DriveClient]
+    node: Callable[[DriveModel, int, int], DriveNode]  # model, node id, serial number
+    cyclic_messages: Callable[[DriveModel, int, int, float], Sequence[CyclicMessage]]
+    """Of one drive and its set-points: model, node id, control period [ns], and gear: signed shaft
+    revolutions per wheel revolution."""
+    words: Callable[[Frame], str]
+    """A frame in one line for people, "" if it isn't the protocol's."""
+    node_seen: Callable[[Frame], NodeSeen | None]
+    """The node that a frame concerns, None if it isn't the protocol's."""
+    section: type[Parameters] = NoOptions
+    """Keys of `[drive.options]`; both ends find them in `DriveLink.own` and `DriveModel.own`."""
+    endpoints: EndpointFile | None = None

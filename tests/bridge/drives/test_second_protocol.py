@@ -1,0 +1,111 @@
+"""A second drive protocol is a folder and a row: the one of `support.second_drive` runs a robot."""
+
+import pytest
+from support.second_drive.tools import PlainSection
+
+import configs.drives
+from bridge.drives import protocol, protocols
+from bridge.frame import Frame
+from bridge.process import Stop
+from configs.brief import NetworkLink
+from configs.errors import ScenarioError
+from configs.loading import load
+from configs.resolve import agent_brief, leader_brief, plant_brief, robot_briefs
+from configs.signals import PLANT_SIGNALS
+from fleetloop.can.census import Census, Node
+from fleetloop.check.bus_load import bus_messages
+from fleetloop.launch.in_process import InProcessRun
+
+OWN = "support.second_drive:ROW"
+NETWORK = NetworkLink("t", "", "", "")
+
+
+class Rows:
+    """The plant's rows of one robot."""
+
+    def __init__(self) -> None:
+        self.last = b""
+
+    def add(self, robot: str, source: str, _first_tick: int, rows: bytes) -> None:
+        if (robot, source) == ("r1", "plant"):
+            self.last = rows
+
+    def end(self, robot: str, source: str) -> None:
+        pass
+
+    def traffic(self, bus: str, frames: bytes) -> None:
+        pass
+
+
+@pytest.mark.parametrize("timing", ["ideal", "wire"])
+@pytest.mark.parametrize("name", [OWN, "plain"])
+def test_a_scenario_runs_with_a_protocol_of_ones_own(monkeypatch, timing: str, name: str) -> None:
+    monkeypatch.setattr(configs.drives, "DRIVES", {**configs.drives.DRIVES, "plain": OWN})
+    scenario = load(
+        "two_robots_100hz",
+        (
+            f"drive.protocol='{name}'",
+            "drive.options.torque_unit_shaft_N_m=0.0001",
+            "mounting={left_sign=-1, gear_ratio=9.0}",
+            f"bus.timing='{timing}'",
+            "drive.preset='ideal'",
+            "until_s=3.0",
+            "clock.mode='lockstep'",
+        ),
+    )
+    rows = Rows()
+    run = InProcessRun(
+        plant_brief(scenario, network=NETWORK),
+        [agent_brief(scenario, robot, network=NETWORK, bus=()) for robot in scenario.names],
+        leader_brief(scenario),
+        rows,
+        lambda _: None,
+    )
+    run.run(Stop())
+    assert run.stopped_robots == {}
+    memory = memoryview(rows.last).cast("d")
+    names = [signal.name for signal in PLANT_SIGNALS]
+    last = dict(zip(names, memory[-len(names) :], strict=True))
+    assert last["v_m_s"] > 0.1
+    frames = 2 * 100 * 4 * 0.9  # of each bus in two seconds: two encoders, two set-points
+    assert min(run.frames.values()) > frames
+
+
+def test_its_section_is_checked_where_it_stands() -> None:
+    with pytest.raises(
+        ScenarioError, match=r"drive\.options\.torque_unit_shaft_N_m=-1.0: .*greater than 0"
+    ):
+        load("two_robots", (f"drive.protocol='{OWN}'", "drive.options.torque_unit_shaft_N_m=-1.0"))
+    with pytest.raises(ScenarioError, match=r"drive\.options\.unit.*unknown key"):
+        load("two_robots", (f"drive.protocol='{OWN}'", "drive.options.unit=1.0"))
+    with pytest.raises(ScenarioError, match=r"drive\.options\.unit.*unknown key"):
+        load("two_robots", ("drive.options.unit=1.0",))
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("canopen", "known: odrive"),
+        ("nowhere_at_all:ROW", "No module named 'nowhere_at_all'"),
+        ("support.second_drive:NOTHING", "is no bridge.drives.DriveProtocol"),
+    ],
+)
+def test_a_protocol_that_does_not_exist_is_named(name: str, words: str) -> None:
+    with pytest.raises(ScenarioError, match=r"drive\.protocol") as refused:
+        load("two_robots", (f"drive.protocol='{name}'",))
+    assert words in str(refused.value)
+
+
+def test_its_options_load_and_decoder_hang_on_the_row(monkeypatch) -> None:
+    scenario = load("two_robots", (f"drive.protocol='{OWN}'",))
+    robot = robot_briefs(scenario)[0]
+    assert robot.drive.own == PlainSection()
+    messages = bus_messages([robot], 1_000_000)
+    assert sorted(message.can_id for message in messages) == [0x100, 0x101, 0x200, 0x201]
+    monkeypatch.setattr(configs.drives, "DRIVES", {"plain": OWN})
+    monkeypatch.setattr("bridge.drives.DRIVES", configs.drives.DRIVES)
+    assert [row.words(Frame(0x105, bytes(8))) for row in protocols()] == ["plain node 5"]
+    assert protocol("plain") is protocol(OWN)
+    census = Census(1_000_000)
+    census.count(Frame(0x105, bytes(8)), 0)
+    assert census.nodes == [Node(5, "ON", "")]
