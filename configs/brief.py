@@ -20,6 +20,7 @@ from configs.parameters import Parameters
 from configs.powertrain import Encoder, Motor, Supply
 from configs.reach import Reach
 from configs.sections import Body, Bus, Coordination, Disturbance, Drive, Mounting, Pose
+from configs.tls import TlsFiles
 
 Settings = tuple[tuple[str, str | int | float | bool], ...]
 """Keyword arguments as sorted pairs, so that a brief stays hashable and immutable."""
@@ -253,15 +254,6 @@ class HostLimits(Host):
     rearm_after_ns: int = 500_000_000
     rearm_limit_ns: int = 1_000_000_000
     bus_error_limit_ns: int = 0  # 0: an error of the bus ends the controller
-
-
-@dataclass(frozen=True, slots=True)
-class TlsFiles:
-    """Files of mutual TLS, in PEM; the certificate's common name is the identity."""
-
-    ca: str
-    certificate: str
-    private_key: str
 
 
 LEASE_S = 1.0

@@ -10,13 +10,14 @@ has somebody else's clock, so it needs real time.
 """
 
 import tomllib
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from configs import patterns
-from configs.brief import OURS, Settings, TlsFiles
+from configs.brief import OURS, Settings
 from configs.checks import Problem
 from configs.complaints import MISSING, complaints, refusal
 from configs.errors import Complaint, ScenarioError
@@ -24,6 +25,7 @@ from configs.files import expanded
 from configs.parameters import Name, as_tuples
 from configs.roles import AGENT, ROLES, STARTED, identity_of, processes_of
 from configs.scenario import Scenario
+from configs.tls import TlsFiles
 from configs.users import read_users
 
 Endpoint = Annotated[str, Field(pattern=patterns.ENDPOINT)]
@@ -60,14 +62,6 @@ class RobotSection(Section):
     )
 
 
-class TlsSection(Section):
-    """Mutual TLS: files in PEM; the certificate's common name is the identity."""
-
-    ca: Path = Field(strict=False, description="who signed all certificates")
-    certificate: Path = Field(strict=False, description="this machine's")
-    private_key: Path = Field(strict=False, description="this machine's")
-
-
 class NetworkSection(Section):
     """How the machines reach each other."""
 
@@ -83,7 +77,7 @@ class NetworkSection(Section):
         strict=False,
         description="lines identity:password, all of them at the router, its own on a robot",
     )
-    tls: TlsSection | None = Field(None, description="certificates instead of passwords")
+    tls: TlsFiles | None = Field(None, description="certificates instead of passwords")
     guests: dict[Name, tuple[str, ...]] = Field(
         default_factory=dict,
         description="who may open which buses with can.Bus(endpoint=...) from another machine;"
@@ -164,14 +158,6 @@ def check_deployment(
     if found := _problems(deployment, scenario):
         raise refusal([Complaint(name, *problem) for problem in found])
     return _beside(deployment, folder)
-
-
-def tls_files(network: NetworkSection) -> TlsFiles | None:
-    """The files of mutual TLS, None if identities are proven by passwords."""
-    tls = network.tls
-    if tls is None:
-        return None
-    return TlsFiles(str(tls.ca), str(tls.certificate), str(tls.private_key))
 
 
 def passwords(network: NetworkSection | None, identities: tuple[str, ...]) -> dict[str, str]:
@@ -295,10 +281,10 @@ def _beside(deployment: Deployment, folder: Path) -> Deployment:
     if network.users is not None:
         changes["users"] = folder / expanded(network.users, "network.users")
     if network.tls is not None:
-        tls = network.tls
         files = {
-            key: folder / expanded(getattr(tls, key), f"network.tls.{key}")
-            for key in TlsSection.model_fields
+            file.name: folder
+            / expanded(getattr(network.tls, file.name), f"network.tls.{file.name}")
+            for file in fields(network.tls)
         }
-        changes["tls"] = tls.model_copy(update=files)
+        changes["tls"] = replace(network.tls, **files)
     return deployment.model_copy(update={"network": network.model_copy(update=changes)})

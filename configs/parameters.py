@@ -12,6 +12,7 @@ pydantic is imported by the methods that it calls itself: in a process nothing d
 """
 
 from dataclasses import dataclass, field, fields, make_dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Optional, TypeVar
 
 from annotated_types import Ge, Gt, Le
@@ -57,6 +58,16 @@ class Tagged:
         return handler(Annotated[source, Field(discriminator=self.key)])
 
 
+@dataclass(frozen=True, slots=True)
+class FromText:
+    """Annotation of a type that files have as a text."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: "GetCoreSchemaHandler") -> Any:
+        from pydantic import Field
+
+        return handler(Annotated[source, Field(strict=False)])
+
+
 Finite = Annotated[float, Ge(-MOST), Le(MOST)]
 Positive = Annotated[float, Gt(0), Le(MOST)]
 NotNegative = Annotated[float, Ge(0), Le(MOST)]
@@ -65,6 +76,7 @@ SecondsOrZero = Annotated[float, Ge(0), Le(MOST_S)]
 Seed = Annotated[int, Ge(0), Le(MOST_INTEGER)]
 Name = Annotated[str, Pattern(patterns.NAME, max_length=32)]
 Node = Annotated[int, Ge(0), Le(62)]
+FilePath = Annotated[Path, FromText()]
 Point = tuple[Finite, Finite]
 
 

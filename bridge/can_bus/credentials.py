@@ -19,9 +19,10 @@ from pathlib import Path
 from can.util import cast_from_string
 
 from bridge.network.tls import check_tls
-from configs.brief import NetworkLink, TlsFiles
+from configs.brief import NetworkLink
 from configs.errors import ScenarioError
 from configs.files import expanded
+from configs.tls import TlsFiles
 from configs.users import read_users
 
 _TLS = ("ca", "certificate", "private_key")
@@ -69,7 +70,7 @@ def _tls(options: Mapping[str, str], user: str) -> TlsFiles:
     for name in _TLS:
         if name not in options:
             raise ScenarioError(f"{name} = (missing): over tls give {', '.join(_TLS)}")
-    files = TlsFiles(*(options[name] for name in _TLS))
+    files = TlsFiles(**{name: Path(options[name]) for name in _TLS})
     check_tls(files, user)
     return files
 

@@ -17,7 +17,7 @@ import zenoh
 
 from bridge.network import zenoh_log
 from bridge.network.packing import MAX_BYTES
-from configs.brief import TlsFiles
+from configs.tls import TlsFiles
 
 ONE_THREAD = (
     "(app: (worker_threads: 1), net: (handover: app), acc: (handover: app), rx: (handover: app),"
@@ -53,10 +53,10 @@ def set_key(config: zenoh.Config, path: str, value: object) -> None:
 def mutual_tls(files: TlsFiles, side: str) -> dict[str, object]:
     """Zenoh's TLS section; `side` is "listen" or "connect"."""
     return {
-        "root_ca_certificate": files.ca,
+        "root_ca_certificate": str(files.ca),
         "enable_mtls": True,
-        f"{side}_certificate": files.certificate,
-        f"{side}_private_key": files.private_key,
+        f"{side}_certificate": str(files.certificate),
+        f"{side}_private_key": str(files.private_key),
     }
 
 

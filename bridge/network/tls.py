@@ -6,11 +6,10 @@ A certificate is shown to oneself, in memory: the same checks that the other end
 import contextlib
 import ssl
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
-from configs.brief import TlsFiles
 from configs.errors import ScenarioError
+from configs.tls import TlsFiles
 
 _CN = "commonName"
 _FLIGHTS = 4
@@ -32,7 +31,7 @@ def check_tls(files: TlsFiles, identity: str | None, key: str = "") -> None:
     }
     for name, (path, mark) in named.items():
         try:
-            text = Path(path).read_bytes()
+            text = path.read_bytes()
         except OSError as error:
             raise ScenarioError(f"{name} = {path}: {error.strerror}") from error
         if mark.encode() not in text:

@@ -4,11 +4,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from bridge.network import access
-from configs.brief import NetworkLink, Outside, PlantBrief, Settings, TlsFiles
-from configs.deployment import Deployment, NetworkSection, passwords, tls_files
+from configs.brief import NetworkLink, Outside, PlantBrief, Settings
+from configs.deployment import Deployment, NetworkSection, passwords
 from configs.errors import ScenarioError
 from configs.roles import LOCALISATION, identity_of
 from configs.scenario import Scenario
+from configs.tls import TlsFiles
 
 
 def robots_of_plant(brief: PlantBrief, deployment: Deployment) -> PlantBrief:
@@ -62,7 +63,7 @@ def check_credentials(scenario: Scenario, deployment: Deployment) -> None:
 
 
 def _tls(network: NetworkSection, identity: str | None) -> TlsFiles | None:
-    files = tls_files(network)
+    files = network.tls
     if files is not None:
         from bridge.network.tls import check_tls
 
@@ -75,7 +76,7 @@ def outside(deployment: Deployment) -> Outside | None:
     network = deployment.network
     if network is None:
         return None
-    return Outside(network.listen or network.endpoint, tls_files(network))
+    return Outside(network.listen or network.endpoint, network.tls)
 
 
 def bus_guests(deployment: Deployment) -> Mapping[str, tuple[str, ...]]:

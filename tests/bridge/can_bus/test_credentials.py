@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from support.certificates import certificates
 
 from bridge.can_bus.credentials import as_option, network_of
-from configs.brief import TlsFiles
 from configs.errors import ScenarioError
+from configs.tls import TlsFiles
 
 TCP = {"endpoint": "tcp/lab:7447", "user": "bench"}
 TLS = {"endpoint": "tls/lab:7447", "user": "bench"}
@@ -51,7 +51,9 @@ def test_a_password_that_looks_like_a_number_or_a_truth_value_is_one() -> None:
 
 
 def test_certificates_go_with_tls(files: dict[str, str]) -> None:
-    assert network_of({**TLS, **files}).tls == TlsFiles(*files.values())
+    assert network_of({**TLS, **files}).tls == TlsFiles(
+        **{name: Path(file) for name, file in files.items()}
+    )
 
 
 @pytest.mark.parametrize(

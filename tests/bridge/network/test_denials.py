@@ -18,8 +18,9 @@ from bridge.network import access
 from bridge.network import keys
 from bridge.network.client import open_client
 from bridge.network.router import open_router
-from configs.brief import NetworkLink, Outside, TlsFiles
+from configs.brief import NetworkLink, Outside
 from configs.errors import InfrastructureError
+from configs.tls import TlsFiles
 
 folder = Path(sys.argv[1])
 with socket.socket() as probe:
@@ -27,7 +28,11 @@ with socket.socket() as probe:
     port = probe.getsockname()[1]
 
 def files(name):
-    return TlsFiles(*(str(folder / file) for file in ("ca.pem", f"{name}.pem", f"{name}.key")))
+    return TlsFiles(
+        ca=folder / "ca.pem",
+        certificate=folder / f"{name}.pem",
+        private_key=folder / f"{name}.key",
+    )
 
 plan = access.plan("t", ("r1", "r2"), {"r1": (), "r2": ()}, ("r1",), certified=sys.argv[2] == "tls",
                    guests={"agent-r1": "one", "agent-r2": "two"})

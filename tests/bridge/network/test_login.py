@@ -13,8 +13,9 @@ from support.certificates import certificates
 from bridge.network import access
 from bridge.network.client import open_client
 from bridge.network.router import RouterLink, open_router
-from configs.brief import NetworkLink, Outside, TlsFiles
+from configs.brief import NetworkLink, Outside
 from configs.errors import InfrastructureError
+from configs.tls import TlsFiles
 
 RUN = "test"
 
@@ -28,7 +29,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def files(folder: Path, name: str, authority: str = "ca") -> TlsFiles:
-    return TlsFiles(*(str(folder / f) for f in (f"{authority}.pem", f"{name}.pem", f"{name}.key")))
+    return TlsFiles(
+        ca=folder / f"{authority}.pem",
+        certificate=folder / f"{name}.pem",
+        private_key=folder / f"{name}.key",
+    )
 
 
 @pytest.fixture

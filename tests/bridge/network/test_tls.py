@@ -7,8 +7,8 @@ import pytest
 from support.certificates import certificates
 
 from bridge.network.tls import check_tls
-from configs.brief import TlsFiles
 from configs.errors import ScenarioError
+from configs.tls import TlsFiles
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def files(folder: Path, name: str) -> TlsFiles:
-    return TlsFiles(*(str(folder / file) for file in ("ca.pem", f"{name}.pem", f"{name}.key")))
+    return TlsFiles(
+        ca=folder / "ca.pem",
+        certificate=folder / f"{name}.pem",
+        private_key=folder / f"{name}.key",
+    )
 
 
 def test_a_certificate_proves_whom_it_names_and_the_routers_may_have_any_name(folder: Path) -> None:
@@ -47,7 +51,7 @@ def test_a_certificate_of_somebody_else_is_refused_with_both_names(folder: Path)
 def test_a_file_that_is_not_there_or_not_one_is_named_with_its_key(
     folder: Path, key: str, file: str, said: str
 ) -> None:
-    wrong = replace(files(folder, "agent-r2"), **{key: str(folder / file)})
+    wrong = replace(files(folder, "agent-r2"), **{key: folder / file})
     with pytest.raises(ScenarioError, match=f"^network.tls.{key} = {folder}/?{file}: {said}"):
         check_tls(wrong, "agent-r2", "network.tls.")
 
@@ -65,7 +69,7 @@ def test_a_certificate_that_the_other_end_would_refuse_is_refused_here(
 
 
 def test_a_key_of_another_certificate_is_refused(folder: Path) -> None:
-    mixed = replace(files(folder, "agent-r2"), private_key=str(folder / "agent-r1.key"))
+    mixed = replace(files(folder, "agent-r2"), private_key=folder / "agent-r1.key")
     with pytest.raises(ScenarioError, match=r"agent-r1\.key: key values mismatch"):
         check_tls(mixed, "agent-r2")
 
@@ -74,4 +78,4 @@ def test_an_encrypted_key_is_refused_and_nobody_is_asked_for_its_word(folder: Pa
     locked = folder / "locked.key"
     locked.write_text("-----BEGIN ENCRYPTED PRIVATE KEY-----\n")
     with pytest.raises(ScenarioError, match=r"locked\.key: is encrypted"):
-        check_tls(replace(files(folder, "agent-r2"), private_key=str(locked)), "agent-r2")
+        check_tls(replace(files(folder, "agent-r2"), private_key=locked), "agent-r2")
