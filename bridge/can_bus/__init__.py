@@ -1,1 +1,1 @@
-"""The emulated CAN bus: packets, hub and the python-can interface `fleetloop`."""
+"""Emulated CAN buses: hub, packets, transports and the python-can interface `fleetloop`."""

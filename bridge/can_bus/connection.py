@@ -1,7 +1,7 @@
-"""A bus at the hub, and a client's connection: who it is, what it was sent and has not taken yet.
+"""A bus at the hub and the connections of its clients: identity, backlog, counters.
 
-Nothing here waits. What the client doesn't read is kept for it up to `BACKLOG` packets; then the
-newest is lost, counted, and the client is told where it is missing and how much (a LOST packet).
+No call blocks. Packets that a client doesn't read are kept up to `BACKLOG`; beyond it the newest are
+lost and counted, and a LOST packet tells the client where and how many.
 """
 
 import contextlib
@@ -28,10 +28,10 @@ _Item = TypeVar("_Item")
 
 
 class SubmissionQueue(Generic[_Item]):
-    """What the clients of a bus sent and nobody has taken yet, in order.
+    """Frames that the clients of a bus submitted, until they are taken, in order.
 
-    What a controller says in lockstep is taken at once. The others get `TURN` frames through at a
-    time, so that who says very much makes nobody wait: no bus carries more in a tick.
+    Frames of a controller in lockstep are taken at once. All other clients share `TURN` frames at a
+    time, so that a flood delays no other client: no bus carries more in a tick.
     """
 
     __slots__ = ("_late", "now")
@@ -59,7 +59,7 @@ class SubmissionQueue(Generic[_Item]):
 
 
 class BusCounters:
-    """What went over one bus."""
+    """Frames and packets of one bus."""
 
     __slots__ = ("dropped", "from_clients", "from_drives", "garbage", "joins")
 

@@ -1,4 +1,4 @@
-"""How a program on another machine says where a run's router is, and who it is.
+"""Router endpoint and credentials of a client on another machine.
 
     option         what
     endpoint       tcp/HOST:PORT, or tls/HOST:PORT for mutual TLS
@@ -9,7 +9,7 @@
     certificate    with tls: the guest's, PEM
     private_key    with tls: the guest's, PEM
 
-Over tcp whoever is on the way reads and changes frames; it is for networks that are one's own.
+Over tcp frames are neither encrypted nor authenticated: use it on trusted networks only.
 """
 
 import re

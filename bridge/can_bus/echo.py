@@ -1,4 +1,4 @@
-"""Interfaces that hand a node its own frames back, and how to tell these from others'.
+"""Echoes: own frames that an interface hands back to their sender.
 
     sent        a frame goes out, and its echo is awaited for `ECHO_S`
     is_echo     an equal frame came: as often as it was sent, it is an echo

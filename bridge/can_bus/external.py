@@ -1,4 +1,4 @@
-"""The drives' end of buses that aren't ours: any python-can interface, a `can.Bus` per bus.
+"""Drive port on buses of any python-can interface, one `can.Bus` each.
 
 The emulated drives are one more node on a SocketCAN interface, behind a USB adapter, in a multicast
 group. The bus's own clock counts: frames go out when they are delivered and are heard when they

@@ -1,8 +1,8 @@
-"""The hub: all buses of the plant's process, between the emulated drives and their clients.
+"""The hub: all buses of the plant's process, between emulated drives and clients.
 
     deliver    frames of the drives, at one instant, to every client of a bus
-    collect    wait until synchronous clients have said all they had to say until that instant
-    take       what the clients of a bus sent since the last take
+    collect    wait until synchronous clients have answered completely
+    receive    frames of the clients of a bus since the last call
 
 A *batched* client receives and sends the frames of one instant together, in one packet or several.
 A *synchronous* client is batched, and bus time stands still until it has answered every request.
@@ -18,7 +18,7 @@ are no packet and frames that violate classic CAN are counted and dropped; the v
 packet are kept. Where frames take no time an error frame has nothing to destroy: it goes to all
 other clients, and not to the drives.
 
-A bus with a `queue` has bit timing: the hub then carries and doesn't forward. The
+A bus with a `queue` has bit timing: the hub then does not forward by itself. The
 emulation of the wire reads with `submitted` the frames that clients want to send, hands over with
 `forward` the frames that ended on the wire, and gives credit back with `return_credit`.
 """

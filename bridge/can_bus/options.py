@@ -1,6 +1,7 @@
-"""What a program says to `can.Bus(...)`, checked: configuration files of python-can hold text.
+"""Validation of the options of `can.Bus(interface="fleetloop", ...)`.
 
-What is wrong is a `can.CanInitializationError` that names the option, its value and what is right.
+python-can's configuration files hold text, so text is accepted for every type. A wrong option is a
+`can.CanInitializationError` that names the option, its value and a right one.
 """
 
 from math import isfinite

@@ -1,4 +1,4 @@
-"""Between python-can's messages and frames as values: the same on every interface.
+"""Conversion between python-can messages and frames; opening a bus of any interface.
 
 A message is made slot by slot: its constructor checks what a frame of ours can't get wrong, and
 would cost a good part of a control period.

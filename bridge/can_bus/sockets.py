@@ -1,4 +1,4 @@
-"""Where a run's buses live: Unix sockets in a private folder.
+"""Unix sockets of the buses of all runs on this machine, in private folders.
 
     <base>/<run>/<bus>.can              base: $FLEETLOOP_RUNTIME, else $XDG_RUNTIME_DIR/fleetloop,
     <base>/<run>/.fleetloop-lock              else /tmp/fleetloop-<uid>

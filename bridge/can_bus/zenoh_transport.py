@@ -1,10 +1,10 @@
-"""A line from another machine: packets over Zenoh to the relay beside the hub (`relay`).
+"""Transport from another machine: packets over Zenoh to the relay beside the hub (`relay`).
 
     guest ── <bus>/up ──► router, relay ── Unix socket ──► hub
           ◄─ <bus>/down ─
 
-Packets are the same as on the Unix socket, so are the promises: lossless, in order, no echo, room
-that is bounded both ways (`window`). What the guest doesn't read waits here, up to `BACKLOG`
+Packets and guarantees are those of the Unix socket: lossless, in order, no echo, bounded by credit
+in both directions (`flow_control`). What the guest doesn't read waits here, up to `BACKLOG`
 packets, and then at the hub, which drops and counts what is too much. Leaving waits, at most
 `CLOSE_S`, until the hub has all that was sent. The guest holds a liveliness token for as long as it
 lives and watches the relay's: when that goes, or the network to it (noticed within Zenoh's lease),

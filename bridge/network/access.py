@@ -1,4 +1,4 @@
-"""Graph → who may say and hear what: the router's access control and everybody's credentials.
+"""Access control of a run, from its graph: keys that each identity may publish and receive.
 
 The graph *is* the network. The router refuses everything that isn't listed (default deny), and each
 process is bound to its identity by a random password that it alone is given. The rights of a role

@@ -1,4 +1,4 @@
-"""The start barrier: everybody proves every link that it will use, with a message, before the run.
+"""Start barrier: every link that a run will use carries a message before the run begins.
 
 A process says hello on each of its publishers until everybody is ready, and is ready itself when
 it has heard a hello from everyone that it will depend on. So no message of the run can be the first

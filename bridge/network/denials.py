@@ -1,4 +1,4 @@
-"""Whom a router refused what, and how often: read from Zenoh's log, which alone says it.
+"""Refusals by the router, counted from Zenoh's log: logins, rights, unread messages.
 
     login    a password that is wrong, a user that is unknown, no login at all; of TLS, whose
              identity nobody knows then, only why

@@ -1,4 +1,4 @@
-"""Cuts off controllers that say far more than the schedule lets anybody say, at the router.
+"""Flood guard of the router: stops controllers that send far more than the schedule allows.
 
 Zenoh's own limit on rates drops messages by the time between two of them, and in lockstep no honest
 message may be dropped. So the kernel's counters of each connection are looked at instead, several

@@ -1,4 +1,4 @@
-"""Every Zenoh key of a run, one function each; stable parts left.
+"""Zenoh keys of a run, one function each; stable parts left.
 
     fleetloop/<run>/robot/<name>/path        s, v̂_r, t; heard by exactly the out-neighbours
     fleetloop/<run>/robot/<name>/pose        from the localisation system to the robot
@@ -27,37 +27,37 @@ _CHUNK = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 
 
 def path(run: str, robot: str) -> str:
-    """Where a robot says its path variable."""
+    """Key of a robot's path variable."""
     return f"{_run(run)}/robot/{_chunk(robot)}/path"
 
 
 def pose(run: str, robot: str) -> str:
-    """Where the localisation system says a robot's pose."""
+    """Key of a robot's pose, from the localisation system."""
     return f"{_run(run)}/robot/{_chunk(robot)}/pose"
 
 
 def truth(run: str, robot: str) -> str:
-    """Where the plant says what really happened to a robot."""
+    """Key of the plant's record of a robot."""
     return f"{_run(run)}/robot/{_chunk(robot)}/truth"
 
 
 def traffic(run: str, bus: str) -> str:
-    """Where the plant says what crosses a bus."""
+    """Key of the frames of a bus."""
     return f"{_run(run)}/can/{_chunk(bus)}/traffic"
 
 
 def telemetry(run: str, robot: str) -> str:
-    """Where a controller says what it used and commanded."""
+    """Key of a controller's record."""
     return f"{_run(run)}/robot/{_chunk(robot)}/telemetry"
 
 
 def leader_speed(run: str) -> str:
-    """Where the virtual leader says its speed."""
+    """Key of the virtual leader's speed."""
     return f"{_run(run)}/leader/speed"
 
 
 def go(run: str) -> str:
-    """Where the launcher says that everybody is ready."""
+    """Key of the start message."""
     return f"{_run(run)}/@clock/go"
 
 
@@ -72,22 +72,22 @@ def live_all(run: str) -> str:
 
 
 def progress(run: str, process: str) -> str:
-    """Where a process says how far it is."""
+    """Key of a process's progress."""
     return f"{_run(run)}/@progress/{_process(process)}"
 
 
 def notice(run: str, process: str) -> str:
-    """Where a process says what has just happened."""
+    """Key of a process's notices."""
     return f"{_run(run)}/@notice/{_process(process)}"
 
 
 def report(run: str, process: str) -> str:
-    """Where a process says its last word."""
+    """Key of a process's final report."""
     return f"{_run(run)}/@report/{_process(process)}"
 
 
 def guest_line(user: str, line: str, channel: str) -> str:
-    """Where a guest talks to a bus or run/bus; its keys end in up, down and alive."""
+    """Connection of a guest to a bus or run/bus; its keys end in up, down and alive."""
     run, _, bus = channel.rpartition("/")
     chunks = (user, line, run, bus) if run else (user, line, bus)
     return f"fleetloop/@guest/{'/'.join(_chunk(chunk) for chunk in chunks)}"
@@ -99,7 +99,7 @@ def guest_lines(end: str, user: str) -> str:
 
 
 def guest_relay(user: str) -> str:
-    """Liveliness token of who takes a guest's lines."""
+    """Liveliness token of the relay that serves a guest."""
     return f"fleetloop/@guest/{_chunk(user)}/@relay"
 
 
@@ -112,7 +112,7 @@ def guest_of(place: str) -> tuple[str, str] | None:
 
 
 def kind(key: str) -> str:
-    """What is said on a key: path, pose, truth, ..., or of the control plane progress, report."""
+    """Kind of message on a key: path, pose, truth, ..., or of the control plane progress, report."""
     chunks = key.split("/")
     plane = chunks[2]
     return plane[1:] if plane.startswith("@") else chunks[-1]

@@ -1,4 +1,4 @@
-"""A link: how a process talks to the others, whatever carries it.
+"""Links between processes: publish, subscribe, liveliness, whatever transport carries them.
 
 Promises of every link: a message put on a key reaches every link that subscribes to it once, in the
 order of its publisher, and never the link that put it; nothing is lost while both live; `receive`

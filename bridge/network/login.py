@@ -1,4 +1,4 @@
-"""Why there is no session with a router, or no router: from what Zenoh says of one attempt.
+"""Causes of a failed login or listen, from the text of Zenoh's errors.
 
 Zenoh says it of a peer only; of a client it says that it could not connect. So who was refused as a
 client asks again as a peer, for the reason (`bridge.network.zenoh_link`).

@@ -1,4 +1,4 @@
-"""Every message over Zenoh and its bytes; the reports are in `bridge.network.reports`.
+"""Messages over Zenoh and their encoding.
 
 A message is a msgpack array that begins with the version of its layout. Decoding is bounded: too
 long, the wrong types, a wrong length, an unknown version or a number that isn't finite give None,

@@ -1,4 +1,4 @@
-"""What was refused of what arrived: counted by sender and kind, named in words.
+"""Counts of refused messages, by sender and kind.
 
 A message may be refused because it is none (`bridge.network.messages`), because it says what can't
 be, or because there was no room for it. Nobody who reads messages fails for what they say: it is

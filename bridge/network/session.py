@@ -1,4 +1,4 @@
-"""Zenoh sessions: how they are set up, opened within a bound, and kept.
+"""Zenoh sessions: configuration, opening within a bound, lifetime.
 
 Client mode, multicast and gossip off, so that nobody can talk past the router; shared memory off.
 Each session keeps few threads: a message that wakes one instead of five costs half as much. In a

@@ -1,4 +1,4 @@
-"""Files of mutual TLS, looked at before anybody connects: there, fitting, in time, and whose.
+"""Checks of the files of mutual TLS before a connection: present, matching, valid, whose.
 
 A certificate is shown to oneself, in memory: the same checks that the other end will make.
 """

@@ -1,4 +1,4 @@
-"""Zenoh's log: it can only go to file descriptor 1, and what it says is set once per process.
+"""Zenoh's log: configured once per process, read by the router through file descriptor 1.
 
     RUST_LOG=info fleetloop run ...    as usual for programs with Zenoh, but to standard error
 

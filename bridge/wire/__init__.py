@@ -1,1 +1,1 @@
-"""A CAN wire in bus time: bits, arbitration, queues, errors, faults. Pure."""
+"""Emulated classic CAN wire in bus time: bits, arbitration, queues, errors, faults. Pure."""

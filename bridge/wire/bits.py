@@ -1,4 +1,4 @@
-"""How many bits a classic CAN frame takes on the wire, by ISO 11898-1.
+"""Length of a classic CAN frame on the wire in bits, by ISO 11898-1.
 
     field        11-bit identifier           29-bit identifier                    stuffed
     start        0                           0                                    yes

@@ -12,12 +12,12 @@
     ERROR_ACTIVE    both below 96                  everything; its error flag destroys a bad frame
     ERROR_WARNING   one 96 or above                the same
     ERROR_PASSIVE   one above 127                  send, with a pause of 8 bits after each frame of
-                                                   its own; its error flag disturbs nobody
+                                                   its own; its error flag destroys no frame
     BUS_OFF         TEC above 255                  nothing, until restarted and after 128 times 11
                                                    recessive bits
 
-So 16 destroyed frames in a row make a sender passive and 32 take it off the bus; a lone node, whom
-nobody acknowledges, ends passive. The standard lets REC stop counting above 127 and come back to
+So 16 destroyed frames in a row make a sender passive and 32 take it off the bus; a lone node,
+whose frames no other node acknowledges, ends passive. The standard lets REC stop counting above 127 and come back to
 anything from 119 to 127; 120 is what bxCAN does (ST RM0008, CAN_ESR).
 """
 
@@ -30,7 +30,7 @@ _REC_AFTER_PASSIVE = 120
 
 
 class NodeState(IntEnum):
-    """How far a node is trusted; the worse the higher."""
+    """Fault confinement state; the worse the higher."""
 
     ERROR_ACTIVE = 0
     ERROR_WARNING = 1
@@ -67,7 +67,7 @@ class Confinement:
         self.tec += 8
 
     def not_acknowledged(self) -> None:
-        """A frame of this node went well, but nobody acknowledged it."""
+        """A frame of this node was intact, but no node acknowledged it."""
         if max(self.tec, self.rec) < PASSIVE:
             self.tec += 8
 

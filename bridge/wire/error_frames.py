@@ -1,4 +1,4 @@
-"""What a wire's events look like to a client: error frames with the classes of Linux `can/error.h`.
+"""Error frames that clients receive for events on the wire, as in Linux `can/error.h`.
 
     event                  class           data
     destroyed frame        0x08 protocol   [2] the violation, [3] where in the frame
@@ -25,7 +25,7 @@ _VIOLATION = {
 
 
 def of_error(event: ErrorFrame, node: Node | None) -> Frame:
-    """What a client at `node` hears of a destroyed frame; None: it has no node."""
+    """Error frame for a client at `node` after a destroyed frame; None: it has no node."""
     if event.kind is ErrorKind.ACK:
         return _frame(NO_ACK, node)
     kind, place = _VIOLATION[event.kind]
@@ -33,7 +33,7 @@ def of_error(event: ErrorFrame, node: Node | None) -> Frame:
 
 
 def of_state(event: StateChanged, before: NodeState) -> Frame:
-    """What a client hears of a change of its own node's state."""
+    """Error frame for a client whose own node has changed its state."""
     node, state = event.node, event.state
     if state is NodeState.BUS_OFF:
         return _frame(BUS_OFF, node)

@@ -1,4 +1,4 @@
-"""Faults on order: which frames of a wire get lost, come twice, come late or are destroyed.
+"""Fault injection on a wire: frames are dropped, duplicated, delayed or corrupted.
 
     what        where                                  effect
     DROP        between a node and its controller      the frame is taken and never sent
@@ -6,7 +6,7 @@
     DELAY       the same                               the frame is queued later
     CORRUPT     on the wire                            a bit is flipped: error frame, sent again
 
-A fault strikes the next `count` frames that match, or all until the rules are cleared.
+A fault applies to the next `count` frames that match it, or to all until faults are cleared.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from bridge.frame import Frame
 
 
 class FaultKind(Enum):
-    """What happens to a frame."""
+    """Effect of a fault on a frame."""
 
     DROP = auto()
     DUPLICATE = auto()
@@ -26,7 +26,7 @@ class FaultKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What shall happen to which frames, and how often."""
+    """A fault: its kind, the frames that it applies to, and how often."""
 
     kind: FaultKind
     can_id: int | None = None  # SocketCAN's, with flags; None: any
@@ -42,7 +42,7 @@ class Fault:
 
 
 class Faults:
-    """The faults of one wire that have not struck in full yet, oldest first."""
+    """The faults of one wire that are still to be applied, oldest first."""
 
     __slots__ = ("_left",)
 
@@ -50,18 +50,18 @@ class Faults:
         self._left: list[tuple[Fault, int | None]] = []
 
     def add(self, fault: Fault) -> None:
-        """Let this happen from now on."""
+        """Apply this fault from now on."""
         self._left.append((fault, fault.count))
 
     def clear(self) -> None:
-        """Let nothing more happen."""
+        """Forget all faults."""
         self._left.clear()
 
     def __bool__(self) -> bool:
         return bool(self._left)
 
     def match(self, sender: str, frame: Frame, *, on_wire: bool) -> Fault | None:
-        """What would happen to this frame, if anything."""
+        """The oldest fault that applies to a frame; None: no fault does."""
         for fault, _ in self._left:
             if (
                 (fault.kind is FaultKind.CORRUPT) is on_wire
@@ -72,7 +72,7 @@ class Faults:
         return None
 
     def applied(self, fault: Fault) -> None:
-        """It happened: once less to come."""
+        """A fault was applied: one application less is left."""
         for n, (other, left) in enumerate(self._left):
             if other is fault:
                 if left == 1:

@@ -25,16 +25,16 @@ _SECOND_NS = 1_000_000_000
 
 
 class ErrorKind(Enum):
-    """What the first node that complained saw (ISO 11898-1)."""
+    """Error detected by the first node that signalled one (ISO 11898-1)."""
 
     BIT = "another bit on the wire than the one sent"
     STUFF = "six equal bits in a row"
     FORM = "a dominant bit where the format has a recessive one"
-    ACK = "nobody acknowledged"
+    ACK = "no node acknowledged"
 
 
 class NodeCounters:
-    """What became of the frames of one node; accepted = sent + dropped + queued + withheld."""
+    """Frames of one node; accepted = sent + dropped + queued + withheld."""
 
     __slots__ = ("accepted", "dropped", "errors", "refused", "sent")
 
@@ -83,7 +83,7 @@ class Node:
 
 
 class Recovery:
-    """The nodes of a segment that are on their way back."""
+    """The nodes of a segment that recover from bus-off."""
 
     __slots__ = ("_bit_rate", "nodes")
 
@@ -129,7 +129,7 @@ class Recovery:
 
 
 class Delivered(NamedTuple):
-    """A frame has passed: the last bit of its end of frame was at `end_ns`."""
+    """A frame was transmitted: the last bit of its end of frame was at `end_ns`."""
 
     end_ns: int
     start_ns: int
@@ -142,7 +142,7 @@ class Delivered(NamedTuple):
 class ErrorFrame(NamedTuple):
     """A frame was destroyed: the error flag began at `at_ns`, the wire is free at `free_ns`.
 
-    The senders send it again as soon as they may. An error flag that was ordered on an idle wire
+    The senders send it again as soon as they may. An error flag that was injected on an idle wire
     has no senders.
     """
 
@@ -151,12 +151,12 @@ class ErrorFrame(NamedTuple):
     free_ns: int
     kind: ErrorKind
     senders: tuple[Node, ...]
-    frame: Frame  # of the first sender; without any the error frame that was ordered
-    ordered_by: tuple[Node, ...] = ()  # who signalled it because they were told to
+    frame: Frame  # of the first sender; without any the injected error frame
+    ordered_by: tuple[Node, ...] = ()  # nodes that injected it
 
 
 class StateChanged(NamedTuple):
-    """A node is trusted more or less than before."""
+    """The fault confinement state of a node has changed."""
 
     at_ns: int
     node: Node

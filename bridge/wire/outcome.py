@@ -1,21 +1,21 @@
-"""What becomes of a frame on the wire: passes, or is destroyed, where and by what.
+"""Outcome of a transmission: success, or an error frame, at which bit and why.
 
 In order, the first that applies:
 
-    an error flag on order                        see below
+    an injected error flag                        see below
     a sender at the wrong bit rate                bit error after the arbitration field; all fail
     an active listener at the wrong bit rate      the same as a stuff error, and it was the first
-    senders of one identifier, different bits     at the first bit that differs, who sends recessive
+    senders of one identifier, different bits     at the first bit that differs, a recessive sender
                                                   sees a bit error: an active one destroys the frame
                                                   for all, passive ones drop out and the rest go on
-    a fault that corrupts it                form error at the delimiter of the CRC
+    a fault that corrupts it                      form error at the delimiter of the CRC
     nobody else to hear it                        acknowledge error after the acknowledge slot
     else                                          it passes
 
-An error flag on order is six dominant bits in a row, at once whatever is on the wire. In a frame
+An injected error flag is six dominant bits in a row, at once whatever is on the wire. In a frame
 that is under way it destroys it from the next bit on. At its start it destroys it at the first
-recessive bit, of whoever starts with it. On an idle wire all others see it as a stuff error after
-the sixth bit. Who was told to signal it counts nothing.
+recessive bit of the frame that starts with it. On an idle wire all others see it as a stuff error after
+the sixth bit. The injecting node counts nothing.
 
 An error frame is the error flag, 6 bits, longer when others notice only by it (they see six
 dominant bits in a row and then send their own: 12 at most), and a delimiter of 8 bits.
@@ -52,20 +52,20 @@ class Sending(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What becomes of a frame; bits count from its start."""
+    """Outcome of a transmission; bits count from its start."""
 
-    senders: Sequence[Sending]  # who are sending to the end, or until it is destroyed
+    senders: Sequence[Sending]  # of all its bits, or until it is destroyed
     bits: int  # until the wire is free again
     error: ErrorKind | None = None
     error_bit: int = 0  # where the error flag begins
     fallen: Sequence[Sending] = ()  # passive senders that saw a bit error and dropped out
     first: Node | None = None  # a listener that destroyed it
     fault: Fault | None = None
-    orders: Sequence[Sending] = ()  # error flags on order that destroyed it
+    orders: Sequence[Sending] = ()  # injected error flags that destroyed it
 
 
 class Plan:
-    """A transmission: who sends what from when to when; `what` becomes of it, None: it passes."""
+    """A transmission, its senders, times and outcome `what`; None: success."""
 
     __slots__ = ("done_ns", "entry", "free_ns", "heard_by", "sender", "start_ns", "what")
 
@@ -93,7 +93,7 @@ class Plan:
 
 
 def ordered(orders: Sequence[Sending], starting: Sequence[Sending]) -> Outcome:
-    """What becomes of error flags on order, and of the frame that starts with them."""
+    """Outcome of injected error flags, and of the frame that starts with them."""
     at = ERROR_FLAG_BITS
     if starting:
         at = stuffed_bits(starting[0].entry.frame).index("1") + 1
@@ -101,7 +101,7 @@ def ordered(orders: Sequence[Sending], starting: Sequence[Sending]) -> Outcome:
 
 
 def cut_short(plan: Plan, order: Sending, bit: int) -> Outcome:
-    """What becomes of a transmission under way whose bits from `bit` on an error flag covers."""
+    """Outcome of a transmission under way that an error flag destroys from `bit` on."""
     before = plan.what
     senders: Sequence[Sending] = (Sending(plan.sender, plan.entry),)
     if before is None:
@@ -117,7 +117,7 @@ def cut_short(plan: Plan, order: Sending, bit: int) -> Outcome:
 
 
 def outcome(senders: Sequence[Sending], nodes: Sequence[Node], faults: Faults) -> Outcome:
-    """What becomes of the frame of `senders`, who have won the arbitration, among all `nodes`."""
+    """Outcome of the frame of `senders`, the winners of the arbitration, among all `nodes`."""
     frame = senders[0].entry.frame
     listeners = [node for node in nodes if node.state is not NodeState.BUS_OFF]
     sending = [sender.node for sender in senders]

@@ -1,4 +1,4 @@
-"""What waits at a node to be sent, and what waits there to be read.
+"""Transmit queues and receive FIFO of a node.
 
     queue       of                   next on the bus        when full
     Fifo        a host: SocketCAN's  the oldest             refused: the caller gets ENOBUFS
@@ -23,7 +23,7 @@ HOST_QUEUE = 10
 DRIVE_MAILBOXES = 3
 RECEIVE_DEPTH = 3
 ERROR_KEY = -1
-"""Of an error flag on order: it takes part in no arbitration, it ends one."""
+"""Key of an injected error flag: it takes part in no arbitration, it ends one."""
 
 
 class Entry(NamedTuple):

@@ -1,4 +1,4 @@
-"""What a set of periodic messages asks of a bus: its load, and how long each may take at worst.
+"""Load and worst-case response times of the periodic messages of a bus.
 
     U = Σ C_m / T_m                                                                             (1)
     R_m = max over q of  w_m(q) − q T_m + C_m,      q = 0 .. ⌈t_m / T_m⌉ − 1                    (2)

@@ -1,11 +1,11 @@
-"""A stretch of wire: who sends next, what becomes of it, and when.
+"""A segment of the wire: arbitration, transmission, and its effects on the nodes.
 
     free ─ arbitration of all that wait ─► frame ─► end: delivered ─► intermission ─► free
                                              └─► error flag, delimiter ─► intermission ─► free
 
-The transmission that is next or under way is foreseen as soon as somebody asks for it. Until its
-start it is only a plan: whoever joins the arbitration before or at that instant makes it void. So
-the segment needs no clock and gives the same events however it is asked.
+The next transmission is planned on demand. Until its start it is only a plan: a node that joins the
+arbitration before or at that instant voids it. So the segment needs no clock, and gives the same
+events however often it is asked.
 """
 
 from bridge.wire.bits import SUSPEND_BITS
@@ -28,7 +28,7 @@ _PASSIVE, _OFF = NodeState.ERROR_PASSIVE, NodeState.BUS_OFF
 
 
 class Segment:
-    """Nodes that hear each other. Told the time, in order; nothing happens before it."""
+    """Nodes connected with each other. Times are handed in, in order."""
 
     __slots__ = (
         "_bit_rate",
@@ -60,12 +60,12 @@ class Segment:
         self._plan: Plan | None = None
         self.recovery = Recovery(bit_rate)
         self._moves: list[tuple[Node, Segment]] = []
-        self._troubled = False  # somebody has a receive error to work off
+        self._troubled = False  # a node has receive errors left to work off
         self._plain = False  # nothing but arbitration decides who sends, and that it passes
         self._listeners: tuple[Node, ...] = ()
         self._others: dict[Node, tuple[Node, ...]] = {}
 
-    # --- who is there ----------------------------------------------------------------------------
+    # --- nodes -----------------------------------------------------------------------------------
 
     def join(self, node: Node, at_ns: int) -> None:
         """Take a node in; it hears from the next frame on."""
@@ -102,7 +102,7 @@ class Segment:
         return any(to is segment for _, to in self._moves)
 
     def deserted(self) -> bool:
-        """Whether nobody is there, and no frame of one who left is on the wire."""
+        """Whether it has no nodes, and no frame of a detached node is on the wire."""
         return not self.nodes and self._plan is None
 
     def is_sending(self, node: Node, at_ns: int) -> bool:
@@ -135,7 +135,7 @@ class Segment:
         self._plan.heard_by = tuple(other for other in plan.heard_by if other is not node)
 
     def revise(self, at_ns: int) -> None:
-        """Who is there, or what they may do, has changed; or a fault was ordered."""
+        """The nodes or their states have changed, or a fault was injected."""
         self._listeners = tuple(
             node for node in self.nodes if node.state is not _OFF and not node.wrong_bit_rate
         )
@@ -145,7 +145,7 @@ class Segment:
         if self._plan is not None and self._plan.start_ns >= at_ns:
             self._plan = None
 
-    # --- what happens ----------------------------------------------------------------------------
+    # --- transmissions ---------------------------------------------------------------------------
 
     def next_ns(self) -> int | None:
         """When the next event comes, if nobody does anything."""
@@ -158,7 +158,7 @@ class Segment:
         return None if plan is None else plan.done_ns
 
     def run(self, to_ns: int, events: list[Event]) -> None:
-        """Append what happens through `to_ns`; whoever sends at `to_ns` still takes part."""
+        """Append the events through `to_ns`; a frame submitted at `to_ns` still takes part."""
         while True:
             plan = self._plan
             if plan is None and self._first_ns is not None and self._first_ns < to_ns:
@@ -209,7 +209,7 @@ class Segment:
         return plan
 
     def _plan_error(self, start_ns: int, entry: Entry) -> Plan:
-        """Error flags on order, and the frame that would have started with them."""
+        """Injected error flags, and the frame that would have started with them."""
         orders = self._tied(start_ns, entry)
         others = [sending for sending in self._heads(start_ns) if sending.entry.key != ERROR_KEY]
         starting: list[Sending] = []

@@ -6,15 +6,15 @@
 
 * When the wire is free the lowest arbitration field wins; all others wait, at most one frame when
   theirs is lower still. A data frame beats a remote one of its identifier, 11 bits beat 29 with the
-  same base. Whoever submits at the instant at which a frame starts takes part in the arbitration.
+  same base. A frame submitted at the instant at which a frame starts takes part in the arbitration.
 * A frame occupies the wire for its exact number of bits. All other nodes hear it at the end of its
   end of frame; the next one starts three bits later. What isn't acknowledged or is destroyed is
   sent again, and counted as in `confinement`; `outcome` says what destroys a frame.
 * Every accepted frame is delivered exactly once, or queued, or counted as dropped. Frames of one
   node with one identifier stay in order.
-* An error frame that a node submits is an error flag on order: when its turn in the node's queue
-  comes it destroys what is on the wire, or what starts with it, or stands alone on an idle wire.
-  All others count the error; the node that was told to send it does not.
+* An error frame that a node submits is an injected error flag: at its turn in the node's queue it
+  destroys the frame on the wire, or the frame that starts with it, or stands alone on an idle wire.
+  All other nodes count the error; the injecting node does not.
 * Times are integer nanoseconds and never go back: an instant before the last one is an error. The
   same calls give the same events, however often `next_ns` and `advance` are asked in between.
 
@@ -156,15 +156,15 @@ class Wire:
             return self._events[0][0]
         return self._next_ns()
 
-    # --- faults and figures ----------------------------------------------------------------
+    # --- faults and figures ----------------------------------------------------------------------
 
     def inject(self, fault: Fault) -> None:
-        """Let something happen to frames from now on."""
+        """Apply a fault from now on."""
         self._faults.add(fault)
         self._revise()
 
     def clear_faults(self) -> None:
-        """Let no more ordered fault happen."""
+        """Forget all faults that are still to be applied."""
         self._faults.clear()
         self._revise()
 
@@ -216,7 +216,7 @@ class Wire:
         return True
 
     def _apply(self, found: Fault, node: Node, entry: Entry) -> bool:
-        """Let a fault happen to a frame on its way to the controller."""
+        """Apply a fault to a frame on its way to the controller."""
         self._faults.applied(found)
         match found.kind:
             case FaultKind.DROP:
