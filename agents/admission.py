@@ -18,7 +18,7 @@ sums.
 from collections import Counter
 
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
-from bridge.network.refusals import Refusals
+from bridge.network.refused_messages import Refusals
 from configs.brief import LEAD_TICKS, AgentBrief
 from configs.reach import within_world
 

@@ -1,7 +1,7 @@
 """A bus at the hub and the connections of its clients: identity, backlog, counters.
 
-No call blocks. Packets that a client doesn't read are kept up to `BACKLOG`; beyond it the newest are
-lost and counted, and a LOST packet tells the client where and how many.
+No call blocks. Packets that a client doesn't read are kept up to `BACKLOG`; beyond it the newest
+are lost and counted, and a LOST packet tells the client where and how many.
 """
 
 import contextlib

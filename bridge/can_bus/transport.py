@@ -54,7 +54,7 @@ class UnixTransport:
         """Connect and say hello.
 
         Raises:
-            OSError: nobody listens there, or not in time.
+            OSError: no program listens there, or not in time.
         """
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._bound_s: float | None = None

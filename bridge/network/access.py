@@ -19,7 +19,7 @@ the newest wins, it also drops what comes faster than `MOST_PER_PERIOD` times as
 schedule says. In lockstep every message counts and two may arrive together, so there is no rate for
 it to keep: there hearers keep but few of each (`bridge.network.zenoh_link.POLLED_DEPTH`), and
 count, and of a controller that says far more than the ticks allow nothing more is taken
-(`bridge.network.floods`).
+(`bridge.network.flood_guard`).
 
 The launcher's own session is inside the router and isn't subject to the rules. Flows are named from
 the router's side: a process that publishes is an ingress put, and it must be told (egress

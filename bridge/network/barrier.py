@@ -1,9 +1,9 @@
 """Start barrier: every link that a run will use carries a message before the run begins.
 
-A process says hello on each of its publishers until everybody is ready, and is ready itself when
-it has heard a hello from everyone that it will depend on. So no message of the run can be the first
-one on its way, which a declaration still travelling could swallow. Nothing here sleeps: the wait
-for the next hello is the pause between two of one's own.
+A process sends a hello on each of its publishers until all processes are ready; it is ready itself
+when it has received a hello from every process that it depends on. So no message of the run is the
+first on its link, where a declaration still under way could swallow it. Nothing here sleeps: a
+process waits for the next hello between two rounds of its own.
 """
 
 import time

@@ -8,7 +8,6 @@ import time
 
 import zenoh
 
-from bridge.network.login import Obstacle, obstacle
 from bridge.network.session import (
     ONE_THREAD,
     WAIT_BEFORE_CLOSE,
@@ -18,6 +17,7 @@ from bridge.network.session import (
     set_key,
     settings,
 )
+from bridge.network.session_errors import Obstacle, obstacle
 from bridge.network.zenoh_link import POLLED_DEPTH, PolledLink, ZenohLink
 from bridge.process import Stop
 from bridge.waiting import readable

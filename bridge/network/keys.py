@@ -87,7 +87,7 @@ def report(run: str, process: str) -> str:
 
 
 def guest_line(user: str, line: str, channel: str) -> str:
-    """Connection of a guest to a bus or run/bus; its keys end in up, down and alive."""
+    """Key of a guest's connection to a bus or run/bus; its keys end in up, down and alive."""
     run, _, bus = channel.rpartition("/")
     chunks = (user, line, run, bus) if run else (user, line, bus)
     return f"fleetloop/@guest/{'/'.join(_chunk(chunk) for chunk in chunks)}"
@@ -104,7 +104,7 @@ def guest_relay(user: str) -> str:
 
 
 def guest_of(place: str) -> tuple[str, str] | None:
-    """The user and the channel, a bus or run/bus, of a guest's line; None if it is no line's."""
+    """The user and the channel, a bus or run/bus, of a guest's connection; None: another key."""
     chunks = place.split("/")
     if len(chunks) not in (5, 6) or not all(map(_CHUNK.fullmatch, chunks[2:])):
         return None
@@ -112,7 +112,7 @@ def guest_of(place: str) -> tuple[str, str] | None:
 
 
 def kind(key: str) -> str:
-    """Kind of message on a key: path, pose, truth, ..., or of the control plane progress, report."""
+    """Kind of message on a key: path, pose, truth, ...; of the control plane progress, report."""
     chunks = key.split("/")
     plane = chunks[2]
     return plane[1:] if plane.startswith("@") else chunks[-1]

@@ -2,10 +2,10 @@
 
 Promises of every link: a message put on a key reaches every link that subscribes to it once, in the
 order of its publisher, and never the link that put it; nothing is lost while both live; `receive`
-waits a bounded time and wakes at once. `bridge.network.zenoh_link` carries it over Zenoh.
+waits a bounded time and returns at once on a message. `zenoh_link` implements it over Zenoh.
 
-Memory is bounded: of what waits for a reader each subscription has its own room, so that who floods
-his own key crowds out nobody else. What finds no room is dropped and counted.
+Memory is bounded: each subscription has a buffer of its own for unread messages, so that a flood on
+one key displaces no messages of another. Messages beyond the buffer are dropped and counted.
 """
 
 import threading
@@ -15,11 +15,11 @@ from types import TracebackType
 from typing import NamedTuple, Protocol, Self
 
 MOST_AT_ONCE = 10_000
-"""Messages that one look takes: whoever drains comes to an end, however fast others say more."""
+"""Messages taken at a time: draining ends, however fast new messages arrive."""
 ROOM_BYTES = 1 << 18
 """Of one subscription, if the subscriber asks for no other."""
 MOST_WAITING = 1 << 14
-"""Messages of one subscription, however small: who floods with little ones takes time to read."""
+"""Messages of one subscription, however small: many small ones cost time to read."""
 _OVERHEAD_BYTES = 256
 """What a message takes besides its payload."""
 
@@ -60,7 +60,7 @@ class Link(Protocol):
         """The next message, waiting at most `timeout_s`; 0 polls."""
 
     def declare_live(self, key: str) -> None:
-        """Hold a liveliness token: seen by who watches, gone with this link."""
+        """Hold a liveliness token: seen by its subscribers, withdrawn with this link."""
 
     def watch_live(self, key_expr: str, tag: str) -> None:
         """Queue b"1" for every token that is there or comes, b"0" for every one that goes."""

@@ -17,9 +17,8 @@ import zenoh
 
 from bridge.network import zenoh_log
 from bridge.network.access import AccessPlan
-from bridge.network.denials import Denials, directives, is_ours
-from bridge.network.floods import FloodGuard, deafen
-from bridge.network.login import taken
+from bridge.network.flood_guard import FloodGuard, deafen
+from bridge.network.router_refusals import Denials, directives, is_ours
 from bridge.network.session import (
     ROUTER_THREADS,
     WAIT_BEFORE_CLOSE,
@@ -29,6 +28,7 @@ from bridge.network.session import (
     set_key,
     settings,
 )
+from bridge.network.session_errors import taken
 from bridge.network.zenoh_link import ZenohLink
 from configs.brief import LEASE_S, Outside
 from configs.errors import InfrastructureError

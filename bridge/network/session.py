@@ -1,8 +1,8 @@
 """Zenoh sessions: configuration, opening within a bound, lifetime.
 
-Client mode, multicast and gossip off, so that nobody can talk past the router; shared memory off.
-Each session keeps few threads: a message that wakes one instead of five costs half as much. In a
-router what hears and what says stay apart, so that somebody who doesn't read can't stop the rest.
+Client mode, multicast and gossip off, so that all messages pass the router; shared memory off. Each
+session has few threads: a message that wakes one instead of five costs half as much. A router has
+separate threads for receiving and sending, so that a client that doesn't read can't stop the rest.
 """
 
 import contextlib

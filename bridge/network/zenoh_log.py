@@ -2,8 +2,8 @@
 
     RUST_LOG=info fleetloop run ...    as usual for programs with Zenoh, but to standard error
 
-While a router is open the descriptor is a pipe that a thread reads, for whom it refused
-(`bridge.network.denials`); what isn't Zenoh's goes on to where the descriptor led before.
+While a router is open the descriptor is a pipe. A thread reads it for refusals by the router and
+forwards all other lines to the previous target of the descriptor.
 """
 
 import contextlib

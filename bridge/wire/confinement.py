@@ -16,9 +16,9 @@
     BUS_OFF         TEC above 255                  nothing, until restarted and after 128 times 11
                                                    recessive bits
 
-So 16 destroyed frames in a row make a sender passive and 32 take it off the bus; a lone node,
-whose frames no other node acknowledges, ends passive. The standard lets REC stop counting above 127 and come back to
-anything from 119 to 127; 120 is what bxCAN does (ST RM0008, CAN_ESR).
+So 16 destroyed frames in a row make a sender passive and 32 take it off the bus; a lone node, whose
+frames no other node acknowledges, ends passive. The standard lets REC stop counting above 127 and
+return to any value from 119 to 127; 120 is the value of bxCAN (ST RM0008, CAN_ESR).
 """
 
 from enum import IntEnum

@@ -5,17 +5,17 @@ In order, the first that applies:
     an injected error flag                        see below
     a sender at the wrong bit rate                bit error after the arbitration field; all fail
     an active listener at the wrong bit rate      the same as a stuff error, and it was the first
-    senders of one identifier, different bits     at the first bit that differs, a recessive sender
-                                                  sees a bit error: an active one destroys the frame
-                                                  for all, passive ones drop out and the rest go on
+    senders of one identifier, different bits     at the first bit that differs, recessive senders
+                                                  see a bit error: an active one destroys the frame
+                                                  for all, passive ones drop out, the rest go on
     a fault that corrupts it                      form error at the delimiter of the CRC
     nobody else to hear it                        acknowledge error after the acknowledge slot
     else                                          it passes
 
 An injected error flag is six dominant bits in a row, at once whatever is on the wire. In a frame
 that is under way it destroys it from the next bit on. At its start it destroys it at the first
-recessive bit of the frame that starts with it. On an idle wire all others see it as a stuff error after
-the sixth bit. The injecting node counts nothing.
+recessive bit of the frame that starts with it. On an idle wire all others see it as a stuff error
+after the sixth bit. The injecting node counts nothing.
 
 An error frame is the error flag, 6 bits, longer when others notice only by it (they see six
 dominant bits in a row and then send their own: 12 at most), and a delimiter of 8 bits.

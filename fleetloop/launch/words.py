@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from bridge.network import keys
 from bridge.network.link import Dropped
 from bridge.network.messages import Notice, Progress
-from bridge.network.refusals import Refusals
+from bridge.network.refused_messages import Refusals
 from bridge.network.reports import Report, decode_report
 from configs.brief import Schedule
 

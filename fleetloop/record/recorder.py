@@ -16,7 +16,7 @@ from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.client import open_client
 from bridge.network.link import Arrival, Dropped
 from bridge.network.messages import Progress, Rows
-from bridge.network.refusals import Refusals
+from bridge.network.refused_messages import Refusals
 from bridge.network.reports import Report
 from bridge.process import Stop, cpu_ns, serve
 from bridge.telemetry import AGENT_ROW, BLOCK_FRAMES, BLOCK_TICKS, FRAME_ROW, PLANT_ROW

@@ -137,7 +137,7 @@ def test_a_run_may_be_named_with_the_bus(running: Running) -> None:
 def test_an_endpoint_where_nobody_listens_and_a_refused_login_are_told_apart(
     running: Running,
 ) -> None:
-    with pytest.raises(can.CanInitializationError, match="nobody listens there"):
+    with pytest.raises(can.CanInitializationError, match="no program listens there"):
         running.open(endpoint="tcp/127.0.0.1:1", connect_timeout=0.5)
     with pytest.raises(can.CanInitializationError, match="refused the login"):
         running.open(user="stranger", password="x", connect_timeout=0.5)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from support.certificates import certificates
 
-from bridge.network.denials import MOST, Denials
+from bridge.network.router_refusals import MOST, Denials
 
 PROLOGUE = """
 import socket, sys, time

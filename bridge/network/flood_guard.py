@@ -1,18 +1,18 @@
 """Flood guard of the router: stops controllers that send far more than the schedule allows.
 
-Zenoh's own limit on rates drops messages by the time between two of them, and in lockstep no honest
-message may be dropped. So the kernel's counters of each connection are looked at instead, several
-times a second: a bucket leaks what a controller may say, and from whose runs over nothing more is
-taken. A controller says at most one path state per tick, and its rows by the block.
+Zenoh limits rates by dropping messages, and in lockstep no honest message may be dropped. So the
+guard reads the kernel's counters of each connection several times a second into a leaky bucket, and
+stops reading from a controller whose bucket overflows. A controller sends at most one path state
+per tick, and its rows in blocks.
 
     leak        `MESSAGES_PER_TICK`, `BYTES_PER_TICK` for each tick that the run went on
                 `MESSAGES_PER_S`, `BYTES_PER_S` for the start and for what isn't known here
     runs over   at `BURST_MESSAGES`, `BURST_BYTES`
 
-The kernel then drops what comes; hung up on, Zenoh's clients would be back at once. Whoever was cut
-off is so again at every login from then on (`bridge.network.denials`). The socket is Zenoh's, found
-by its descriptor as in `bridge.network.router`. Messages are counted as TCP segments with data:
-those that travel together count once, and cost as little.
+The kernel then drops what arrives: a client of Zenoh that is disconnected would reconnect at once.
+The same happens at every later login of such a user (`router_refusals`). The socket is Zenoh's,
+found by its descriptor. Messages are counted as TCP segments with data: messages that travel
+together count once, and cost as little.
 """
 
 import contextlib

@@ -1,8 +1,8 @@
 """Counts of refused messages, by sender and kind.
 
-A message may be refused because it is none (`bridge.network.messages`), because it says what can't
-be, or because there was no room for it. Nobody who reads messages fails for what they say: it is
-counted here, and the counts go with the reader's last word into the summary.
+A message is refused because it can't be decoded (`bridge.network.messages`), because its content is
+impossible, or because its buffer is full. No reader fails for the content of a message: refusals
+are counted here, and the counts go with the reader's report into the summary.
 """
 
 from collections import Counter

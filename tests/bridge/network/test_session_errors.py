@@ -93,7 +93,7 @@ def test_a_router_that_is_not_there_yet_is_waited_for(
 ) -> None:
     nowhere = NetworkLink(RUN, f"tcp/127.0.0.1:{free_port()}", "agent-r1", "word")
     said = refusal(nowhere, 0.5)
-    assert said.endswith("within 0.5 s: nobody listens there (Connection refused)")
+    assert said.endswith("within 0.5 s: no program listens there (Connection refused)")
 
 
 def test_who_listens_and_says_nothing_or_hangs_up_is_told_apart(outside: Outside) -> None:

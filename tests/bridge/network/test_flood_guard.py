@@ -7,7 +7,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from bridge.network.floods import (
+from bridge.network.flood_guard import (
     BURST_MESSAGES,
     BYTES_PER_TICK,
     MESSAGES_PER_S,

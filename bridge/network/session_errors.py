@@ -1,7 +1,6 @@
 """Causes of a failed login or listen, from the text of Zenoh's errors.
 
-Zenoh says it of a peer only; of a client it says that it could not connect. So who was refused as a
-client asks again as a peer, for the reason (`bridge.network.zenoh_link`).
+Zenoh names the cause to peers only, so a refused client asks again as a peer (`client`).
 """
 
 import re
@@ -9,7 +8,7 @@ from typing import NamedTuple
 
 
 class Obstacle(NamedTuple):
-    """What is in the way; `final`: it will not go away by itself."""
+    """Cause of a failure; `final`: retrying can't help."""
 
     text: str
     final: bool
@@ -32,7 +31,7 @@ _OBSTACLES = (
         True,
     ),
     (r"invalid peer certificate: (.+?)(?: at /|$)", "its certificate was refused here: {0}", True),
-    (r"Connection refused", "nobody listens there (Connection refused)", False),
+    (r"Connection refused", "no program listens there (Connection refused)", False),
     (
         r"(Name or service not known|No address associated|Temporary failure in name resolution)",
         "no such host ({0})",
@@ -41,7 +40,7 @@ _OBSTACLES = (
     (r"((?:Network|No route|Host) (?:is )?(?:to host|unreachable|is down))", "{0}", False),
     (
         r"early eof|Connection reset|Broken pipe",
-        "somebody listens there, and closed the connection: overloaded, another program, or tcp/"
+        "the program there closed the connection: overloaded, another program, or tcp/"
         " instead of tls/",
         False,
     ),
@@ -58,7 +57,7 @@ _TAKEN = (
 
 
 def obstacle(said: str, user: str) -> Obstacle:
-    """What Zenoh's error means for who wants to log in as `user`."""
+    """Cause of a failed login as `user`, from Zenoh's error."""
     for pattern, text, final in _OBSTACLES:
         if found := re.search(pattern, said):
             return Obstacle(text.format(*found.groups(), user=user), final)
@@ -66,7 +65,7 @@ def obstacle(said: str, user: str) -> Obstacle:
 
 
 def taken(said: str) -> str:
-    """What Zenoh's error means for who wants to listen."""
+    """Cause of a failed listen, from Zenoh's error."""
     for pattern, text in _TAKEN:
         if found := re.search(pattern, said):
             return text.format(*found.groups())

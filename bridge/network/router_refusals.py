@@ -1,16 +1,14 @@
-"""Refusals by the router, counted from Zenoh's log: logins, rights, unread messages.
+"""Refusals by the router, counted from Zenoh's log, their only source.
 
-    login    a password that is wrong, a user that is unknown, no login at all; of TLS, whose
-             identity nobody knows then, only why
-    deafness somebody who took nothing of what he asked for while others waited to say more: the
-             router cuts him off before everybody else stands still
-    rights   somebody who came with the certificate of somebody else; what somebody put, and
-             where somebody listened, without the right to
+    login    wrong password, unknown user, no login; on TLS the identity is unknown, only the cause
+    unread   a client that read nothing while others waited to send to it: the router disconnects it
+             before all other clients stand still
+    rights   a certificate of another identity; puts and subscriptions without the right to them
 
-A login is a sequence of lines about one connection (TLS, InitSyn, OpenSyn), the last of them with
-the user's name. Rights are looked up in advance when a key is declared, which says nothing, and
-then again for every message, which does; but for what comes too often (`access.downsampling`) and
-was dropped before. What is kept is bounded.
+A login is a sequence of lines about one connection (TLS, InitSyn, OpenSyn); the last one has the
+user's name. Zenoh looks up rights once when a key is declared, without a log line, and again for
+each message, with one; messages dropped earlier by rate (`access.downsampling`) leave none. Memory
+is bounded.
 """
 
 import re

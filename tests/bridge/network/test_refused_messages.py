@@ -1,6 +1,6 @@
 """What was refused is counted by sender and kind, in bounded memory."""
 
-from bridge.network.refusals import FLOOD, MOST_KINDS, Refusals
+from bridge.network.refused_messages import FLOOD, MOST_KINDS, Refusals
 
 
 def test_refusals_are_counted_and_named() -> None:
