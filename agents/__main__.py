@@ -35,7 +35,7 @@ from bridge.process import (
     settle_memory,
 )
 from bridge.profile import Sampler
-from bridge.telemetry import AGENT_ROW, RowBuffer
+from bridge.telemetry import RowBuffer, row_of
 from configs.brief import AgentBrief
 from configs.errors import FleetloopError, InfrastructureError
 from configs.roles import AGENT
@@ -70,7 +70,7 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> str:
     telemetry = link.publisher(keys.telemetry(name, robot))
     report = link.publisher(keys.report(name, AGENT.process(robot)))
     rows = RowBuffer(
-        AGENT_ROW,
+        row_of(brief.signals),
         lambda first, count, block, final: telemetry.put(Rows(first, count, block, final).encode()),
     )
     agent = Agent(brief, rows)

@@ -26,25 +26,26 @@ a message; it never reads a clock.
 
 from collections.abc import Sequence
 from math import hypot, inf, isfinite, nan
+from typing import Any
 
 from agents.admission import Admission
 from agents.coordination import CoordinationState, Coordinator
-from agents.guard import WHOLE, Guard, Passed, Phase
-from agents.laws import LAWS, LawState, Sense
-from agents.limits import EncoderCheck, held_still
+from agents.guard import WHOLE, Guard, Phase, TorqueOutcome
+from agents.laws.build import build, failure
+from agents.laws.interface import PathVariable, Reference, RobotMotion
+from agents.limits import EncoderCheck
 from agents.localisation import Localiser
 from agents.neighbours import Neighbours
-from agents.paths import Reference, robot_path
+from agents.paths import robot_path
 from bridge.frame import Frame
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.telemetry import RowBuffer
 from configs.brief import AgentBrief
-from configs.signals import LAW_SIGNALS
 
+_new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 DIVERGED = (ArithmeticError, ValueError)
 """What arithmetic raises where it ends: overflow, division by zero, the sine of infinity."""
 _NOWHERE = Reference(nan, nan, nan, nan, nan)
-_NO_SIGNALS = (nan,) * len(LAW_SIGNALS)
 POSE_HISTORY_TICKS = 64
 """In real time, a fix may be this old: the odometry since is known."""
 
@@ -61,8 +62,10 @@ class Agent:
         """Phase, faults, and what gets through to the drives."""
         self._drives = self._guard.drives
         self._path = robot_path(brief.path, brief.offset)
-        self._law = LAWS[brief.law](brief.gains, brief.wheels, self._h)
-        self._law_state: LawState | None = None
+        law = build(brief.law, brief.wheels, self._h, self._path)
+        self._law_step, self._law_hold = law.step, law.hold
+        self._no_signals = (nan,) * law.signals
+        self._law_state: Any = None  # the law's own
         self._pose_delay = brief.schedule.pose_delay_ticks
         history = POSE_HISTORY_TICKS if brief.schedule.realtime else self._pose_delay
         self._localiser = Localiser(brief.localisation, brief.wheels, history)
@@ -190,7 +193,7 @@ class Agent:
             self._guard.begin(tick)
         return self._control(tick, sense)
 
-    def _take_due(self, tick: int, sense: Sense) -> Sense:
+    def _take_due(self, tick: int, sense: RobotMotion) -> RobotMotion:
         """Use what is due at this tick, in the order of names whatever the order of arrival."""
         for robot, state in sorted(self._states.pop(tick, {}).items()):
             self._neighbours.hear(robot, state.t_ns, state.s, state.v_hat)
@@ -199,7 +202,7 @@ class Agent:
             return sense
         return self._fix(tick, fix, self._pose_delay, sense)
 
-    def _take_newest(self, tick: int, sense: Sense) -> Sense:
+    def _take_newest(self, tick: int, sense: RobotMotion) -> RobotMotion:
         """In real time: use the newest fix, as old as it is, unless it is too old to place."""
         if not self._fixes:
             return sense
@@ -210,7 +213,7 @@ class Agent:
             return sense
         return self._fix(tick, fix, ago, sense)
 
-    def _fix(self, tick: int, fix: PoseFix, ago: int, carried: Sense) -> Sense:
+    def _fix(self, tick: int, fix: PoseFix, ago: int, carried: RobotMotion) -> RobotMotion:
         """Use a fix of some ticks ago; `carried` is where the ones before have been carried on."""
         try:
             sense = self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad, ago)
@@ -225,38 +228,38 @@ class Agent:
             )
         return sense
 
-    def _control(self, tick: int, sense: Sense) -> Sequence[Frame]:
-        """Steps 1 to 11 of the law at one tick; where it diverges the robot stops."""
+    def _control(self, tick: int, motion: RobotMotion) -> Sequence[Frame]:
+        """The coordination and the law at one tick; where either diverges the robot stops."""
         t_ns = tick * self._schedule.period_ns
         v_hat, mu, s = coordination = self._coordination
         s_dot = mu + v_hat
+        n, sum_s, sum_v = self._neighbours.sums(t_ns)
+        v_r = self._leader.at(t_ns) if self._leader is not None else 0.0
+        after = self._coordinator.advance(coordination, n, sum_s, sum_v, v_r)
+        along = _new(PathVariable, (s, s_dot, (after[0] + after[1] - s_dot) / self._h))
         guard = self._guard
         try:
             reference = self._path(s)
-            out = self._law(self._law_state, sense, reference, s_dot)
-        except DIVERGED as error:
-            reference, signals = _NOWHERE, _NO_SIGNALS
-            trouble = f"the law diverged at s = {s:.4g} m: {error}"
-            frames = guard.act(tick, nan, nan, trouble)
+            out = self._law_step(self._law_state, motion, reference, along)
+        except Exception as error:  # whatever a law or a path raises ends this robot's motion only
+            reference, signals = _NOWHERE, self._no_signals
+            how, why = failure(error)
+            frames = guard.act(tick, nan, nan, f"the law {how} at s = {s:.4g} m: {why}")
         else:
-            signals = out[3]
+            signals = tuple(out[3])
             frames = guard.act(tick, out[0], out[1])
-        passed = guard.passed
-        if passed is WHOLE:
+        outcome = guard.outcome
+        if outcome is WHOLE:
             self._law_state = out.state
-        elif passed is Passed.LIMITED:
-            self._law_state = held_still(self._law_state, out.state)
-        elif passed is Passed.ANEW:
+        elif outcome is TorqueOutcome.LIMITED:
+            self._law_state = self._law_hold(self._law_state, out.state)
+        elif outcome is TorqueOutcome.ANEW:
             self._law_state = None
-        n, sum_s, sum_v = self._neighbours.sums(t_ns)
-        v_r = self._leader.at(t_ns) if self._leader is not None else 0.0
-        self._go_on(
-            t_ns * 1e-9 + self._h, self._coordinator.advance(coordination, n, sum_s, sum_v, v_r)
-        )
+        self._go_on(t_ns * 1e-9 + self._h, after)
         x_d, y_d, theta_d, _, _ = reference
-        used = (t_ns * 1e-9, *sense, s, s_dot, mu, v_hat, n, x_d, y_d, theta_d)
-        measured = (*self._drives.sent, self.late_s, self.round_trip_s)
-        self._rows.add(tick, (*used, *signals, *measured))
+        used = (t_ns * 1e-9, *motion, s, s_dot, mu, v_hat, n, x_d, y_d, theta_d)
+        sent = (*self._drives.sent, self.late_s, self.round_trip_s)
+        self._rows.add(tick, (*used, *signals, *sent))
         return frames
 
     def _go_on(self, t_s: float, after: CoordinationState) -> None:

@@ -32,7 +32,7 @@ class Phase(Enum):
     DONE = auto()
 
 
-class Passed(Enum):
+class TorqueOutcome(Enum):
     """What became of the law's torques."""
 
     WHOLE = auto()
@@ -41,7 +41,7 @@ class Passed(Enum):
     ANEW = auto()  # nothing, and the law begins again with the next tick
 
 
-WHOLE = Passed.WHOLE
+WHOLE = TorqueOutcome.WHOLE
 _DRIVING = Phase.DRIVING
 
 
@@ -67,8 +67,8 @@ class Guard:
         self.phase = Phase.ARMING
         self.begun = False
         """Whether tick 0 has come."""
-        self.passed = Passed.NOTHING
-        """What became of the torques of this tick."""
+        self.outcome = TorqueOutcome.NOTHING
+        """What became of the torques that the law asked for in this tick."""
         self.stopped_tick = 0
         self.stopped_because = ""
         """Why the robot stands still now, "" if it doesn't."""
@@ -164,12 +164,12 @@ class Guard:
     # --- from tick 0 on --------------------------------------------------------------------------
 
     def act(self, tick: int, right: float, left: float, trouble: str = "") -> Sequence[Frame]:
-        """The frames of a tick at which the law asks for these torques [N·m]; see `passed`.
+        """The frames of a tick at which the law asks for these torques [N·m]; see `outcome`.
 
         `trouble` says why it asks for none that are finite, if more is known than that.
         """
         drives, now_ns = self.drives, self._bus_time_ns(tick)
-        self.passed = Passed.NOTHING
+        self.outcome = TorqueOutcome.NOTHING
         if self.phase is not _DRIVING:
             return self._come_back(tick, now_ns)
         fault = drives.fault(now_ns)
@@ -179,11 +179,11 @@ class Guard:
             fault = trouble or "the law asks for a torque that is not finite"
         if fault is not None:
             return self._stop(tick, fault)
-        self.passed = WHOLE
+        self.outcome = WHOLE
         if self._limiter.active:
             limited = self._limiter(right, left)
             if limited != (right, left):
-                self.passed = Passed.LIMITED
+                self.outcome = TorqueOutcome.LIMITED
             right, left = limited
         return drives.torque(right, left)
 
@@ -235,7 +235,7 @@ class Guard:
         if not drives.armed:
             return drives.arm(now_ns)
         self._limiter.reset()
-        self.passed = Passed.ANEW
+        self.outcome = TorqueOutcome.ANEW
         self.stopped_because = ""
         self._change(tick, _DRIVING, "armed again")
         return drives.torque(0.0, 0.0)

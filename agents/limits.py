@@ -6,13 +6,11 @@
 φ, ν angle [rad] and speed [rad/s] of a wheel   h control period [s]   T = `FORGET_S`
 
 (2) is near 0 for an encoder that is well: a jump of the angle, or a flipped sign, shows in it at
-once, a frozen angle or a wrong speed within T. Where the limit of (1) acts, the estimates of the
-law must hold still, as they do at the law's own limit: what they would learn is the limit.
+once, a frozen angle or a wrong speed within T. Where the limit of (1) acts, the law is told so
+(`Law.hold`): what it would learn is the limit.
 """
 
 from math import exp, inf
-
-from agents.laws import LawState
 
 FORGET_S = 0.2
 
@@ -43,13 +41,6 @@ class TorqueLimiter:
         limit, step = self._limit, self._step
         torque = min(max(torque, before - step), before + step)
         return min(max(torque, -limit), limit)
-
-
-def held_still(before: LawState | None, after: LawState) -> LawState:
-    """The next state of a law whose torque was limited: filters go on, estimates don't."""
-    if before is None:
-        return after
-    return after._replace(theta_1=before.theta_1, theta_2=before.theta_2, kappa=before.kappa)
 
 
 class EncoderCheck:

@@ -18,7 +18,7 @@ a fix is taken as the nearest angle of its direction.
 from collections import deque
 from math import cos, pi, sin
 
-from agents.laws import Sense
+from agents.laws.interface import RobotMotion
 from configs.brief import Wheels
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
@@ -57,7 +57,7 @@ class Localiser:
 
     def wheels(
         self, right_wheel_rad: float, left_wheel_rad: float, right_speed: float, left_speed: float
-    ) -> Sense:
+    ) -> RobotMotion:
         """Take wheel angles [rad] and speeds [rad/s]; return the motion now."""
         if self._right is not None:
             x, y, theta = self._odometry
@@ -78,7 +78,7 @@ class Localiser:
         )
         return self._sense()
 
-    def fix(self, x: float, y: float, theta: float, ticks_ago: int = 0) -> Sense:
+    def fix(self, x: float, y: float, theta: float, ticks_ago: int = 0) -> RobotMotion:
         """Take a pose of now, or of some periods ago; return the motion now."""
         if self._fixed and self._mode == "odometry":
             return self._sense()
@@ -91,12 +91,12 @@ class Localiser:
         self._anchor = (x, y, theta, o_x, o_y, o_theta, cos(turned), sin(turned))
         return self._sense()
 
-    def _sense(self) -> Sense:
+    def _sense(self) -> RobotMotion:
         f_x, f_y, f_theta, o_x, o_y, o_theta, c, s = self._anchor
         v, omega = self._speeds
         if self._held:
-            return _new(Sense, (f_x, f_y, f_theta, v, omega))
+            return _new(RobotMotion, (f_x, f_y, f_theta, v, omega))
         x, y, theta = self._odometry
         dx, dy = x - o_x, y - o_y
         x, y, theta = f_x + (c * dx - s * dy), f_y + (s * dx + c * dy), f_theta + (theta - o_theta)
-        return _new(Sense, (x, y, theta, v, omega))
+        return _new(RobotMotion, (x, y, theta, v, omega))

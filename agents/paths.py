@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from math import atan2, cos, sin, sqrt
 from typing import NamedTuple
 
+from agents.laws.interface import Reference, RobotPath
 from configs.brief import (
     CirclePath,
     CosinePath,
@@ -30,16 +31,6 @@ from configs.brief import (
 )
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
-
-
-class Reference(NamedTuple):
-    """What the path asks for at one s."""
-
-    x: float  # [m], world
-    y: float  # [m], world
-    theta: float  # [rad], in (−π, π]
-    v_bar: float  # (10) [m per unit of s]
-    omega_bar: float  # (11) [rad per unit of s]
 
 
 class Jet(NamedTuple):
@@ -58,7 +49,6 @@ class PlanarJet(NamedTuple):
     y: Jet
 
 
-RobotPath = Callable[[float], Reference]
 _Curve = Callable[[float], PlanarJet]
 
 

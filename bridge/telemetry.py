@@ -8,10 +8,15 @@ import struct
 from collections.abc import Callable, Sequence
 
 from bridge.frame import Frame
-from configs.signals import AGENT_SIGNALS, PLANT_SIGNALS
+from configs.signals import PLANT_SIGNALS, Signal
 
-PLANT_ROW = struct.Struct(f"<{len(PLANT_SIGNALS)}d")
-AGENT_ROW = struct.Struct(f"<{len(AGENT_SIGNALS)}d")
+
+def row_of(signals: Sequence[Signal]) -> struct.Struct:
+    """The row of a table of signals."""
+    return struct.Struct(f"<{len(signals)}d")
+
+
+PLANT_ROW = row_of(PLANT_SIGNALS)
 
 BLOCK_TICKS = 128
 """Rows that are gathered before a block is sent."""

@@ -17,9 +17,11 @@ from math import inf
 from configs.drives import NO_OPTIONS
 from configs.host import Host
 from configs.parameters import Parameters
+from configs.plugins import Choice
 from configs.powertrain import Encoder, Motor, Supply
 from configs.reach import Reach
 from configs.sections import Body, Bus, Coordination, Disturbance, Drive, Mounting, Pose
+from configs.signals import Signal
 from configs.tls import TlsFiles
 
 Settings = tuple[tuple[str, str | int | float | bool], ...]
@@ -147,29 +149,6 @@ class Wheels:
     half_track_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class Gains:
-    """Gains of equations (15)-(36); see `agents.path_following` and `agents.wheel_torque`."""
-
-    k1: float  # [1/s]
-    k2: float  # [1/m]
-    k3: float  # [1/s]
-    k4: float  # [N·m·s/m, N·m·s/rad]
-    gamma_1_s: float
-    gamma_2_s: float
-    gamma_3_s: float
-    k5: tuple[float, float, float, float, float, float, float, float]  # diagonal of K_5
-    sigma_max: float  # bound σ_M of every element of Θ
-    sigma_margin: float  # k of the projection
-    eta: float  # [1/s] of (36)
-    rho: float
-    sgn_width: float  # sgn(e) is tanh(e / sgn_width)
-    theta_hat_0: tuple[float, float, float, float, float, float, float, float]
-    kappa_hat_0: float
-    v_bar_limit_m_s: float  # of the robust law
-    torque_limit_wheel_N_m: float  # of the robust law
-
-
 def when(tick: int, period_ns: int) -> str:
     """A tick in words."""
     return f"tick {tick} (t = {tick * period_ns * 1e-9:.3f} s)"
@@ -288,9 +267,9 @@ class AgentBrief:
     """Everything that one robot's controller process is told at its start."""
 
     robot: str
-    law: str  # a key of agents.laws.LAWS
+    law: Choice  # with its gains
+    signals: tuple[Signal, ...]  # of every tick, the law's among them
     wheels: Wheels
-    gains: Gains
     coordination: Coordination
     s_0: float  # the path variable at t = 0 [m]
     reach: Reach  # what neighbours can say
@@ -431,6 +410,7 @@ class RecorderBrief:
 
     path: str  # of the record
     robots: tuple[str, ...]
+    controllers: tuple[tuple[Signal, ...], ...]  # rows of their controllers
     buses: tuple[str, ...]  # whose traffic is recorded
     bus_formats: tuple[str, ...]  # "blf", "log"
     scenario_toml: str

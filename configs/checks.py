@@ -11,9 +11,11 @@ from pydantic import ValidationError
 from configs.drives import options_of
 from configs.errors import ScenarioError
 from configs.graph import parse_edge
+from configs.plugins import Recorded
 from configs.scenario import ETSRO, Scenario
 from configs.sections import Drive, Expect
-from configs.signals import expectable
+from configs.signals import PLANT_SIGNALS, SPREAD, controller_signals
+from configs.wording import MISSING, right_of
 
 MAX_NODE = 62
 """63 is the address of drives that have none."""
@@ -29,7 +31,7 @@ class Problem(NamedTuple):
 
 def cross_problems(scenario: Scenario) -> list[Problem]:
     """All problems that no section can see alone."""
-    problems = [*_names(scenario), *_periods(scenario), *_drives(scenario)]
+    problems = [*_names(scenario), *_laws(scenario), *_periods(scenario), *_drives(scenario)]
     problems += [*_host(scenario), *_expects(scenario)]
     edges = list(_edges(scenario))
     if not problems and not edges:
@@ -63,6 +65,32 @@ def _names(scenario: Scenario) -> Iterator[Problem]:
     steps = [step.t_s for step in scenario.leader.steps]
     if any(b <= a for a, b in itertools.pairwise(steps)):
         yield Problem("leader.steps", steps, "t_s must increase")
+
+
+def _laws(scenario: Scenario) -> Iterator[Problem]:
+    """What robots say differently of the law, each against the law that it has then."""
+    for robot in scenario.robot:
+        try:
+            scenario.control_of(robot)
+        except ValidationError as error:
+            for item in error.errors(include_url=False):
+                key = ".".join(str(part) for part in ("robot", robot.name, "control", *item["loc"]))
+                value = MISSING if item["type"] == "missing" else item["input"]
+                yield Problem(key, value, right_of(item))
+
+
+def _expectable(scenario: Scenario) -> list[str]:
+    """Signals that an expectation may be about; nothing if a law isn't here, of a record."""
+    known = {SPREAD, *(signal.name for signal in PLANT_SIGNALS)}
+    for robot in scenario.robot:
+        try:
+            control = scenario.control_of(robot)
+        except ValidationError:  # said already
+            continue
+        if isinstance(control.parameters, Recorded):
+            return []
+        known |= {signal.name for signal in controller_signals(control.load().SIGNALS)}
+    return sorted(known)
 
 
 def _periods(scenario: Scenario) -> Iterator[Problem]:
@@ -229,10 +257,10 @@ def _host(scenario: Scenario) -> Iterator[Problem]:
 
 
 def _expects(scenario: Scenario) -> Iterator[Problem]:
-    known = expectable()
+    known = _expectable(scenario)
     for n, expect in enumerate(scenario.expect):
         where = f"expect.{n}"
-        if expect.signal not in known:
+        if known and expect.signal not in known:
             close = difflib.get_close_matches(expect.signal, known, 1, cutoff=0.5)
             hint = f"; did you mean {close[0]}?" if close else ""
             right = f"no such signal{hint} (known: {', '.join(known)})"

@@ -11,40 +11,12 @@ from pydantic import BaseModel, ValidationError
 from configs.checks import Problem
 from configs.errors import Complaint, ScenarioError
 from configs.parameters import as_tuples
-from configs.patterns import WORDS
 from configs.scenario import Scenario
+from configs.wording import MISSING, right_of
 
-MISSING = "(missing)"
 _NOTHING = object()
 _KEY = "[key]"  # pydantic's mark for what is wrong with a key rather than its value
 
-_WORDS = {
-    "missing": "must be given",
-    "greater_than": "must be greater than {gt}",
-    "greater_than_equal": "must be {ge} or more",
-    "less_than": "must be less than {lt}",
-    "less_than_equal": "must be {le} or less",
-    "finite_number": "must be a finite number",
-    "float_type": "must be a number",
-    "float_parsing": "must be a number",
-    "int_parsing": "must be a whole number",
-    "int_type": "must be a whole number",
-    "int_from_float": "must be a whole number",
-    "int_parsing_size": "is too large",
-    "bool_type": "must be true or false",
-    "string_type": "must be a text",
-    "path_type": "must be a text, the path of a file",
-    "string_too_short": "must not be empty",
-    "string_too_long": "must have {max_length} characters or fewer",
-    "literal_error": "must be {expected}",
-    "tuple_type": "must be a list",
-    "too_short": "must have {min_length} entries or more",
-    "too_long": "must have {max_length} entries or fewer",
-    "dict_type": "must be a table",
-    "model_type": "must be a table",
-    "model_attributes_type": "must be a table",
-    "dataclass_type": "must be a table",
-}
 _UNKNOWN_KEY = {"extra_forbidden", "unexpected_keyword_argument"}
 _ROUNDS = 8
 _STAND_INS: dict[object, object] = {
@@ -79,7 +51,7 @@ def complaints(
 
 def in_words(error: ValidationError) -> str:
     """What pydantic has against one value, in our words."""
-    return _right(error.errors(include_url=False)[0])
+    return right_of(error.errors(include_url=False)[0])
 
 
 class Salvage(NamedTuple):
@@ -94,8 +66,10 @@ class Salvage(NamedTuple):
         return not any(key in text or key.startswith(f"{problem.key}.") for key in self.lost)
 
 
-def salvage(error: ValidationError, data: dict[str, Any]) -> Salvage | None:
-    """The scenario without what is wrong in it; None if too much is."""
+def salvage(
+    error: ValidationError, data: dict[str, Any], context: dict[str, Any]
+) -> Salvage | None:
+    """The scenario without what is wrong in it, read in this context; None if too much is."""
     rest = copy.deepcopy(data)
     lost: set[str] = set()
     found: ValidationError | None = error
@@ -105,7 +79,7 @@ def salvage(error: ValidationError, data: dict[str, Any]) -> Salvage | None:
         for item in _errors(found):
             lost |= _repair(rest, item)
         try:
-            scenario = Scenario.model_validate(as_tuples(rest))
+            scenario = Scenario.model_validate(as_tuples(rest), context=context)
             return Salvage(scenario, tuple(lost - {"name"}))  # nothing depends on its name
         except ValidationError as more:
             found = more
@@ -179,7 +153,7 @@ def _problem(item: dict[str, Any], data: dict[str, Any], model: type[BaseModel])
         right = f"must be one of {tags}" if tags else "must be given"
         return Problem(".".join([*names, "kind"]), tag, right)
     value = MISSING if item["type"] == "missing" else item["input"]
-    return Problem(".".join(names), value, _right(item))
+    return Problem(".".join(names), value, right_of(item))
 
 
 def _unknown(loc: Sequence[int | str], model: type[BaseModel]) -> str:
@@ -223,16 +197,6 @@ def _known_keys(loc: Sequence[int | str], model: type[BaseModel]) -> list[str]:
             (named,) = node["patternProperties"].values()
             node = resolve(named, tag)
     return sorted(node.get("properties", {}))
-
-
-def _right(item: Mapping[str, Any]) -> str:
-    kind, about = item["type"], item.get("ctx", {})
-    if kind == "value_error":
-        return str(about["error"])
-    if kind == "string_pattern_mismatch":
-        return WORDS.get(about["pattern"], f"must match {about['pattern']}")
-    shown = {k: f"{v:g}" if isinstance(v, float) else v for k, v in about.items()}
-    return _WORDS.get(kind, "is of the wrong kind").format(**shown)
 
 
 def _shown(value: object) -> str:

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from configs import patterns
 from configs.brief import OURS, Settings
 from configs.checks import Problem
-from configs.complaints import MISSING, complaints, refusal
+from configs.complaints import complaints, refusal
 from configs.errors import Complaint, ScenarioError
 from configs.files import expanded
 from configs.parameters import Name, as_tuples
@@ -27,6 +27,7 @@ from configs.roles import AGENT, ROLES, STARTED, identity_of, processes_of
 from configs.scenario import Scenario
 from configs.tls import TlsFiles
 from configs.users import read_users
+from configs.wording import MISSING
 
 Endpoint = Annotated[str, Field(pattern=patterns.ENDPOINT)]
 

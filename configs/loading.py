@@ -37,11 +37,27 @@ def load(source: str | Path, overrides: Sequence[str | Override] = ()) -> Scenar
     Raises:
         ScenarioError: no such scenario, or all that is wrong with it, a line each.
     """
-    return loads(*_read(str(source)), overrides)
+    name, text = _read(str(source))
+    folder = "" if str(source) in shipped() else str(Path(source).parent)
+    return loads(name, text, overrides, folder=folder)
 
 
-def loads(name: str, text: str, overrides: Sequence[str | Override] = ()) -> Scenario:
+def loads(
+    name: str,
+    text: str,
+    overrides: Sequence[str | Override] = (),
+    *,
+    folder: str = "",
+    recorded: bool = False,
+) -> Scenario:
     """Load a scenario from TOML text; `name` stands for the file in messages.
+
+    Args:
+        name: of the file.
+        text: of the file.
+        overrides: as `load` takes them.
+        folder: where modules of one's own are looked for first; the current one if not given.
+        recorded: it is a record's: laws and shapes that aren't here are taken as they come.
 
     Raises:
         ScenarioError: all that is wrong with it, a line each.
@@ -59,7 +75,8 @@ def loads(name: str, text: str, overrides: Sequence[str | Override] = ()) -> Sce
             found.append(done)
         else:
             applied.append(done)
-    return _check(name, data, applied, found)
+    context = {"folder": str(Path(folder).resolve()), "recorded": recorded}
+    return _check(name, data, applied, found, context)
 
 
 def to_toml(scenario: Scenario) -> str:
@@ -98,15 +115,19 @@ def _read(source: str) -> tuple[str, str]:
 
 
 def _check(
-    name: str, data: dict[str, Any], overrides: Sequence[Override], found: list[Complaint]
+    name: str,
+    data: dict[str, Any],
+    overrides: Sequence[Override],
+    found: list[Complaint],
+    context: dict[str, Any],
 ) -> Scenario:
     scenario: Scenario | None = None
     try:
-        scenario = Scenario.model_validate(as_tuples(data))
+        scenario = Scenario.model_validate(as_tuples(data), context=context)
         problems = cross_problems(scenario)
     except ValidationError as error:
         problems = complaints(error, data)
-        if (rest := salvage(error, data)) is not None:
+        if (rest := salvage(error, data, context)) is not None:
             problems += filter(rest.believes, cross_problems(rest.scenario))
     found += [blamed(name, problem, overrides) for problem in problems]
     if found or scenario is None:

@@ -1,6 +1,5 @@
 """Scenario → briefs: what each process of a run is told at its start."""
 
-from dataclasses import asdict
 from math import inf
 
 from configs import sections
@@ -13,7 +12,6 @@ from configs.brief import (
     DriveModel,
     FigureEightPath,
     FormationOffset,
-    Gains,
     HostLimits,
     LeaderBrief,
     LinePath,
@@ -37,6 +35,7 @@ from configs.drives import options_of
 from configs.parameters import extended
 from configs.reach import Reach, reach_of
 from configs.scenario import Scenario
+from configs.signals import Signal, controller_signals
 from configs.splines import Ends, chord_lengths, quintic_spline
 
 ENCODER_AGE_LIMIT_S = 0.05
@@ -83,16 +82,15 @@ def agent_brief(
 ) -> AgentBrief:
     """What the controller of robot `name` is told."""
     robot = next(robot for robot in scenario.robot if robot.name == name)
-    control = scenario.control_of(robot)
     body = scenario.body_of(robot)
     graph = scenario.topology
     drive = _drive_model(scenario, 0)
     ticks = schedule(scenario, speed, profile=profile)
     return AgentBrief(
         robot=name,
-        law=control.law,
+        law=scenario.control_of(robot),
+        signals=signals_of(scenario, robot),
         wheels=Wheels(body.wheel_radius_m, body.half_track_m),
-        gains=gains_of(control),
         coordination=scenario.coordination,
         s_0=robot.s_0,
         reach=reach(scenario),
@@ -110,9 +108,9 @@ def agent_brief(
     )
 
 
-def gains_of(control: sections.Control) -> Gains:
-    """The gains as the law has them."""
-    return Gains(**{k: v for k, v in asdict(control).items() if k != "law"})
+def signals_of(scenario: Scenario, robot: sections.Robot) -> tuple[Signal, ...]:
+    """What is recorded of a robot's controller at every tick."""
+    return controller_signals(scenario.control_of(robot).load().SIGNALS)
 
 
 def reach(scenario: Scenario) -> Reach:

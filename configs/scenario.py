@@ -10,11 +10,14 @@ from typing import Annotated, Literal
 from annotated_types import Len
 from pydantic import BaseModel, ConfigDict, Field
 
+from configs.choices import chosen_anew
 from configs.graph import Graph, generated, parse_edge, random_rooted
 from configs.host import Host
 from configs.parameters import Name, Seconds, Seed, changed
+from configs.plugins import Choice
 from configs.powertrain import Encoder, Motor, Supply
 from configs.sections import (
+    LAW,
     Body,
     Bus,
     Clock,
@@ -56,7 +59,7 @@ class Scenario(BaseModel):
     path: PathShape = Cosine(kind="cosine", start_m=(-3.5, 0.0))
     leader: Leader = Leader()
     graph: GraphSection = GraphSection(generator="chain")
-    control: Control = Control()
+    control: Control = Field(default_factory=lambda: LAW.choose({}, ""))
     coordination: Coordination = Coordination()
     localisation: Localisation = Localisation()
     bus: Bus = Bus()
@@ -115,9 +118,13 @@ class Scenario(BaseModel):
         kind = self.robot_types.get(robot.type, Body())
         return changed(kind, robot.body)
 
-    def control_of(self, robot: Robot) -> Control:
-        """The law and gains of a robot: the fleet's, with what the robot says differently."""
-        return changed(self.control, robot.control)
+    def control_of(self, robot: Robot) -> Choice:
+        """The law and gains of a robot: the fleet's, with what the robot says differently.
+
+        Raises:
+            ValidationError: what it says is wrong; not of a scenario that was checked.
+        """
+        return chosen_anew(self.control, LAW, robot.control)
 
     def mounting_of(self, robot: Robot) -> Mounting:
         """How a robot's drives are mounted: the fleet's, with what the robot says differently."""

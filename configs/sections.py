@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from annotated_types import Ge, Gt, Le, Len
 
 from configs import patterns
+from configs.choices import Changes, Chooser
 from configs.parameters import (
     MOST_S,
     Finite,
@@ -27,8 +28,7 @@ from configs.parameters import (
     changes_of,
     parameter,
 )
-
-Eight = tuple[Finite, Finite, Finite, Finite, Finite, Finite, Finite, Finite]
+from configs.plugins import LAWS, Choice, Kind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,30 +194,9 @@ class Pose(Parameters):
     theta_rad: Finite = 0.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Control(Parameters):
-    """The law and its gains, equations (15)-(36)."""
-
-    law: Literal["adaptive_dsc", "adaptive_dsc_robust"] = parameter(
-        "adaptive_dsc", "the paper's law, or the one for real rates and drives"
-    )
-    k1: Positive = 2.0
-    k2: Positive = 3.0
-    k3: Positive = 1.5
-    k4: Positive = 3.0
-    gamma_1_s: Positive = 0.01
-    gamma_2_s: Seconds = 0.01
-    gamma_3_s: Seconds = 0.01
-    k5: Eight = (0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1)
-    sigma_max: Positive = parameter(1.0, "bound of every element of Θ")
-    sigma_margin: Positive = parameter(0.1, "the projection's k")
-    eta: NotNegative = parameter(0.001, "(36) [1/s]")
-    rho: Positive = 1.0
-    sgn_width: Positive = parameter(0.001, "sgn(e) is tanh(e / sgn_width)")
-    theta_hat_0: Eight = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    kappa_hat_0: NotNegative = 0.0
-    v_bar_limit_m_s: Positive = parameter(2.0, "approach speed of the robust law")
-    torque_limit_wheel_N_m: Positive = parameter(2.0, "per wheel, of the robust law")
+LAW = Chooser(Kind.LAW, "law", LAWS, "adaptive_dsc")
+Control = Annotated[Choice, LAW]
+"""The law and its gains, in one table."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -242,15 +221,10 @@ if TYPE_CHECKING:
         """Keys of `Body`, none required."""
 
     @dataclass(frozen=True, slots=True, kw_only=True)
-    class ControlChanges(Parameters):
-        """Keys of `Control`, none required."""
-
-    @dataclass(frozen=True, slots=True, kw_only=True)
     class MountingChanges(Parameters):
         """Keys of `Mounting`, none required."""
 else:
     BodyChanges = changes_of("BodyChanges", Body)
-    ControlChanges = changes_of("ControlChanges", Control)
     MountingChanges = changes_of("MountingChanges", Mounting)
 
 
@@ -266,7 +240,7 @@ class Robot(Parameters):
     s_0: Finite = 0.0
     offset: Offset = World(kind="world")
     body: BodyChanges = parameter(BodyChanges(), "parameters that differ from its type's")
-    control: ControlChanges = parameter(ControlChanges(), "gains that differ from [control]")
+    control: Changes = parameter(Changes({}), "law and gains that differ from [control]")
     mounting: MountingChanges = parameter(MountingChanges(), "what differs from [mounting]")
     disturbance: Disturbance | None = None
     bus: Name | None = parameter(None, "robots may share one; of its own if not given")

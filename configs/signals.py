@@ -1,10 +1,12 @@
 """Every signal that a run records of every robot at every tick, and those that are made of them.
 
-The plant tells the truth about a robot; its controller tells what it used and commanded. These
-tables are the only place that knows the signals and their order: rows, record, export, figures and
-diff go by name, and a scenario's expectations are checked against them.
+The plant gives the truth about a robot; its controller gives what it used, what its law says of the
+tick (a table that the law brings) and what it commanded. A record carries the names and units of
+its rows, so everything that reads one goes by name.
 """
 
+import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 
@@ -48,28 +50,14 @@ PLANT_SIGNALS: tuple[Signal, ...] = (
 )
 """Truth of one robot at one tick, before the controller answers."""
 
-LAW_SIGNALS: tuple[Signal, ...] = (
+PATH_ERRORS: tuple[Signal, ...] = (
     Signal("x_e_m", "m", "path following error, (8)"),
     Signal("y_e_m", "m", "path following error, (8)"),
     Signal("theta_e_rad", "rad", "path following error, (8), in (−π, π]"),
-    Signal("alpha_theta_rad", "rad", "filtered virtual control, (19)"),
-    Signal("alpha_v_m_s", "m/s", "filtered virtual control, (20)"),
-    Signal("alpha_omega_rad_s", "rad/s", "filtered virtual control, (27)"),
-    Signal("xi_e1_m_s", "m/s", "speed error, (30)"),
-    Signal("xi_e2_rad_s", "rad/s", "turn rate error, (30)"),
-    Signal("theta_hat_1", "kg·m²", "estimate of c b"),
-    Signal("theta_hat_2", "N·m·s", "estimate of d̄_11"),
-    Signal("theta_hat_3", "N·m·s", "estimate of d̄_12"),
-    Signal("theta_hat_4", "kg·m²", "estimate of m̄_1"),
-    Signal("theta_hat_5", "kg·m²", "estimate of c / b"),
-    Signal("theta_hat_6", "N·m·s", "estimate of d̄_21"),
-    Signal("theta_hat_7", "N·m·s", "estimate of d̄_22"),
-    Signal("theta_hat_8", "kg·m²", "estimate of m̄_2"),
-    Signal("kappa_hat", "N·m", "estimate of the disturbance bound, (36)"),
 )
-"""What a law says of one tick."""
+"""Where the robot is, seen from itself, against its reference."""
 
-AGENT_SIGNALS: tuple[Signal, ...] = (
+USED_SIGNALS: tuple[Signal, ...] = (
     Signal("t_s", "s", "scenario time of the tick"),
     Signal("x_used_m", "m", "position that the controller used"),
     Signal("y_used_m", "m", "position that the controller used"),
@@ -84,7 +72,10 @@ AGENT_SIGNALS: tuple[Signal, ...] = (
     Signal("x_d_m", "m", "reference position, (1)"),
     Signal("y_d_m", "m", "reference position, (1)"),
     Signal("theta_d_rad", "rad", "reference heading, (8)"),
-    *LAW_SIGNALS,
+)
+"""What a controller used at one tick."""
+
+SENT_SIGNALS: tuple[Signal, ...] = (
     Signal(
         "tau_right_wheel_N_m",
         "N·m",
@@ -98,13 +89,52 @@ AGENT_SIGNALS: tuple[Signal, ...] = (
     Signal("late_s", "s", "in real time, wall time from the tick's due time to its computation"),
     Signal("round_trip_s", "s", "in real time, from the last torques sent to their feedback"),
 )
-"""One controller at one tick: what it used and what it commanded."""
+"""What a controller commanded at one tick, and how well it kept its time."""
 
 SPREAD = "s_spread"
 """max_i s_i − min_i s_i over robots [m], of what is recorded of each."""
 
+_NAME = re.compile(r"[A-Za-z](?:_?[A-Za-z0-9])*")
+_PATH_ERROR_NAMES = frozenset(signal.name for signal in PATH_ERRORS)
+_TAKEN = frozenset(
+    name.lower()
+    for name in (
+        *("tick", "robot", SPREAD),
+        *(signal.name for signal in (*PLANT_SIGNALS, *USED_SIGNALS, *SENT_SIGNALS)),
+    )
+)
 
-def expectable() -> tuple[str, ...]:
-    """What an expectation may be about, sorted."""
-    recorded = {signal.name for signal in (*PLANT_SIGNALS, *AGENT_SIGNALS)}
-    return tuple(sorted(recorded | {SPREAD}))
+
+def gives_path_errors(law: Sequence[Signal]) -> bool:
+    """Whether a law's table has `PATH_ERRORS` in it; else the controller adds them."""
+    return any(signal.name in _PATH_ERROR_NAMES for signal in law)
+
+
+def controller_signals(law: Sequence[Signal]) -> tuple[Signal, ...]:
+    """The row of a controller with a law of this table: what it used, its law's, what it sent."""
+    own = law if gives_path_errors(law) else (*PATH_ERRORS, *law)
+    return (*USED_SIGNALS, *own, *SENT_SIGNALS)
+
+
+def signals_fault(law: object) -> str | None:
+    """Why a law's table can't be recorded, None if it can."""
+    if not isinstance(law, tuple):
+        return "SIGNALS must be a tuple of Signal(name, unit, meaning)"
+    seen: set[str] = set()
+    for signal in law:
+        texts = isinstance(signal, tuple) and all(isinstance(text, str) for text in signal)
+        if not texts or len(signal) != len(Signal._fields):
+            return f"SIGNALS: {signal!r} is no Signal(name, unit, meaning)"
+        name, *about = signal
+        if not _NAME.fullmatch(name):
+            return f"SIGNALS: {name!r}: a name has letters, digits and single underscores"
+        if name.lower() in _TAKEN:
+            return f"SIGNALS: {name} is recorded of every robot already; choose another name"
+        if name.lower() in seen:
+            return f"SIGNALS: {name} comes twice (upper and lower case are one in a record)"
+        if any(not text.isprintable() for text in about):
+            return f"SIGNALS: {name}: unit and meaning must be one line"
+        seen.add(name.lower())
+    if 0 < len(_PATH_ERROR_NAMES & {name for name, *_ in law}) < len(PATH_ERRORS):
+        return f"SIGNALS: give all of {', '.join(sorted(_PATH_ERROR_NAMES))}, or none of them"
+    return None

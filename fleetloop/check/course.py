@@ -13,7 +13,8 @@ from math import cos, hypot, inf, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.paths import RobotPath, robot_path
+from agents.laws.interface import RobotPath
+from agents.paths import robot_path
 from configs.brief import WorldOffset
 from configs.checks import Problem
 from configs.complaints import refusal

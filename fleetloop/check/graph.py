@@ -15,6 +15,7 @@ from configs.graph import Graph
 from configs.scenario import Scenario
 from fleetloop.check.coordination import Forecast, Matrix, delay_margin_s, radii
 from fleetloop.check.finding import Finding, Level
+from fleetloop.check.law import lateral_gain_1_m
 from fleetloop.settling import FINAL_S, LOST_M, SETTLE_BAND
 
 SETTLED_PART = 0.1
@@ -140,7 +141,12 @@ def _leader(scenario: Scenario) -> list[Finding]:
     }
     key, slowest = min(speeds.items(), key=lambda item: item[1])
     if slowest < 0.0:
-        k2 = max(scenario.control_of(robot).k2 for robot in scenario.robot)
+        controls = [scenario.control_of(robot) for robot in scenario.robot]
+        k2 = max(
+            (gain for one in controls if (gain := lateral_gain_1_m(one)) is not None), default=0
+        )
+        if not k2:
+            return [Finding("ok", title, f"v_r ≥ {slowest:g} m/s; not known whether the law minds")]
         growth_s = -1.0 / (k2 * slowest)
         text = (
             f"v_r = {slowest:g} m/s: must be positive for the law, or y_e grows instead of"

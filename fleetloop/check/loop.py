@@ -20,9 +20,9 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.laws import LAWS, LawState, Sense
-from agents.paths import Reference
-from configs.brief import Gains, Wheels
+from agents.laws.adaptive_dsc import AdaptiveDsc, DscState
+from agents.laws.interface import PathVariable, Reference, RobotMotion
+from configs.brief import Wheels
 from plant.body import RigidBody, State
 from plant.integrate import rk4
 
@@ -36,8 +36,8 @@ MAX_PERIODS = 200
 class Loop:
     """What one robot's loops are made of."""
 
-    law: str
-    gains: Gains
+    law: type[AdaptiveDsc]
+    gains: AdaptiveDsc.Gains
     wheels: Wheels
     body: RigidBody
     period_s: float
@@ -119,7 +119,7 @@ def largest_gain(loop: Loop, name: str, v_bar: float, omega_bar: float, s_dot: f
     return bisect(stable, 0.0, getattr(loop.gains, name), 7)
 
 
-def with_gain(gains: Gains, name: str, value: float) -> Gains:
+def with_gain(gains: AdaptiveDsc.Gains, name: str, value: float) -> AdaptiveDsc.Gains:
     """Gains of which k1, k2, k3 or k4 is another."""
     match name:
         case "k1":
@@ -149,7 +149,6 @@ def _interval(loop: Loop, v_bar: float, omega_bar: float, s_dot: float, tick: in
     """
     h, periods = loop.period_s, min(loop.pose_every, MAX_PERIODS)
     late_s = min(loop.pose_delay, MAX_PERIODS) * h
-    law = LAWS[loop.law](loop.gains, loop.wheels, h)
     whole = int(loop.torque_delay_s / h)
     part = loop.torque_delay_s / h - whole
     v, omega = v_bar * s_dot, omega_bar * s_dot
@@ -157,6 +156,8 @@ def _interval(loop: Loop, v_bar: float, omega_bar: float, s_dot: float, tick: in
     at = _Frame(v, omega)
     steady = _steady_torques(loop.body, v, omega)
     size = 8 + 2 * (whole + 1)
+    law = loop.law(loop.gains, loop.wheels, h, lambda _: Reference(0.0, 0.0, 0.0, v_bar, omega_bar))
+    along = PathVariable(0.0, s_dot, 0.0)
 
     def run(deviation: Vector) -> Vector:
         x, y, theta, dv, domega, a_theta, a_v, a_omega = deviation[:8].tolist()
@@ -166,14 +167,15 @@ def _interval(loop: Loop, v_bar: float, omega_bar: float, s_dot: float, tick: in
             for r, left in deviation[8:size].reshape(-1, 2).tolist()
         )
         fix = at.in_world(-late_s, *deviation[size:].tolist())
-        memory = LawState(a_theta, v + a_v, omega + a_omega, *rows, 0.0)  # type: ignore[arg-type]
+        memory = DscState(a_theta, v + a_v, omega + a_omega, *rows, 0.0)  # type: ignore[arg-type]
         pose = (x, y, theta)
         for n in range(periods):
             t = n * h
             if n == tick:
                 pose = at.in_path(t, state.x, state.y, state.theta)
             reference = Reference(*at.in_world(t, 0.0, 0.0, 0.0), v_bar, omega_bar)
-            out = law(memory, Sense(*fix, state.v, state.omega), reference, s_dot)
+            motion = RobotMotion(*fix, state.v, state.omega)
+            out = law.step(memory, motion, reference, along)
             memory = out.state._replace(theta_1=memory.theta_1, theta_2=memory.theta_2, kappa=0.0)
             torques.append((out.tau_right, out.tau_left))
             if part > 0.0:

@@ -5,7 +5,7 @@ It is the run itself, with the run's own controllers, drives and bodies, but not
 short scenarios are rehearsed to their end.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,9 +14,9 @@ from bridge.network.messages import Progress
 from bridge.process import Stop
 from configs.brief import NetworkLink
 from configs.errors import FleetloopError
-from configs.resolve import agent_brief, leader_brief, plant_brief, schedule
+from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of
 from configs.scenario import Scenario
-from configs.signals import AGENT_SIGNALS
+from configs.signals import Signal
 from fleetloop.check.finding import Finding
 from fleetloop.launch.in_process import InProcessRun
 from fleetloop.record.writer import Source
@@ -29,7 +29,6 @@ _TICK_S, _SUBSTEP_S, _WIRE_S = 40e-6, 20e-6, 250e-6
 FINAL_S = 4.0
 """Its end, where errors should be small: shorter than a run's, as a rehearsal is."""
 _TITLE = "rehearsal"
-_ROW = np.dtype([(signal.name, "<f8") for signal in AGENT_SIGNALS])
 
 
 @dataclass(slots=True)
@@ -48,8 +47,9 @@ class _Notebook:
     def traffic(self, bus: str, frames: bytes) -> None:
         pass
 
-    def rows(self, robot: str) -> np.ndarray:
-        return np.frombuffer(b"".join(self.blocks.get(robot, [])), _ROW)
+    def rows(self, robot: str, signals: Sequence[Signal]) -> np.ndarray:
+        layout = np.dtype([(signal.name, "<f8") for signal in signals])
+        return np.frombuffer(b"".join(self.blocks.get(robot, [])), layout)
 
 
 def rehearse(scenario: Scenario) -> list[Finding]:
@@ -109,7 +109,10 @@ def _part(scenario: Scenario, until_s: float) -> Scenario:
 
 def _errors(scenario: Scenario, notebook: _Notebook, said: str, *, whole: bool) -> list[Finding]:
     """Robots that are off their paths, or apart, at the end of what was rehearsed."""
-    rows = {robot.name: notebook.rows(robot.name) for robot in scenario.robot}
+    rows = {
+        robot.name: notebook.rows(robot.name, signals_of(scenario, robot))
+        for robot in scenario.robot
+    }
     period_s = schedule(scenario).period_s
     found = []
     last = {robot: part[_final(part, period_s) :] for robot, part in rows.items() if len(part)}

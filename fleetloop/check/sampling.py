@@ -3,23 +3,28 @@
 A torque comes late by the time of its frames on the wire, the firmware's latency, the motor's
 current loop and the drive's velocity estimator. With a known delay, half of the speed loop's limit
 is a good gain: k_4 = 0.25 min(m̄)/h where torques come one period late.
+
+The speed loop is looked at for every law that has one (`Law.speed_gain_N_m_s`), the channel for the
+dynamic surface laws: it is built of their filters.
 """
 
 from collections.abc import Iterator
 from dataclasses import replace
 from math import inf
+from typing import Any
 
 import numpy as np
 
 from bridge.frame import Frame
 from bridge.wire.bits import frame_bits
 from configs.brief import Wheels
-from configs.resolve import gains_of, schedule
+from configs.resolve import schedule
 from configs.scenario import Scenario
 from configs.sections import Robot
 from fleetloop.check.body import inertias, robot_body
 from fleetloop.check.course import Course
 from fleetloop.check.finding import Finding, Level
+from fleetloop.check.law import is_adaptive_dsc, speed_gain
 from fleetloop.check.loop import (
     Loop,
     bisect,
@@ -48,6 +53,19 @@ def sampling_findings(scenario: Scenario, courses: list[Course]) -> Iterator[Fin
     known: dict[tuple[object, ...], list[Finding]] = {}
     for course in courses:
         robot = course.robot
+        if not is_adaptive_dsc(scenario.control_of(robot)):
+            gain = speed_gain(scenario.control_of(robot))
+            if gain is not None:
+                rate = scenario.clock.control_period_s, torque_delay_s(scenario)
+                finding = _speed_loop(
+                    gain,
+                    *rate,
+                    min(inertias(scenario.body_of(robot))),
+                    bounded=bool(limits(scenario, robot)),
+                )
+                yield replace(finding, robots=(robot.name,))
+            yield from _held_pose(scenario, course)
+            continue
         loop = loop_of(scenario, robot)
         arcs = _arcs(course)
         alike = (
@@ -62,7 +80,9 @@ def sampling_findings(scenario: Scenario, courses: list[Course]) -> Iterator[Fin
         if alike not in known:
             known[alike] = [
                 _speed_loop(
-                    loop,
+                    loop.gains.k4,
+                    loop.period_s,
+                    loop.torque_delay_s,
                     min(inertias(scenario.body_of(robot))),
                     bounded=bool(limits(scenario, robot)),
                 ),
@@ -77,10 +97,11 @@ def loop_of(scenario: Scenario, robot: Robot) -> Loop:
     control, body = scenario.control_of(robot), scenario.body_of(robot)
     ticks = schedule(scenario)
     external = scenario.localisation.source == "external"
-    # Limits aside: the channel is what happens close to the path.
-    gains = replace(gains_of(control), torque_limit_wheel_N_m=inf)
+    gains: Any = control.parameters
+    if hasattr(gains, "torque_limit_wheel_N_m"):  # the channel is what happens close to the path
+        gains = replace(gains, torque_limit_wheel_N_m=inf)
     return Loop(
-        control.law,
+        control.load(),
         gains,
         Wheels(body.wheel_radius_m, body.half_track_m),
         robot_body(body),
@@ -114,13 +135,12 @@ def _arcs(course: Course) -> list[tuple[float, float, float]]:
     return [(float(course.v_bar[n]), float(course.omega_bar[n]), s_dot) for n in places]
 
 
-def _speed_loop(loop: Loop, inertia: float, *, bounded: bool) -> Finding:
+def _speed_loop(k4: float, h: float, late_s: float, inertia: float, *, bounded: bool) -> Finding:
     """k_4 against rate and delay; `bounded` torques swing, others grow without end."""
-    h = loop.period_s
-    gain, delay = loop.gains.k4 * h / inertia, loop.torque_delay_s / h
+    gain, delay = k4 * h / inertia, late_s / h
     most = bisect(lambda k: speed_loop_radius(k, delay) < 1.0, 0.0, 4.0, 24)
     title = "sampled speed loop k4 h / min(m̄)"
-    late = f" with torques {1e3 * loop.torque_delay_s:.2g} ms late" if delay else ""
+    late = f" with torques {1e3 * late_s:.2g} ms late" if delay else ""
     said = f"{gain:.3g}, stable below {most:.3g}{late}"
     suits = 0.25 * min(most, 1.0) * inertia / h
     remedy = f"control.k4 = {suits:.3g} suits this rate"

@@ -14,16 +14,18 @@ from math import hypot, inf, isfinite
 
 import numpy as np
 
-from agents.laws import LAWS, LawState, Sense
-from agents.path_following import path_errors, smoothing
-from configs.brief import Gains, Wheels
-from configs.resolve import gains_of
+from agents.laws.adaptive_dsc import AdaptiveDsc, DscState
+from agents.laws.build import build, failure
+from agents.laws.dsc_terms import path_errors, smoothing
+from agents.laws.interface import PathVariable, RobotMotion
+from configs.brief import Wheels
 from configs.scenario import Scenario
 from configs.sections import Robot
 from fleetloop.check.body import robot_body
 from fleetloop.check.coordination import Forecast
 from fleetloop.check.course import path_of
 from fleetloop.check.finding import Finding
+from fleetloop.check.law import is_adaptive_dsc, normalises
 from fleetloop.check.torque import limits
 from plant.body import State
 from plant.integrate import rk4
@@ -44,6 +46,7 @@ class _Start:
     ratio: float = 0.0  # h Σ k_5 F² / k_4
     ratio_at_s: float = 0.0
     diverged_at_s: float | None = None
+    failed: str = ""  # how and why a law or path raised
 
 
 def start_findings(scenario: Scenario, ahead: Forecast) -> Iterator[Finding]:
@@ -54,17 +57,18 @@ def start_findings(scenario: Scenario, ahead: Forecast) -> Iterator[Finding]:
     for n, robot in enumerate(scenario.robot):
         seen = _start(scenario, robot, ahead, n, ticks)
         yield _first_torque(scenario, robot, seen)
-        if scenario.control_of(robot).law == "adaptive_dsc":
+        control = scenario.control_of(robot)
+        if is_adaptive_dsc(control) and not normalises(control):
             yield _adaptation(robot, seen)
 
 
 def _start(scenario: Scenario, robot: Robot, ahead: Forecast, number: int, ticks: int) -> _Start:
     """Integrate law and body over the first ticks."""
     control, section = scenario.control_of(robot), scenario.body_of(robot)
-    gains = gains_of(control)
     body, h = robot_body(section), scenario.clock.control_period_s
-    law = LAWS[control.law](gains, Wheels(section.wheel_radius_m, section.half_track_m), h)
     path = path_of(scenario, robot)
+    law = build(control, Wheels(section.wheel_radius_m, section.half_track_m), h, path)
+    gains = control.parameters
     most = min((limit.torque_wheel_N_m for limit in limits(scenario, robot)), default=inf)
     instants = h * np.arange(ticks)
     places = np.interp(instants, ahead.t_s, ahead.s[:, number]).tolist()
@@ -73,17 +77,24 @@ def _start(scenario: Scenario, robot: Robot, ahead: Forecast, number: int, ticks
     state = State(pose.x_m, pose.y_m, pose.theta_rad, robot.v_m_s, robot.omega_rad_s, 0.0, 0.0)
     steps = max(1, round(h / _STEP_S))
     seen, memory = _Start(), None
-    for tick, (s, s_dot) in enumerate(zip(places, speeds, strict=True)):
-        sense = Sense(state.x, state.y, state.theta, state.v, state.omega)
-        out = law(memory, sense, path(s), s_dot)
+    rates = np.gradient(np.array(speeds), h).tolist() if ticks > 1 else [0.0]
+    for tick, along in enumerate(zip(places, speeds, rates, strict=True)):
+        motion = RobotMotion(state.x, state.y, state.theta, state.v, state.omega)
+        try:
+            out = law.step(memory, motion, path(along[0]), PathVariable(*along))
+        except Exception as error:
+            how, why = failure(error)
+            seen.diverged_at_s, seen.failed = tick * h, f"{how}: {why}"
+            return seen
         asked = max(abs(out.tau_right), abs(out.tau_left))
         if tick == 0:
             seen.first_wheel_N_m = asked
         if asked > seen.asked_wheel_N_m:
             seen.asked_wheel_N_m, seen.asked_at_s = asked, tick * h
-        ratio = _ratio(gains, h, memory, out.state, sense)
-        if ratio > seen.ratio:
-            seen.ratio, seen.ratio_at_s = ratio, tick * h
+        if isinstance(gains, AdaptiveDsc.Gains):
+            ratio = _ratio(gains, h, memory, out.state, motion)
+            if ratio > seen.ratio:
+                seen.ratio, seen.ratio_at_s = ratio, tick * h
         right, left = (min(max(t, -most), most) for t in (out.tau_right, out.tau_left))
         memory = out.state
         for _ in range(steps):
@@ -95,7 +106,13 @@ def _start(scenario: Scenario, robot: Robot, ahead: Forecast, number: int, ticks
     return seen
 
 
-def _ratio(gains: Gains, h: float, before: LawState | None, after: LawState, sense: Sense) -> float:
+def _ratio(
+    gains: AdaptiveDsc.Gains,
+    h: float,
+    before: DscState | None,
+    after: DscState,
+    motion: RobotMotion,
+) -> float:
     """How large h Σ k_5 F² / k_4 is in the worse row of (32); α' from how far a filter moved."""
     if before is None:
         return 0.0
@@ -106,7 +123,7 @@ def _ratio(gains: Gains, h: float, before: LawState | None, after: LawState, sen
             (after.alpha_omega, before.alpha_omega, gains.gamma_3_s),
         )
     )
-    v, omega = sense.v, sense.omega
+    v, omega = motion.v, motion.omega
     rows = (omega * omega, v, omega, rate_v), (v * omega, v, omega, rate_omega)
     k5 = gains.k5[:4], gains.k5[4:]
     sizes = [
@@ -123,8 +140,11 @@ def _first_torque(scenario: Scenario, robot: Robot, seen: _Start) -> Finding:
     bounds = [
         limit for limit in limits(scenario, robot) if limit.key != "control.torque_limit_wheel_N_m"
     ]
-    paper = scenario.control_of(robot).law == "adaptive_dsc"
-    if bounds and paper:
+    if seen.failed:
+        text = f"{off}: the law {seen.failed}, {seen.diverged_at_s:.3g} s after the start"
+        return Finding("error", title, text, (robot.name,), "control.law")
+    control = scenario.control_of(robot)
+    if bounds and is_adaptive_dsc(control) and not normalises(control):
         limit = min(bounds, key=lambda one: one.torque_wheel_N_m)
         if seen.asked_wheel_N_m > limit.torque_wheel_N_m:
             text = (

@@ -26,6 +26,7 @@ from configs.sections import Body, Robot
 from fleetloop.check.body import inertias
 from fleetloop.check.course import Course, Series
 from fleetloop.check.finding import Finding, Level
+from fleetloop.check.law import approach_rate_1_s, speed_gain, torque_limit_wheel_N_m
 
 START_S = 0.5
 """Accelerations from rest aren't looked at: how fast a robot gets going is its law's business."""
@@ -88,12 +89,9 @@ def limits(scenario: Scenario, robot: Robot) -> list[Limit]:
     """All that bounds a wheel's torque."""
     control, host, drive = scenario.control_of(robot), scenario.host, scenario.drive
     found = []
-    if control.law == "adaptive_dsc_robust":
-        found.append(
-            Limit(
-                "control.torque_limit_wheel_N_m", "the law's limit", control.torque_limit_wheel_N_m
-            )
-        )
+    own_N_m = torque_limit_wheel_N_m(control)
+    if own_N_m < inf:
+        found.append(Limit("control.torque_limit_wheel_N_m", "the law's limit", own_N_m))
     if host.torque_limit_wheel_N_m is not None:
         found.append(
             Limit("host.torque_limit_wheel_N_m", "the host's limit", host.torque_limit_wheel_N_m)
@@ -200,11 +198,12 @@ def _behind(scenario: Scenario, course: Course, need: Need, bounds: list[Limit])
         for b in bounds
     ]
     part = np.clip(np.min(parts, axis=0), 0.0, 10.0)
-    k1 = scenario.control_of(course.robot).k1
+    rate = approach_rate_1_s(scenario.control_of(course.robot))
+    k1 = inf if rate is None else rate
     steps = np.diff(course.t_s, append=2 * course.t_s[-1] - course.t_s[-2] if len(part) > 1 else 0)
     lag, lags = 0.0, []
     for f, v, dt in zip(part.tolist(), np.abs(course.v).tolist(), steps.tolist(), strict=True):
-        gained = (1.0 - f) * v if f < 1.0 else -min(k1 * lag, (f - 1.0) * v)
+        gained = (1.0 - f) * v if f < 1.0 else -min(k1 * lag if lag else 0.0, (f - 1.0) * v)
         lag = max(lag + gained * dt, 0.0)
         lags.append(lag)
     return np.array(lags)
@@ -277,7 +276,10 @@ def _slew(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:
     if slew is None:
         return
     control, body = scenario.control_of(course.robot), scenario.body_of(course.robot)
-    lag_s = min(inertias(body)) / control.k4
+    gain = speed_gain(control)
+    if gain is None:
+        return
+    lag_s = min(inertias(body)) / gain
     takes_s = float(np.abs(need.torque_wheel_N_m).max()) / slew
     if takes_s > lag_s:
         yield Finding(

@@ -15,7 +15,7 @@ from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.frame import Frame
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix, Progress
 from bridge.process import Stop, settled_memory
-from bridge.telemetry import AGENT_ROW, PLANT_ROW, FrameBuffer, RowBuffer
+from bridge.telemetry import PLANT_ROW, FrameBuffer, RowBuffer, row_of
 from configs.brief import AgentBrief, LeaderBrief, PlantBrief
 from fleetloop.record.writer import Source
 from plant.bus.build import build_buses
@@ -131,7 +131,7 @@ class InProcessRun:
             for robot in self._robots
         ]
         self._telemetry = [
-            RowBuffer(AGENT_ROW, partial(_write, writer, brief.robot, "controller"))
+            RowBuffer(row_of(brief.signals), partial(_write, writer, brief.robot, "controller"))
             for brief in agents
         ]
         self._agents = [

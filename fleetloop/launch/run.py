@@ -13,7 +13,7 @@ from configs.deployment import Deployment, load_deployment
 from configs.errors import InfrastructureError, ScenarioError
 from configs.loading import load, to_toml
 from configs.overrides import Overrides
-from configs.resolve import agent_brief, leader_brief, plant_brief, schedule
+from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of
 from configs.roles import short_name
 from configs.scenario import Scenario
 from fleetloop.check.examine import examine
@@ -165,7 +165,7 @@ def _in_process(
         with (
             RunRecord(
                 record,
-                scenario.names,
+                {robot.name: signals_of(scenario, robot) for robot in scenario.robot},
                 to_toml(scenario),
                 period_ns,
                 buses=scenario.buses,

@@ -13,7 +13,7 @@ from bridge.can_bus import sockets
 from configs.brief import AgentBrief, NetworkLink, PlantBrief, RecorderBrief
 from configs.deployment import Deployment
 from configs.loading import to_toml
-from configs.resolve import agent_brief, plant_brief, schedule
+from configs.resolve import agent_brief, plant_brief, schedule, signals_of
 from configs.roles import AGENT, PLANT, RECORDER, STARTED
 from configs.scenario import Scenario
 from fleetloop.launch import placement
@@ -126,6 +126,7 @@ def _recorder(place: Place) -> RecorderBrief:
     return RecorderBrief(
         str(orders.record),
         orders.scenario.names,
+        tuple(signals_of(orders.scenario, robot) for robot in orders.scenario.robot),
         _recorded(orders),
         orders.scenario.bus.record,
         to_toml(orders.scenario),

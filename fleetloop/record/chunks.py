@@ -17,7 +17,7 @@ from mcap.opcode import Opcode
 
 from fleetloop.record import schema
 from fleetloop.record.head import PREFIX, encoded
-from fleetloop.record.schema import Kind
+from fleetloop.record.schema import Kind, Layout
 
 CHUNK_TICKS = 512
 _ZSTD_LEVEL = 1
@@ -73,8 +73,9 @@ class ChunkWriter:
 class ChunkReader:
     """Unpacks chunks of a file in their order, and refuses any that isn't what was written."""
 
-    def __init__(self, robots: int) -> None:
-        self._channels = range(1, robots * len(Kind) + 1)
+    def __init__(self, layout: Layout) -> None:
+        self._layout = layout
+        self._channels = range(1, len(layout.robots) * len(Kind) + 1)
         self._next_tick = dict.fromkeys(self._channels, 0)
         self._decompress = zstandard.ZstdDecompressor().decompress
 
@@ -102,7 +103,7 @@ class ChunkReader:
         return channel, messages
 
     def _messages(self, packed: bytes, size: int, crc: int, channel: int) -> np.ndarray:
-        layout = schema.MESSAGE_TYPES[schema.kind_of(channel)]
+        layout = self._layout.message_type(channel)
         if not 0 < size <= CHUNK_TICKS * layout.itemsize or size % layout.itemsize:
             raise DamageError(f"a chunk of {size} bytes, not 1 to {CHUNK_TICKS} messages")
         try:

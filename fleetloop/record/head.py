@@ -20,11 +20,12 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
 from fleetloop.record import schema
+from fleetloop.record.schema import Kind, Layout
 
 MAGIC = b"\x89MCAP0\r\n"
 LIBRARY = "fleetloop"
 SCENARIO = "scenario.toml"
-_VERSION, _CRC = "version", "crc32_of_all_before"
+_VERSION, _CRC, _SIGNALS = "version", "crc32_of_all_before", "signals"
 PREFIX = struct.Struct("<BQ")
 """What every record of MCAP begins with: its opcode and the length of its content."""
 _Records = Sequence[tuple[int, bytes]]
@@ -35,7 +36,7 @@ class Head(NamedTuple):
     """The head of a record, as its bytes and as what the summary repeats of it."""
 
     data: bytes
-    robots: tuple[str, ...]
+    layout: Layout
     scenario_toml: str
     schemas: tuple[records.Schema, ...]
     channels: tuple[records.Channel, ...]
@@ -47,22 +48,16 @@ class HeadError(Exception):
     """It isn't the head of a record; the text says why."""
 
 
-def build(robots: Sequence[str], scenario_toml: str) -> Head:
+def build(layout: Layout, scenario_toml: str) -> Head:
     """The head of a new record."""
     schemas = tuple(
-        records.Schema(id=kind + 1, name=name, encoding="ros2msg", data=text.encode())
-        for kind, (name, text) in schema.SCHEMAS.items()
+        records.Schema(id=number, name=name, encoding="ros2msg", data=text.encode())
+        for number, name, text in layout.schemas()
     )
     channels = tuple(
-        records.Channel(
-            id=schema.channel_id(number, kind),
-            schema_id=kind + 1,
-            topic=schema.topic(robot, kind),
-            message_encoding="cdr",
-            metadata={},
-        )
-        for number, robot in enumerate(robots)
-        for kind in schema.Kind
+        _channel(layout, schema.channel_id(number, kind), robot, kind)
+        for number, robot in enumerate(layout.robots)
+        for kind in Kind
     )
     data = MAGIC + b"".join(
         map(encoded, (records.Header(profile="ros2", library=LIBRARY), *schemas, *channels))
@@ -90,12 +85,23 @@ def build(robots: Sequence[str], scenario_toml: str) -> Head:
     metadata_index = records.MetadataIndex(len(data), len(said), LIBRARY)
     return Head(
         data + said,
-        tuple(robots),
+        layout,
         scenario_toml,
         schemas,
         channels,
         attachment_index,
         metadata_index,
+    )
+
+
+def _channel(layout: Layout, channel: int, robot: str, kind: Kind) -> records.Channel:
+    names = [] if kind is Kind.POSE else [signal.name for signal in layout.signals(channel)]
+    return records.Channel(
+        id=channel,
+        schema_id=layout.schema_number(channel),
+        topic=schema.topic(robot, kind),
+        message_encoding="cdr",
+        metadata={_SIGNALS: " ".join(names)} if names else {},
     )
 
 
@@ -124,14 +130,9 @@ def understood(found: _Records, crc: int) -> Head:
             raise HeadError("of another version of Fleetloop, or damaged: no check sum of its head")
         if said.metadata[_CRC] != f"{crc:08x}":
             raise HeadError("damaged: the check sum of its head differs")
-        robots = [
-            channel.topic.split("/")[1]
-            for channel in _all_of(records.Channel, Opcode.CHANNEL, found)
-            if channel.topic.endswith("/plant")
-        ]
         (attachment,) = _all_of(records.Attachment, Opcode.ATTACHMENT, found)
-        head = build(robots, attachment.data.decode())
-    except (McapError, ValueError, IndexError, struct.error) as error:
+        head = build(_layout(found), attachment.data.decode())
+    except (McapError, ValueError, LookupError, struct.error) as error:
         raise HeadError(f"damaged: its head says nothing ({str(error) or 'too short'})") from error
     if list(found[:-1]) != _parts(head):
         writer = said.metadata.get(_VERSION, "?")
@@ -151,6 +152,21 @@ def _all_of(kind: type[_Kind], opcode: Opcode, found: _Records) -> list[_Kind]:
         for number, content in found
         if number == opcode
     ]
+
+
+def _layout(found: _Records) -> Layout:
+    """Robots and tables; without names in the metadata, of another version, no table."""
+    texts = {one.id: one.data.decode() for one in _all_of(records.Schema, Opcode.SCHEMA, found)}
+    robots = {
+        channel.topic.split("/")[1]: schema.signals_of(
+            channel.metadata[_SIGNALS], texts[channel.schema_id]
+        )
+        if _SIGNALS in channel.metadata
+        else ()
+        for channel in _all_of(records.Channel, Opcode.CHANNEL, found)
+        if channel.topic.endswith("/controller")
+    }
+    return Layout.of(robots)
 
 
 def _parts(head: Head) -> list[tuple[int, bytes]]:

@@ -8,7 +8,7 @@ room. A file that lost its end (its writer was killed) is whole again after
 """
 
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Self
 
@@ -20,6 +20,7 @@ from fleetloop.record.append import AppendedFile
 from fleetloop.record.chunks import ChunkWriter
 from fleetloop.record.head import MAGIC, Head, build, encoded
 from fleetloop.record.scan import RecordError, Written, end_record, scan
+from fleetloop.record.schema import Layout
 
 _LOST_BYTES = 1024
 """The reason that the end gives is cut off there."""
@@ -42,13 +43,13 @@ class McapFile:
         self._tail_bytes = len(self._tail("")) + _LOST_BYTES + channels
 
     @classmethod
-    def create(cls, path: Path, robots: Sequence[str], scenario_toml: str) -> Self:
-        """Begin a new file for these robots.
+    def create(cls, path: Path, layout: Layout, scenario_toml: str) -> Self:
+        """Begin a new file of this layout.
 
         Raises:
             InfrastructureError: it can't be written; no file of it stays.
         """
-        head = build(robots, scenario_toml)
+        head = build(layout, scenario_toml)
         try:
             file = AppendedFile(path)
         except OSError as error:

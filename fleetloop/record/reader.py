@@ -14,8 +14,8 @@ from fleetloop.record.schema import Kind
 class Record:
     """A run's record: per robot and source a structured array, one element per tick from tick 0 on.
 
-    Fields are `tick` and the signals of `configs.signals` by name. Sources are as long as they
-    were: a controller that ended early has fewer rows than the others.
+    Fields are `tick` and the signals by name, of a controller its law's among them. Sources are as
+    long as they were: a controller that ended early has fewer rows than the others.
     """
 
     path: Path
@@ -48,17 +48,18 @@ class Record:
         found = scan(path, take)
         if found.damaged and not damaged:
             raise RecordError(f"{path}: {found.lost}; --partial takes what is before it")
-        robots = found.head.robots
+        layout = found.head.layout
 
         def rows(kind: Kind) -> dict[str, np.ndarray]:
-            empty = np.empty(0, schema.ROW_TYPES[kind])
-            return {
-                robot: np.concatenate([empty, *blocks.get((number, kind), [])])
-                for number, robot in enumerate(robots)
-            }
+            made = {}
+            for number, robot in enumerate(layout.robots):
+                empty = np.empty(0, layout.row_type(schema.channel_id(number, kind)))
+                made[robot] = np.concatenate([empty, *blocks.get((number, kind), [])])
+            return made
 
         plant, controller = rows(Kind.PLANT), rows(Kind.CONTROLLER)
-        return cls(path, robots, plant, controller, found.head.scenario_toml, found.lost)
+        toml = found.head.scenario_toml
+        return cls(path, layout.robots, plant, controller, toml, found.lost)
 
     def shortage(self) -> str:
         """What isn't in it and how much is; empty if it is all there."""

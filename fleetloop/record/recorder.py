@@ -19,7 +19,7 @@ from bridge.network.messages import Progress, Rows
 from bridge.network.refused_messages import Refusals
 from bridge.network.reports import Report
 from bridge.process import Stop, cpu_ns, serve
-from bridge.telemetry import AGENT_ROW, BLOCK_FRAMES, BLOCK_TICKS, FRAME_ROW, PLANT_ROW
+from bridge.telemetry import BLOCK_FRAMES, BLOCK_TICKS, FRAME_ROW, PLANT_ROW, row_of
 from configs.brief import RecorderBrief
 from configs.roles import RECORDER
 from fleetloop.record.can_log import frames_of
@@ -36,7 +36,6 @@ GAPS = 8
 ROOM_BYTES = 1 << 26
 """Of what waits of one source: a slow disk may take its time."""
 _WHOSE = {"plant": "the plant for {}", "controller": "{}'s controller", "can": "bus {}"}
-_ROW_SIZES = {"plant": PLANT_ROW.size, "controller": AGENT_ROW.size, "can": FRAME_ROW.size}
 
 
 class _Recorder:
@@ -48,6 +47,10 @@ class _Recorder:
         self._gaps: Counter[str] = Counter()  # blocks in a row that leave one, by source
         sources = {f"{kind}/{r}" for r in brief.robots for kind in ("plant", "controller")}
         sources |= {f"can/{bus}" for bus in brief.buses}
+        sizes = zip(brief.robots, (row_of(one).size for one in brief.controllers), strict=True)
+        self._row_sizes = {f"controller/{robot}": size for robot, size in sizes}
+        self._row_sizes |= {f"plant/{robot}": PLANT_ROW.size for robot in brief.robots}
+        self._row_sizes |= {f"can/{bus}": FRAME_ROW.size for bus in brief.buses}
         self.unheard = set(sources)
         self.unfinished = set(sources)
         self.undecodable = 0
@@ -56,7 +59,7 @@ class _Recorder:
     def take(self, arrival: Arrival) -> bool:
         """Take what may be taken; return whether the record has more now."""
         kind, _, robot = arrival.tag.partition("/")
-        rows = Rows.decode(arrival.payload, _ROW_SIZES[kind])
+        rows = Rows.decode(arrival.payload, self._row_sizes[arrival.tag])
         wrong = "not well formed" if rows is None else self._wrong(kind, robot, rows)
         if rows is None or wrong is not None:
             self.undecodable += rows is None
@@ -141,7 +144,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         open_client(brief.network, brief.start_deadline_s) as link,
         RunRecord(
             Path(brief.path),
-            brief.robots,
+            dict(zip(brief.robots, brief.controllers, strict=True)),
             brief.scenario_toml,
             brief.period_ns,
             buses=brief.buses,

@@ -1,13 +1,14 @@
 """Everything that a run records: signals in `record.mcap`, each bus in `can/`."""
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from configs.errors import InfrastructureError
+from configs.signals import Signal
 from fleetloop.record.can_log import CanLogWriter
 from fleetloop.record.writer import RecordWriter, Source
 
@@ -19,6 +20,7 @@ class RunRecord:
 
     Args:
         path: of the record; recordings of the buses go to the folder `can` beside it.
+        robots: each with the table of its controller's rows.
         buses: names of the buses that are recorded.
         formats: "blf" and "log": Vector's format and candump's.
 
@@ -29,7 +31,7 @@ class RunRecord:
     def __init__(
         self,
         path: Path,
-        robots: Sequence[str],
+        robots: Mapping[str, Sequence[Signal]],
         scenario_toml: str,
         period_ns: int,
         *,

@@ -160,7 +160,7 @@ def _head(path: Path, file: _File) -> Scan:
 
 def _body(file: _File, found: Scan, take: Take) -> None:
     """Chunks, end and summary."""
-    chunks = ChunkReader(len(found.head.robots))
+    chunks = ChunkReader(found.head.layout)
     record = file.record()
     while record.opcode == Opcode.CHUNK:
         index = file.record()

@@ -7,7 +7,7 @@ run alone, and a source that ends early holds nobody's rows back.
 """
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
@@ -15,14 +15,13 @@ from typing import Literal, Self
 import numpy as np
 
 from configs.errors import InfrastructureError
-from configs.signals import AGENT_SIGNALS, PLANT_SIGNALS
+from configs.signals import Signal
 from fleetloop.record.chunks import CHUNK_TICKS
 from fleetloop.record.mcap_file import McapFile
-from fleetloop.record.schema import Kind, channel_id, pose_messages, row_messages
+from fleetloop.record.schema import Kind, Layout, channel_id, pose_messages, row_messages
 
 Source = Literal["plant", "controller"]
 _KINDS: dict[str, Kind] = {"plant": Kind.PLANT, "controller": Kind.CONTROLLER}
-_WIDTHS = {Kind.PLANT: len(PLANT_SIGNALS), Kind.CONTROLLER: len(AGENT_SIGNALS)}
 
 
 class _Rows:
@@ -51,17 +50,31 @@ class _Rows:
 
 
 class RecordWriter:
-    """Writes one record; a context manager that completes the file."""
+    """Writes one record; a context manager that completes the file.
+
+    Args:
+        path: of the file.
+        robots: in their order, each with the table of its controller's rows.
+        scenario_toml: the scenario, for those who read the record.
+        period_ns: of the rows.
+    """
 
     def __init__(
-        self, path: str | Path, robots: Sequence[str], scenario_toml: str, period_ns: int
+        self,
+        path: str | Path,
+        robots: Mapping[str, Sequence[Signal]],
+        scenario_toml: str,
+        period_ns: int,
     ) -> None:
         self._path = Path(path)
         self._robots = tuple(robots)
         self._period_ns = period_ns
-        self._file = McapFile.create(self._path, self._robots, scenario_toml)
+        self._layout = Layout.of(robots)
+        self._file = McapFile.create(self._path, self._layout, scenario_toml)
         self._sources = {
-            (number, kind): _Rows() for number in range(len(self._robots)) for kind in _WIDTHS
+            (number, kind): _Rows()
+            for number in range(len(self._robots))
+            for kind in _KINDS.values()
         }
         self._numbers = {robot: number for number, robot in enumerate(self._robots)}
         self._lost = ""
@@ -95,7 +108,8 @@ class RecordWriter:
                 f"{self._path}: rows of {source} {robot} begin at tick {first_tick},"
                 f" expected {expected}"
             )
-        held.add(np.frombuffer(rows, "<f8").reshape(-1, _WIDTHS[kind]))
+        width = len(self._layout.signals(channel_id(self._numbers[robot], kind)))
+        held.add(np.frombuffer(rows, "<f8").reshape(-1, width))
         if held.count >= CHUNK_TICKS:
             self._write_groups()
 
@@ -153,7 +167,9 @@ class RecordWriter:
             if not len(rows):
                 continue
             channel = channel_id(number, kind)
-            self._file.chunk(channel, row_messages(channel, first, rows, self._period_ns))
+            self._file.chunk(
+                channel, row_messages(self._layout, channel, first, rows, self._period_ns)
+            )
             if kind is Kind.PLANT:
                 channel = channel_id(number, Kind.POSE)
                 self._file.chunk(channel, pose_messages(channel, first, rows, self._period_ns))

@@ -76,6 +76,8 @@ def print_comparison(a: Path, b: Path, *, as_json: bool, partial: bool = False) 
 
 def _first(robot: str, source: str, a: np.ndarray, b: np.ndarray) -> Difference | None:
     both = min(len(a), len(b))
+    if a.dtype != b.dtype:
+        return Difference(0, robot, source, "signals", *_unlike(a, b))
     bits_a = np.ascontiguousarray(a[:both]).view("<u8").reshape(both, len(a.dtype.names or ()))
     bits_b = np.ascontiguousarray(b[:both]).view("<u8").reshape(both, len(b.dtype.names or ()))
     rows, columns = np.nonzero(bits_a != bits_b)
@@ -85,6 +87,15 @@ def _first(robot: str, source: str, a: np.ndarray, b: np.ndarray) -> Difference 
         tick = int(a["tick"][row])
         return Difference(tick, robot, source, name, a[name][row].item(), b[name][row].item())
     return None
+
+
+def _unlike(a: np.ndarray, b: np.ndarray) -> tuple[str, str]:
+    """The signals that only one of both has; their order if that is all."""
+    of_a, of_b = a.dtype.names or (), b.dtype.names or ()
+    only_a, only_b = (
+        [name for name in one if name not in other] for one, other in ((of_a, of_b), (of_b, of_a))
+    )
+    return ", ".join(only_a or of_a), ", ".join(only_b or of_b)
 
 
 def _ended(robot: str, source: str, a: int, b: int) -> Difference:

@@ -92,7 +92,8 @@ def _series(expect: Expect, record: Record) -> list[tuple[np.ndarray, np.ndarray
         values = spread({robot: record.controller[robot] for robot in robots})
         return [(record.controller[robots[0]]["t_s"][: len(values)], values)]
     source = record.plant if expect.signal in _OF_PLANT else record.controller
-    return [(source[robot]["t_s"], source[robot][expect.signal]) for robot in robots]
+    having = [robot for robot in robots if expect.signal in (source[robot].dtype.names or ())]
+    return [(source[robot]["t_s"], source[robot][expect.signal]) for robot in having]
 
 
 def _within(expect: Expect, values: np.ndarray, found: dict[str, float]) -> bool:

@@ -2,13 +2,13 @@
 
     t_s      scenario time of the tick [s]
     robot    its name
-    ...      signals by their names in the record (`configs.signals`), units in the names
+    ...      signals by their names in the record, units in the names
 
 Every robot has all its own rows, however early another ended; rows go by tick, then robot. Pose and
 speeds are the plant's truth (heading not wrapped); the rest is what the controller used and
 commanded. Where only one of both has a row (a controller that ended before the plant), the other's
-signals are missing: empty in .csv, NaN in .npz. In both files NaN also says that a signal had no
-value, as `late_s` in lockstep.
+signals are missing, as those of a law that another robot has: empty in .csv, NaN in .npz. In both
+files NaN also says that a signal had no value, as `late_s` in lockstep.
 """
 
 import os
@@ -19,16 +19,12 @@ from pathlib import Path
 import numpy as np
 
 from configs.errors import InfrastructureError, ScenarioError
-from configs.signals import AGENT_SIGNALS, PLANT_SIGNALS
+from configs.signals import PLANT_SIGNALS
 from fleetloop.record.reader import Record
 from fleetloop.results.run_folder import read_record
 
 ALL = "all"
 _TRUTH = tuple(signal.name for signal in PLANT_SIGNALS)
-SIGNALS = tuple(
-    dict.fromkeys(("tick", *(signal.name for signal in (*PLANT_SIGNALS, *AGENT_SIGNALS))))
-)
-"""Every signal that can be asked for; `t_s` is in every table."""
 DEFAULT = (
     *("x_m", "y_m", "theta_rad", "v_m_s", "omega_rad_s", "s", "s_dot", "v_r_hat"),
     *("x_e_m", "y_e_m", "theta_e_rad", "tau_right_wheel_N_m", "tau_left_wheel_N_m"),
@@ -48,18 +44,19 @@ class Selection:
     from_s: float | None = None
     to_s: float | None = None
 
-    def columns(self) -> tuple[str, ...]:
+    def columns(self, record: Record) -> tuple[str, ...]:
         """Names of the signals, in order, without time and robot.
 
         Raises:
             ScenarioError: one isn't recorded; it names those that are.
         """
-        unknown = [name for name in self.signals if name not in (*SIGNALS, ALL)]
+        recorded = signals_of(record)
+        unknown = [name for name in self.signals if name not in (*recorded, ALL)]
         if unknown:
             raise ScenarioError(
-                f"--signals {','.join(unknown)}: no such signal; there are {', '.join(SIGNALS)}"
+                f"--signals {','.join(unknown)}: no such signal; there are {', '.join(recorded)}"
             )
-        chosen = SIGNALS if ALL in self.signals else tuple(self.signals) or DEFAULT
+        chosen = recorded if ALL in self.signals else tuple(self.signals) or DEFAULT
         return tuple(name for name in dict.fromkeys(chosen) if name not in _KEYS)
 
     def numbers(self, record: Record) -> list[int]:
@@ -98,6 +95,12 @@ class Selection:
         return chosen
 
 
+def signals_of(record: Record) -> tuple[str, ...]:
+    """Every signal of any robot of a record; `t_s` is in every table."""
+    rows = (*record.plant.values(), *record.controller.values())
+    return tuple(dict.fromkeys(name for each in rows for name in each.dtype.names or ()))
+
+
 def table(record: Record, selection: Selection | None = None) -> Table:
     """The chosen columns, rows in order of tick, then robot.
 
@@ -105,7 +108,7 @@ def table(record: Record, selection: Selection | None = None) -> Table:
         ScenarioError: something that was asked for isn't there.
     """
     selection = selection or Selection()
-    names = selection.columns()
+    names = selection.columns(record)
     numbers = selection.numbers(record)
     lengths = [_length(record, record.robots[number]) for number in numbers]
     order = np.lexsort(
@@ -124,13 +127,18 @@ def _length(record: Record, robot: str) -> int:
 
 def _column(record: Record, numbers: Sequence[int], name: str) -> np.ma.MaskedArray:
     """One signal of these robots, one after the other, each as long as its longer source."""
-    values, missing = [], []
+    values: list[np.ndarray] = []
+    missing = []
     for number in numbers:
         robot = record.robots[number]
         rows = record.plant[robot] if name in _TRUTH else record.controller[robot]
         if name in ("t_s", "tick"):
             rows = max(record.plant[robot], record.controller[robot], key=len)
         length = _length(record, robot)
+        if name not in (rows.dtype.names or ()):  # another law's
+            values.append(np.zeros(length))
+            missing.append(np.ones(length, bool))
+            continue
         values += [rows[name], np.zeros(length - len(rows), rows.dtype[name])]
         missing.append(np.arange(length) >= len(rows))
     return np.ma.MaskedArray(np.concatenate(values), np.concatenate(missing))

@@ -50,7 +50,7 @@ def write_report(run: Path, record: Record | None = None) -> Path:
     path = record.path
     if not any(len(rows) for rows in record.controller.values()):
         raise ScenarioError(f"{path}: not one tick of a controller is in it, nothing to show")
-    scenario = loads(f"{path}: {run_folder.SCENARIO}", record.scenario_toml)
+    scenario = loads(f"{path}: {run_folder.SCENARIO}", record.scenario_toml, recorded=True)
     if scenario.names != record.robots:
         raise ScenarioError(f"{path}: rows of {record.robots}, but a scenario of {scenario.names}")
     summary = _summary(path.parent, record, scenario)

@@ -1,6 +1,7 @@
 """One controller's phases, told everything by the test."""
 
 import pytest
+from support.controller_rows import COLUMNS
 from support.robot_bench import NOWHERE, SCENARIO, Bench
 
 from agents.agent import Agent
@@ -8,12 +9,9 @@ from agents.guard import Phase
 from bridge.drives.odrive.frames import Command, identifier
 from bridge.frame import Frame
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
-from bridge.telemetry import AGENT_ROW, RowBuffer
+from bridge.telemetry import RowBuffer, row_of
 from configs.errors import InfrastructureError
 from configs.resolve import agent_brief
-from configs.signals import AGENT_SIGNALS
-
-COLUMNS = [signal.name for signal in AGENT_SIGNALS]
 
 
 def test_a_controller_arms_in_the_countdown_and_drives_from_tick_0() -> None:
@@ -72,7 +70,7 @@ def test_the_closing_tick_disarms() -> None:
 
 def test_what_is_missing_is_named() -> None:
     brief = agent_brief(SCENARIO, "r1", network=NOWHERE, bus=())
-    agent = Agent(brief, RowBuffer(AGENT_ROW, lambda *_: None))
+    agent = Agent(brief, RowBuffer(row_of(brief.signals), lambda *_: None))
     assert agent.missing_to_start() == ["the localisation system", "the leader"]
     agent.take_leader(LeaderSpeed(((0, 0.6),)))
     agent.take_pose(PoseFix(-1, 0, 0.0, 0.0, 0.0))

@@ -7,16 +7,17 @@ from math import isfinite, isnan
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.controller_rows import COLUMNS
 from support.robot_bench import SCENARIO, ZERO, Bench, set_points
 
 from agents.guard import Phase
-from agents.wheel_torque import Projection
+from agents.laws.dsc_terms import Projection
 from bridge.network.messages import PathState
-from bridge.telemetry import AGENT_SIGNALS
 from configs.brief import NetworkLink, SplinePath, WorldOffset
+from configs.plugins import LAWS
 from configs.resolve import agent_brief
+from configs.sections import LAW
 
-COLUMNS = [signal.name for signal in AGENT_SIGNALS]
 BRIEF = agent_brief(SCENARIO, "r2", network=NetworkLink("test", "", "", ""), bus=())
 STANDSTILL = ((1.0, 0.0, 0.0, 0.0, 0.0, 0.0),)
 FLT_MAX = 3.4028234663852886e38
@@ -63,14 +64,15 @@ def test_a_path_variable_that_diverges_stays_where_it_was_a_number_and_stops_the
 
 def test_gains_beyond_all_numbers_are_no_reason_to_fail_before_the_run() -> None:
     assert Projection.of(1e200, 1e200).square > 1e308
-    bench = Bench("r2", gains=replace(BRIEF.gains, sigma_max=1e200, k4=1e308, sgn_width=1e-320))
+    gains = replace(BRIEF.law.parameters, sigma_max=1e200, k4=1e308, sgn_width=1e-320)
+    bench = Bench("r2", law=replace(BRIEF.law, parameters=gains))
     bench.run(bench.schedule.countdown_ticks + 20)
     assert bench.phase in (Phase.STOPPED, Phase.DRIVING)
 
 
 @settings(deadline=None, max_examples=100)
 @given(
-    law=st.sampled_from(["adaptive_dsc", "adaptive_dsc_robust"]),
+    law=st.sampled_from(sorted(LAWS)),
     source=st.sampled_from(["fused", "external", "odometry"]),
     wheels=st.lists(st.tuples(*[st.sampled_from(ABSURD)] * 4), min_size=1, max_size=5),
 )
@@ -78,7 +80,7 @@ def test_whatever_encoders_say_the_controller_lives_and_sends_numbers(
     law: str, source: str, wheels: list[tuple[float, float, float, float]]
 ) -> None:
     host = replace(BRIEF.host, encoder_mismatch_limit_wheel_rad=1e300)
-    bench = Bench("r2", law=law, localisation=source, host=host)
+    bench = Bench("r2", law=LAW.choose({"law": law}, ""), localisation=source, host=host)
     bench.drive(3)
     for right, left, right_speed, left_speed in wheels:
         bench.axes[0].feed(right, right_speed)

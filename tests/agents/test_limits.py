@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.laws import LawState
-from agents.limits import EncoderCheck, TorqueLimiter, held_still
+from agents.limits import EncoderCheck, TorqueLimiter
 
 H = 0.005
 torques = st.floats(-1e6, 1e6)
@@ -40,13 +39,6 @@ def test_a_step_is_a_ramp_of_the_slew_rate_and_begins_at_0_after_a_reset() -> No
     assert ramp[50:] == [(1.0, -1.0)] * 10
     limiter.reset()
     assert limiter(1.0, 0.0) == pytest.approx((0.02, 0.0))
-
-
-def test_a_limited_law_keeps_its_estimates_and_moves_its_filters() -> None:
-    before = LawState(0.0, 0.0, 0.0, (1.0,) * 4, (2.0,) * 4, 3.0)
-    after = LawState(4.0, 5.0, 6.0, (7.0,) * 4, (8.0,) * 4, 9.0)
-    assert held_still(before, after) == LawState(4.0, 5.0, 6.0, (1.0,) * 4, (2.0,) * 4, 3.0)
-    assert held_still(None, after) is after
 
 
 def motions(seconds: float):

@@ -1,11 +1,13 @@
 """Rows and blocks of telemetry."""
 
+from support.controller_rows import SIGNALS
+
 from bridge.telemetry import BLOCK_TICKS, PLANT_ROW, RowBuffer
-from configs.signals import AGENT_SIGNALS, PLANT_SIGNALS
+from configs.signals import PLANT_SIGNALS
 
 
 def test_signal_names_are_unique_and_have_units() -> None:
-    for signals in (PLANT_SIGNALS, AGENT_SIGNALS):
+    for signals in (PLANT_SIGNALS, SIGNALS):
         names = [signal.name for signal in signals]
         assert len(set(names)) == len(names)
         assert all(signal.unit and signal.meaning for signal in signals)

@@ -58,7 +58,7 @@ def test_the_paper_scenario_has_the_numbers_of_section_4() -> None:
     assert paper.topology.edges == (("r1", "r2"), ("r2", "r3"), ("r3", "r4"))
     assert paper.topology.leader == ("r1",)
     assert paper.leader.speed_m_s == 0.6
-    control = paper.control
+    control = paper.control.parameters
     assert (control.k1, control.k2, control.k3, control.k4) == (2.0, 3.0, 1.5, 3.0)
     assert (control.gamma_1_s, control.gamma_2_s, control.gamma_3_s) == (0.01, 0.01, 0.01)
     assert (paper.coordination.p, paper.coordination.q) == (2.0, 1.0)
@@ -361,5 +361,5 @@ def test_a_robot_may_differ_from_its_type_and_from_the_fleet() -> None:
     assert scenario.body_of(first).body_mass_kg == 2.3
     assert scenario.body_of(second).body_mass_kg == 5.0
     assert scenario.body_of(second).wheel_mass_kg == 0.28
-    assert scenario.control_of(second).k4 == 1.5
-    assert scenario.control_of(second).k1 == scenario.control.k1
+    assert scenario.control_of(second).parameters.k4 == 1.5
+    assert scenario.control_of(second).parameters.k1 == scenario.control.parameters.k1

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.controller_rows import SIGNALS
 
 from fleetloop.launch.run import Options, run_scenario
 from fleetloop.record.reader import Record
@@ -24,7 +25,7 @@ def uneven_run(finished_run: Path, tmp_path_factory: pytest.TempPathFactory) -> 
     folder.mkdir()
     whole = Record.open(finished_run / "record.mcap")
     with RecordWriter(
-        folder / "record.mcap", whole.robots, whole.scenario_toml, 2_000_000
+        folder / "record.mcap", dict.fromkeys(whole.robots, SIGNALS), whole.scenario_toml, 2_000_000
     ) as writer:
         for robot in whole.robots:
             writer.add(robot, "plant", 0, signals_of(whole.plant[robot]))

@@ -3,11 +3,12 @@
 from pathlib import Path
 
 import pytest
+from support.controller_rows import ROW, SIGNALS
 from support.robot_bench import NOWHERE, SCENARIO
 
 from bridge.network.link import Arrival, Dropped
 from bridge.network.messages import Rows
-from bridge.telemetry import AGENT_ROW, BLOCK_TICKS, FRAME_ROW
+from bridge.telemetry import BLOCK_TICKS, FRAME_ROW
 from configs.brief import RecorderBrief
 from configs.loading import to_toml
 from fleetloop.record.recorder import AHEAD_TICKS, _Recorder
@@ -20,19 +21,24 @@ PERIOD_NS = 1_000_000
 @pytest.fixture
 def recorder(tmp_path: Path):
     brief = RecorderBrief(
-        *(str(tmp_path / "r.mcap"), ("r1", "r2"), ("r1",), ("blf",), to_toml(SCENARIO)),
+        *(str(tmp_path / "r.mcap"), ("r1", "r2"), (SIGNALS, SIGNALS), ("r1",)),
+        *(("blf",), to_toml(SCENARIO)),
         *(PERIOD_NS, 1.0, 0.02, NOWHERE, ""),
         ticks=TICKS,
         last_frame_ns=10**12,
     )
     with RunRecord(
-        tmp_path / "r.mcap", brief.robots, brief.scenario_toml, PERIOD_NS, buses=("r1",)
+        tmp_path / "r.mcap",
+        dict.fromkeys(brief.robots, SIGNALS),
+        brief.scenario_toml,
+        PERIOD_NS,
+        buses=("r1",),
     ) as record:
         yield _Recorder(brief, record)
 
 
 def rows(first: int, count: int, *, final: bool = False) -> bytes:
-    return Rows(first, count, bytes(AGENT_ROW.size * count), final).encode()
+    return Rows(first, count, bytes(ROW.size * count), final).encode()
 
 
 def take(recorder: _Recorder, payload: bytes, tag: str = "controller/r1") -> list[str]:

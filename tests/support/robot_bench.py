@@ -8,10 +8,11 @@ from bridge.drives.odrive.frames import AxisState, Command, identifier
 from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import Frame
 from bridge.network.messages import PathState, PoseFix
-from bridge.telemetry import AGENT_ROW, RowBuffer
+from bridge.telemetry import RowBuffer, row_of
 from configs.brief import AgentBrief, NetworkLink
 from configs.loading import load
 from configs.resolve import agent_brief, plant_brief
+from configs.signals import controller_signals
 
 NOWHERE = NetworkLink("test", "", "", "")
 AT_ONCE = "drive.boot_s=0.0"  # a reboot takes no time
@@ -30,7 +31,8 @@ class Bench:
         brief = replace(brief, **changes)
         model = plant_brief(scenario, network=NOWHERE).robots[0].drive
         self.rows: list[tuple[float, ...]] = []
-        self.agent = Agent(brief, RowBuffer(AGENT_ROW, self._keep))
+        self._row = row_of(controller_signals(brief.law.load().SIGNALS))
+        self.agent = Agent(brief, RowBuffer(self._row, self._keep))
         self.axes = [OdriveNode(model, 0, 1), OdriveNode(model, 1, 2)]
         self.schedule = brief.schedule
         self.tick_now = -brief.schedule.countdown_ticks
@@ -43,7 +45,7 @@ class Bench:
         ) if brief.hears else None
 
     def _keep(self, _first: int, _count: int, rows: bytes, _final: bool) -> None:
-        self.rows += AGENT_ROW.iter_unpack(rows)
+        self.rows += self._row.iter_unpack(rows)
 
     @property
     def now_ns(self) -> int:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 
 import pytest
+from support.controller_rows import ROW
 
 from bridge.network.flood_guard import (
     BURST_MESSAGES,
@@ -18,7 +19,6 @@ from bridge.network.flood_guard import (
     deafen,
 )
 from bridge.network.messages import PathState
-from bridge.telemetry import AGENT_ROW
 
 
 def test_what_the_schedule_allows_never_runs_over() -> None:
@@ -44,7 +44,7 @@ def test_a_flood_runs_over_within_a_second_whatever_its_shape() -> None:
 
 def test_forty_thousand_a_second_is_beyond_what_any_fast_run_allows() -> None:
     assert 3 * (MESSAGES_PER_S + MESSAGES_PER_TICK * 2000) < 40_000
-    assert 2.5 * (AGENT_ROW.size + len(PathState(2**40, 2**62, 1e3, 0.6).encode())) < BYTES_PER_TICK
+    assert 2.5 * (ROW.size + len(PathState(2**40, 2**62, 1e3, 0.6).encode())) < BYTES_PER_TICK
 
 
 class Pair:

@@ -6,7 +6,7 @@ from math import isclose, pi, sin
 import numpy as np
 import pytest
 
-from agents.laws import LAWS, Sense
+from agents.laws.interface import PathVariable, RobotMotion
 from agents.paths import Reference
 from configs.loading import load
 from fleetloop.check.loop import (
@@ -89,7 +89,8 @@ def test_held_and_late_poses_decay_as_the_law_itself_has_it(
 def _offsets(loop: Loop, *, v: float, fixes: int) -> np.ndarray:
     """|y_e| at each fix of a robot that starts a micrometre off a line, tick by tick."""
     h = loop.period_s
-    law, memory = LAWS[loop.law](loop.gains, loop.wheels, h), None
+    line = lambda s: Reference(s, 0.0, 0.0, 1.0, 0.0)  # noqa: E731
+    law, memory = loop.law(loop.gains, loop.wheels, h, line), None
     state = State(0.0, 1e-6, 0.0, v, 0.0, 0.0, 0.0)
     poses = [(v * h * n, 0.0, 0.0) for n in range(-loop.pose_delay, 0)]
     off = []
@@ -99,7 +100,8 @@ def _offsets(loop: Loop, *, v: float, fixes: int) -> np.ndarray:
             fix = poses[tick]
             off.append(abs(state.y))
         reference = Reference(v * h * tick, 0.0, 0.0, 1.0, 0.0)
-        out = law(memory, Sense(*fix, state.v, state.omega), reference, v)
+        motion = RobotMotion(*fix, state.v, state.omega)
+        out = law.step(memory, motion, reference, PathVariable(v * h * tick, v, 0.0))
         memory = out.state._replace(theta_1=loop.theta[:4], theta_2=loop.theta[4:], kappa=0.0)
         state = rk4(loop.body, state, out.tau_right, out.tau_left, 0.0, h)
     return np.array(off)

@@ -3,8 +3,9 @@
 from pathlib import Path
 
 import pytest
+from support.controller_rows import ROW, SIGNALS
 
-from bridge.telemetry import AGENT_ROW, PLANT_ROW
+from bridge.telemetry import PLANT_ROW
 from configs.errors import InfrastructureError
 from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.run_record import RunRecord
@@ -13,12 +14,12 @@ from fleetloop.record.writer import Source
 BLOCKS: list[tuple[Source, int, bytes]] = [
     (source, first, bytes(row.size * 100))
     for first in range(0, 1000, 100)
-    for source, row in (("plant", PLANT_ROW), ("controller", AGENT_ROW))
+    for source, row in (("plant", PLANT_ROW), ("controller", ROW))
 ]
 
 
 def writer(path: Path) -> RunRecord:
-    return RunRecord(path, ("r1",), "schema = 1\n", 1_000_000)
+    return RunRecord(path, {"r1": SIGNALS}, "schema = 1\n", 1_000_000)
 
 
 def test_the_file_is_the_same_as_without_it(tmp_path: Path) -> None:

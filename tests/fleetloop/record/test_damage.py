@@ -13,10 +13,12 @@ from hypothesis import strategies as st
 from mcap import records
 from mcap.opcode import Opcode
 from mcap.writer import Writer
+from support.controller_rows import SIGNALS
 
 from fleetloop.record.head import MAGIC, build, encoded
 from fleetloop.record.reader import Record
 from fleetloop.record.scan import RecordError
+from fleetloop.record.schema import Layout
 from fleetloop.record.writer import CHUNK_TICKS, RecordWriter, finish_truncated
 
 ROBOTS = ("r1", "r2")
@@ -39,7 +41,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def write(path: Path, ticks: int) -> Path:
     draw = np.random.default_rng(1)
-    with RecordWriter(path, ROBOTS, 'name = "x"\n', 1_000_000) as writer:
+    with RecordWriter(path, dict.fromkeys(ROBOTS, SIGNALS), 'name = "x"\n', 1_000_000) as writer:
         for robot in ROBOTS:
             for source, width in (("plant", 12), ("controller", 35)):
                 rows = draw.normal(size=(ticks, width)).round(2)
@@ -194,7 +196,7 @@ def test_a_damaged_file_is_not_completed_as_if_it_were_cut(whole: Path, tmp_path
 
 
 def test_a_record_of_other_signals_names_them(tmp_path: Path) -> None:
-    head = build(ROBOTS, "")
+    head = build(Layout.of(dict.fromkeys(ROBOTS, SIGNALS)), "")
     before = head.data[: head.metadata.offset].replace(b"float64 kappa_hat", b"float64 gamma_hat")
     facts = {"version": "9.9", "crc32_of_all_before": f"{zlib.crc32(before):08x}"}
     (tmp_path / "a.mcap").write_bytes(before + encoded(records.Metadata("fleetloop", facts)))

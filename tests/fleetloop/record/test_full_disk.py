@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
+from support.controller_rows import SIGNALS
 
 from configs.errors import InfrastructureError
 from fleetloop.record.append import AppendedFile
@@ -59,7 +60,7 @@ def fill(disk: Path) -> None:
 
 def record(path: Path, groups: int, before: int = 0, meanwhile=lambda: None) -> None:
     """Write so many groups of rows; after `before` of them something else happens."""
-    with RecordWriter(path, ("r1",), 'name = "x"\n', 1_000_000) as writer:
+    with RecordWriter(path, {"r1": SIGNALS}, 'name = "x"\n', 1_000_000) as writer:
         for group in range(groups):
             if group == before:
                 meanwhile()
@@ -125,7 +126,7 @@ def test_the_last_chunks_make_room_where_nothing_can_be_reserved(tmp_path: Path)
 def test_a_start_on_a_full_disk_leaves_no_file(small_disk: Path) -> None:
     fill(small_disk)
     with pytest.raises(InfrastructureError, match="No space left"):
-        RecordWriter(small_disk / "a.mcap", ("r1",), "", 1_000_000)
+        RecordWriter(small_disk / "a.mcap", {"r1": SIGNALS}, "", 1_000_000)
     with pytest.raises(InfrastructureError, match="No space left"):
         CanLogWriter(small_disk / "a.blf", small_disk / "a.log", channel=1, name="r1")
     assert [path.name for path in small_disk.iterdir()] == ["others"]
@@ -134,7 +135,9 @@ def test_a_start_on_a_full_disk_leaves_no_file(small_disk: Path) -> None:
 def test_a_start_whose_recordings_fail_leaves_no_file(tmp_path: Path) -> None:
     (tmp_path / "can").touch()
     with pytest.raises(InfrastructureError, match="can't make"):
-        RunRecord(tmp_path / "a.mcap", ("r1",), "", 1_000_000, buses=("r1",), formats=("blf",))
+        RunRecord(
+            tmp_path / "a.mcap", {"r1": SIGNALS}, "", 1_000_000, buses=("r1",), formats=("blf",)
+        )
     assert [path.name for path in tmp_path.iterdir()] == ["can"]
 
 

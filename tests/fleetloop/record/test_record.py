@@ -8,14 +8,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from support.controller_rows import SIGNALS
 
 from configs.errors import InfrastructureError, ScenarioError
-from configs.signals import AGENT_SIGNALS, PLANT_SIGNALS
+from configs.signals import PLANT_SIGNALS
 from fleetloop.record.reader import Record
 from fleetloop.record.writer import CHUNK_TICKS, RecordWriter, finish_truncated
 
 ROBOTS = ("r1", "r2")
-WIDTHS = {"plant": len(PLANT_SIGNALS), "controller": len(AGENT_SIGNALS)}
+LAYOUT = dict.fromkeys(ROBOTS, SIGNALS)
+WIDTHS = {"plant": len(PLANT_SIGNALS), "controller": len(SIGNALS)}
 PERIOD_NS = 1_000_000
 
 
@@ -30,7 +32,7 @@ def rows(robot: str, source: str, first: int, count: int) -> np.ndarray:
 
 def write(path: Path, ticks: int, order=None, block: int = 128) -> None:
     sources = [(robot, source) for robot in ROBOTS for source in WIDTHS]
-    with RecordWriter(path, ROBOTS, 'name = "x"\n', PERIOD_NS) as writer:
+    with RecordWriter(path, LAYOUT, 'name = "x"\n', PERIOD_NS) as writer:
         starts = range(0, ticks, block)
         calls = [(first, *source) for first in starts for source in sources]
         for first, robot, source in order(calls) if order else calls:
@@ -63,7 +65,7 @@ def test_the_file_does_not_depend_on_the_order_of_arrival(tmp_path: Path) -> Non
 
 def test_a_source_that_ends_early_holds_nobody_back(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
-    with RecordWriter(path, ROBOTS, "", PERIOD_NS) as writer:
+    with RecordWriter(path, LAYOUT, "", PERIOD_NS) as writer:
         writer.add("r2", "controller", 0, rows("r2", "controller", 0, 100).tobytes())
         writer.end("r2", "controller")
         sizes = []
@@ -81,7 +83,7 @@ def test_a_source_that_ends_early_holds_nobody_back(tmp_path: Path) -> None:
 
 def test_when_a_source_says_that_it_ended_does_not_show_in_the_file(tmp_path: Path) -> None:
     for name, early in (("a.mcap", True), ("b.mcap", False)):
-        with RecordWriter(tmp_path / name, ROBOTS, "", PERIOD_NS) as writer:
+        with RecordWriter(tmp_path / name, LAYOUT, "", PERIOD_NS) as writer:
             writer.add("r1", "plant", 0, rows("r1", "plant", 0, 700).tobytes())
             if early:
                 writer.end("r1", "plant")
@@ -154,7 +156,7 @@ def test_a_file_cut_anywhere_opens_and_is_whole_again_when_finished(
 
 
 def test_missing_and_repeated_rows_are_refused(tmp_path: Path) -> None:
-    with RecordWriter(tmp_path / "a.mcap", ROBOTS, "", PERIOD_NS) as writer:
+    with RecordWriter(tmp_path / "a.mcap", LAYOUT, "", PERIOD_NS) as writer:
         block = rows("r1", "plant", 0, 10).tobytes()
         writer.add("r1", "plant", 0, block)
         for first in (0, 11):
@@ -165,7 +167,7 @@ def test_missing_and_repeated_rows_are_refused(tmp_path: Path) -> None:
 def test_a_full_disk_is_named() -> None:
     with (
         pytest.raises(InfrastructureError, match=r"can't write /dev/full: No space left"),
-        RecordWriter("/dev/full", ROBOTS, "x" * 100_000, PERIOD_NS),
+        RecordWriter("/dev/full", LAYOUT, "x" * 100_000, PERIOD_NS),
     ):
         pass
 

@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.controller_rows import ROW, SIGNALS
 
 from bridge.network.link import Arrival
 from bridge.network.messages import Rows
-from bridge.telemetry import AGENT_ROW, PLANT_ROW
+from bridge.telemetry import PLANT_ROW
 from configs.brief import NetworkLink, RecorderBrief
 from fleetloop.record.reader import Record
 from fleetloop.record.recorder import _Recorder
@@ -15,7 +16,7 @@ from fleetloop.record.run_record import RunRecord
 
 
 def rows(tag: str, first: int, count: int, *, final: bool = False) -> Arrival:
-    size = PLANT_ROW.size if tag.startswith("plant") else AGENT_ROW.size
+    size = PLANT_ROW.size if tag.startswith("plant") else ROW.size
     block = np.full((count, size // 8), 1.5).tobytes()
     return Arrival(tag, "", Rows(first, count, block, final).encode())
 
@@ -24,9 +25,21 @@ def record(path: Path, *arrivals: Arrival) -> tuple[_Recorder, Record]:
     """What comes of these messages."""
     network = NetworkLink("x", "", "", "")
     brief = RecorderBrief(
-        str(path), ("r1", "r2"), (), (), "", 1_000_000, 1.0, 0.1, network, "", 300, 0
+        str(path),
+        ("r1", "r2"),
+        (SIGNALS, SIGNALS),
+        (),
+        (),
+        "",
+        1_000_000,
+        1.0,
+        0.1,
+        network,
+        "",
+        300,
+        0,
     )
-    with RunRecord(path, brief.robots, "", brief.period_ns) as file:
+    with RunRecord(path, dict.fromkeys(brief.robots, SIGNALS), "", brief.period_ns) as file:
         recorder = _Recorder(brief, file)
         for arrival in arrivals:
             recorder.take(arrival)

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.controller_rows import COLUMNS
 
 from configs.errors import InfrastructureError, ScenarioError
+from configs.signals import PLANT_SIGNALS
 from fleetloop.record.reader import Record
-from fleetloop.results.export import DEFAULT, SIGNALS, Selection, export, table
+from fleetloop.results.export import DEFAULT, Selection, export, table
 
 HEADER = (
     "t_s,robot,x_m,y_m,theta_rad,v_m_s,omega_rad_s,s,s_dot,v_r_hat,x_e_m,y_e_m,theta_e_rad,"
@@ -88,7 +90,8 @@ def test_signals_robots_and_time_are_chosen(finished_run: Path, tmp_path: Path) 
 
 def test_all_signals_are_every_recorded_one_once(finished_run: Path) -> None:
     columns = table(Record.open(finished_run / "record.mcap"), Selection(("all",)))
-    assert sorted(columns) == sorted({"robot", *SIGNALS})
+    plant = {signal.name for signal in PLANT_SIGNALS}
+    assert sorted(columns) == sorted({"robot", "tick", *plant, *COLUMNS})
 
 
 @pytest.mark.parametrize(

@@ -5,19 +5,26 @@ from math import cos, pi, sin
 
 import pytest
 
-from agents.laws import LAWS, Sense
+from agents.laws.adaptive_dsc_robust import AdaptiveDscRobust
+from agents.laws.interface import PathVariable, RobotMotion
 from agents.paths import robot_path
 from configs.brief import NetworkLink, WorldOffset
 from configs.loading import load
 from configs.resolve import agent_brief, plant_brief, reference_path
-from configs.signals import LAW_SIGNALS
 from plant.body import RigidBody, State
 from plant.integrate import rk4
 
 NOWHERE = NetworkLink("test", "", "", "")
 SEEDS = 200
 SECONDS = 14.0
-NAMES = [signal.name for signal in LAW_SIGNALS]
+NAMES = [signal.name for signal in AdaptiveDscRobust.SIGNALS]
+
+
+def law_of(brief, path, period_s: float):
+    made = AdaptiveDscRobust(brief.law.parameters, brief.wheels, period_s, path)
+    return lambda state, motion, reference, s_dot: made.step(
+        state, motion, reference, PathVariable(0.0, s_dot, 0.0)
+    )
 
 
 def final_errors(scenario, seed: int) -> tuple[float, float]:
@@ -25,10 +32,10 @@ def final_errors(scenario, seed: int) -> tuple[float, float]:
     draw = random.Random(seed)
     brief = agent_brief(scenario, "r1", network=NOWHERE, bus=())
     plant = plant_brief(scenario, network=NOWHERE).robots[0]
-    law = LAWS[scenario.control.law](brief.gains, brief.wheels, scenario.clock.control_period_s)
     robot = RigidBody(plant.body, plant.disturbance)
     path = robot_path(reference_path(scenario.path), WorldOffset(0.0, 0.0))
     h = scenario.clock.control_period_s
+    law = law_of(brief, path, h)
     far, where = 3.0 * draw.random() ** 0.5, draw.uniform(-pi, pi)
     start = path(0.0)
     state = State(
@@ -38,7 +45,7 @@ def final_errors(scenario, seed: int) -> tuple[float, float]:
     worst_x = worst_y = 0.0
     ticks = round(SECONDS / h)
     for k in range(ticks):
-        sense = Sense(seen.x, seen.y, seen.theta, seen.v, seen.omega)
+        sense = RobotMotion(seen.x, seen.y, seen.theta, seen.v, seen.omega)
         out = law(memory, sense, path(0.6 * k * h), 0.6)
         memory, seen = out.state, state
         assert max(abs(out.tau_right), abs(out.tau_left)) <= 2.0
@@ -59,9 +66,9 @@ def test_it_tracks_from_any_start_within_three_metres(name: str) -> None:
 
 def test_far_off_the_path_the_approach_speed_is_bounded() -> None:
     brief = agent_brief(load("realtime_100hz"), "r1", network=NOWHERE, bus=())
-    law = LAWS["adaptive_dsc_robust"](brief.gains, brief.wheels, 0.01)
     path = robot_path(reference_path(load("realtime_100hz").path), WorldOffset(0.0, 0.0))
-    out = law(None, Sense(-500.0, 0.0, 0.0, 0.0, 0.0), path(0.0), 0.0)
+    law = law_of(brief, path, 0.01)
+    out = law(None, RobotMotion(-500.0, 0.0, 0.0, 0.0, 0.0), path(0.0), 0.0)
     signals = dict(zip(NAMES, out.signals, strict=True))
     assert signals["alpha_v_m_s"] == pytest.approx(2.0)
     assert abs(out.tau_right) <= 2.0
@@ -69,10 +76,10 @@ def test_far_off_the_path_the_approach_speed_is_bounded() -> None:
 
 def test_estimates_hold_still_while_a_wheel_is_at_its_limit() -> None:
     brief = agent_brief(load("realtime_100hz"), "r1", network=NOWHERE, bus=())
-    law = LAWS["adaptive_dsc_robust"](brief.gains, brief.wheels, 0.01)
     path = robot_path(reference_path(load("realtime_100hz").path), WorldOffset(0.0, 0.0))
-    first = law(None, Sense(-9.0, 3.0, 1.0, 5.0, -9.0), path(0.0), 0.6)
-    again = law(first.state, Sense(-9.0, 3.0, 1.0, 5.0, -9.0), path(0.0), 0.6)
+    law = law_of(brief, path, 0.01)
+    first = law(None, RobotMotion(-9.0, 3.0, 1.0, 5.0, -9.0), path(0.0), 0.6)
+    again = law(first.state, RobotMotion(-9.0, 3.0, 1.0, 5.0, -9.0), path(0.0), 0.6)
     assert max(abs(again.tau_right), abs(again.tau_left)) == 2.0
     assert again.state.theta_1 == first.state.theta_1
     assert again.state.theta_2 == first.state.theta_2

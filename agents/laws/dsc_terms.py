@@ -1,27 +1,66 @@
-"""Dynamic half of the law: adaptive torque from speed errors, eqs (29)-(36).
+"""Terms that dynamic surface laws share: errors (8), filters, projection (35), wheel torques (3).
 
-    e = (v − α_v, ω − α_ω)                                                          (30)
-    F_1 = (ω², −v, −ω, −α_v'),  F_2 = (−v ω, −v, −ω, −α_ω')      rows of Ω          (32)
-    u_r = −k_4 e_r − F_r · Θ̂_r − κ̂ sgn(e_r),   τ = B u                        (3), (34)
-    Θ̂_r' = K_5 proj(F_r e_r, Θ̂_r)                                                  (35)
-    κ̂' = η (‖e‖ − ρ κ̂)                                                            (36)
+    x_e =  cos θ (x − x_d) + sin θ (y − y_d)          errors in the robot's axes      (8)
+    y_e = −sin θ (x − x_d) + cos θ (y − y_d)
+    θ_e = θ − θ_d, wrapped to (−π, π]
 
-    Θ = (c b, d̄_11, d̄_12, m̄_1, c/b, d̄_21, d̄_22, m̄_2): unknown, each |σ| ≤ σ_M
-    B = (1/r) [[1, b], [1, −b]]: from body to (right, left) wheel
-    sgn(e) is tanh(e / width), so that the torque is continuous
+A filter γ α' + α = ᾱ moves by (1 − e^(−h/γ)) (ᾱ − α) over a period h with its input held, exactly.
 
-The paper prints `proj` without the factor π in its conditions; with it, as in its reference [26],
-both sides are projected: with Ξ(σ̂) = (σ̂² − σ_M²)/(k² + 2 k σ_M),
+The paper prints `proj` of (35) without the factor π in its conditions; with it, as in its reference
+[26], both sides are projected: with Ξ(σ̂) = (σ̂² − σ_M²)/(k² + 2 k σ_M),
 
     proj(π, σ̂) = (1 − Ξ) π   if Ξ > 0 and σ̂ π > 0,   else π
 
 which keeps |σ̂| ≤ σ_M + k; a clip to that bound guards against a long sampling period.
 """
 
+from dataclasses import dataclass
+from math import cos, exp, pi, sin
 from typing import NamedTuple
+
+from configs.parameters import Finite, Parameters, Positive, Seconds, parameter
 
 Row = tuple[float, float, float, float]
 """Four of the eight parameters: those of one row of Ω."""
+Eight = tuple[Finite, Finite, Finite, Finite, Finite, Finite, Finite, Finite]
+"""Θ's elements: c b, d̄_11, d̄_12, m̄_1, c/b, d̄_21, d̄_22, m̄_2 [kg·m², N·m·s]."""
+PathErrors = tuple[float, float, float]
+"""(8): where the robot is, seen from itself, against its reference: x_e, y_e [m], θ_e [rad]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurfaceGains(Parameters):
+    """Gains of the virtual controls, the filters and the speed loop, (15)-(34)."""
+
+    k1: Positive = parameter(2.0, "(15), of x_e [1/s]")
+    k2: Positive = parameter(3.0, "(17), of y_e [1/m]")
+    k3: Positive = parameter(1.5, "(25), of the heading [1/s]")
+    k4: Positive = parameter(3.0, "(34), of the speeds [N·m·s/m, N·m·s/rad]")
+    gamma_1_s: Positive = parameter(0.01, "filter (19)")
+    gamma_2_s: Seconds = parameter(0.01, "filter (20)")
+    gamma_3_s: Seconds = parameter(0.01, "filter (27)")
+
+
+def wrap(angle: float) -> float:
+    """The same direction in (−π, π]."""
+    if -pi < angle <= pi:
+        return angle
+    wrapped = angle % (2.0 * pi)
+    return wrapped - 2.0 * pi if wrapped > pi else wrapped
+
+
+def path_errors(
+    x: float, y: float, theta: float, x_d: float, y_d: float, theta_d: float
+) -> PathErrors:
+    """Errors (8) of a robot at (x, y, θ) against its reference."""
+    c, s = cos(theta), sin(theta)
+    dx, dy = x - x_d, y - y_d
+    return c * dx + s * dy, c * dy - s * dx, wrap(theta - theta_d)
+
+
+def smoothing(period_s: float, time_constant_s: float) -> float:
+    """Share of the way that a filter goes in one period: 1 − e^(−h/γ)."""
+    return 1.0 - exp(-period_s / time_constant_s)
 
 
 class Projection(NamedTuple):

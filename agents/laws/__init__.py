@@ -1,0 +1,1 @@
+"""Control laws, one file each; their interface is `agents.laws.interface`."""

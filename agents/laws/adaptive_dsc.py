@@ -1,0 +1,187 @@
+"""The paper's law: adaptive dynamic surface control, equations (8)-(36), sampled with output held.
+
+    x_e, y_e, θ_e: the reference seen from the robot                                 (8)
+    v̄ = −k_1 x_e + v̄_d ṡ cos θ_e                                                    (15)
+    θ̄ = −atan(k_2 y_e)                                                              (17)
+    γ_1 α_θ' + α_θ = θ̄,  α_θ(0) = θ̄(0)                                              (19)
+    γ_2 α_v' + α_v = v̄,  α_v(0) = v̄(0)                                              (20)
+    ω̄ = −k_3 (θ_e − θ̄) + ω̄_d ṡ + α_θ'                                               (25)
+    γ_3 α_ω' + α_ω = ω̄,  α_ω(0) = ω̄(0)                                              (27)
+    e = (v − α_v, ω − α_ω)                                                          (30)
+    F_1 = (ω², −v, −ω, −α_v'),  F_2 = (−v ω, −v, −ω, −α_ω')      rows of Ω          (32)
+    u_r = −k_4 e_r − F_r · Θ̂_r − κ̂ sgn(e_r),   τ = B u                        (3), (34)
+    Θ̂_r' = K_5 proj(F_r e_r, Θ̂_r)                                                  (35)
+    κ̂' = η (‖e‖ − ρ κ̂)                                                            (36)
+
+    x_e, y_e [m]   θ_e, θ̄, α_θ [rad]   v̄, α_v [m/s]   ω̄, α_ω [rad/s]   ṡ [m/s]   γ [s]
+    Θ = (c b, d̄_11, d̄_12, m̄_1, c/b, d̄_21, d̄_22, m̄_2): unknown, each |σ| ≤ σ_M
+    B = (1/r) [[1, b], [1, −b]]: from body to (right, left) wheel
+    sgn(e) is tanh(e / width), so that the torque is continuous
+
+Filters and κ̂ are advanced exactly, Θ̂ by Euler's rule. `proj` is in `agents.laws.dsc_terms`.
+"""
+
+from dataclasses import dataclass
+from math import atan, cos, exp, hypot, tanh
+from typing import NamedTuple
+
+from agents.laws.dsc_terms import (
+    Eight,
+    Projection,
+    Row,
+    SurfaceGains,
+    adapt,
+    path_errors,
+    smoothing,
+    wheel_torques,
+)
+from agents.laws.interface import (
+    PATH_ERRORS,
+    Law,
+    LawOutput,
+    PathVariable,
+    Reference,
+    RobotMotion,
+    RobotPath,
+    Signal,
+    Wheels,
+)
+from configs.parameters import NotNegative, Positive, parameter
+
+_new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
+
+
+class DscState(NamedTuple):
+    """Filters (19), (20), (27) and estimates (35), (36)."""
+
+    alpha_theta: float
+    alpha_v: float
+    alpha_omega: float
+    theta_1: Row  # (c b, d̄_11, d̄_12, m̄_1)
+    theta_2: Row  # (c/b, d̄_21, d̄_22, m̄_2)
+    kappa: float
+
+
+class AdaptiveDsc(Law):
+    """Equations (8)-(36)."""
+
+    @dataclass(frozen=True, slots=True, kw_only=True)
+    class Gains(SurfaceGains):
+        """Gains of (15)-(36)."""
+
+        k5: Eight = parameter((0.1,) * 8, "(35), diagonal of K_5")
+        sigma_max: Positive = parameter(1.0, "bound of every element of Θ")
+        sigma_margin: Positive = parameter(0.1, "the projection's k")
+        eta: NotNegative = parameter(0.001, "(36) [1/s]")
+        rho: Positive = parameter(1.0, "(36)")
+        sgn_width: Positive = parameter(0.001, "sgn(e) is tanh(e / sgn_width)")
+        theta_hat_0: Eight = parameter((0.0,) * 8, "Θ̂ at the start")
+        kappa_hat_0: NotNegative = parameter(0.0, "κ̂ at the start")
+
+    SIGNALS = (
+        *PATH_ERRORS,
+        Signal("alpha_theta_rad", "rad", "filtered virtual control, (19)"),
+        Signal("alpha_v_m_s", "m/s", "filtered virtual control, (20)"),
+        Signal("alpha_omega_rad_s", "rad/s", "filtered virtual control, (27)"),
+        Signal("xi_e1_m_s", "m/s", "speed error, (30)"),
+        Signal("xi_e2_rad_s", "rad/s", "turn rate error, (30)"),
+        Signal("theta_hat_1", "kg·m²", "estimate of c b"),
+        Signal("theta_hat_2", "N·m·s", "estimate of d̄_11"),
+        Signal("theta_hat_3", "N·m·s", "estimate of d̄_12"),
+        Signal("theta_hat_4", "kg·m²", "estimate of m̄_1"),
+        Signal("theta_hat_5", "kg·m²", "estimate of c / b"),
+        Signal("theta_hat_6", "N·m·s", "estimate of d̄_21"),
+        Signal("theta_hat_7", "N·m·s", "estimate of d̄_22"),
+        Signal("theta_hat_8", "kg·m²", "estimate of m̄_2"),
+        Signal("kappa_hat", "N·m", "estimate of the disturbance bound, (36)"),
+    )
+
+    def __init__(
+        self,
+        gains: "AdaptiveDsc.Gains",
+        wheels: Wheels,
+        period_s: float,
+        path: RobotPath,  # noqa: ARG002 - the reference at the present s is enough
+    ) -> None:
+        h, g = period_s, gains
+        rates = tuple(h * k for k in g.k5)
+        self._rates_1: Row = (rates[0], rates[1], rates[2], rates[3])
+        self._rates_2: Row = (rates[4], rates[5], rates[6], rates[7])
+        self._bounds = Projection.of(g.sigma_max, g.sigma_margin)
+        self._estimates: tuple[Row, Row, float] = (
+            g.theta_hat_0[:4],
+            g.theta_hat_0[4:],
+            g.kappa_hat_0,
+        )
+        keep = exp(-g.eta * g.rho * h)
+        self._constants = (
+            *(g.k1, g.k2, g.k3, g.k4),
+            *(g.gamma_1_s, g.gamma_2_s, g.gamma_3_s),
+            *(smoothing(h, gamma) for gamma in (g.gamma_1_s, g.gamma_2_s, g.gamma_3_s)),
+            *(keep, (1.0 - keep) / g.rho, g.sgn_width),
+            *(wheels.radius_m, wheels.half_track_m),
+        )
+
+    def step(
+        self, state: DscState | None, motion: RobotMotion, reference: Reference, along: PathVariable
+    ) -> LawOutput:
+        """One period of (8)-(36)."""
+        k1, k2, k3, k4, g1, g2, g3, a1, a2, a3, keep, gain, width, r, b = self._constants
+        x, y, theta, v, omega = motion
+        x_d, y_d, theta_d, v_bar_d, omega_bar_d = reference
+        s_dot = along[1]
+        x_e, y_e, theta_e = path_errors(x, y, theta, x_d, y_d, theta_d)  # (8)
+        approach, bar_theta = self._approach(x_e, y_e, k1, k2)  # (17)
+        bar_v = approach + v_bar_d * s_dot * cos(theta_e)  # (15)
+        turn = -k3 * (theta_e - bar_theta) + omega_bar_d * s_dot
+        if state is None:
+            state = DscState(bar_theta, bar_v, turn, *self._estimates)
+        alpha_theta, alpha_v, alpha_omega, theta_1, theta_2, kappa = state
+        rate_theta = (bar_theta - alpha_theta) / g1  # (19)
+        rate_v = (bar_v - alpha_v) / g2  # (20)
+        bar_omega = turn + rate_theta  # (25)
+        rate_omega = (bar_omega - alpha_omega) / g3  # (27)
+        e_1, e_2 = v - alpha_v, omega - alpha_omega  # (30)
+        f_1 = (omega * omega, -v, -omega, -rate_v)  # (32)
+        f_2 = (-v * omega, -v, -omega, -rate_omega)
+        t1, t2, t3, t4 = theta_1
+        t5, t6, t7, t8 = theta_2
+        known_1 = f_1[0] * t1 - v * t2 - omega * t3 - rate_v * t4
+        known_2 = f_2[0] * t5 - v * t6 - omega * t7 - rate_omega * t8
+        u_1 = -k4 * e_1 - known_1 - kappa * tanh(e_1 / width)  # (34)
+        u_2 = -k4 * e_2 - known_2 - kappa * tanh(e_2 / width)
+        tau_right, tau_left = wheel_torques(u_1, u_2, r, b)  # (3)
+        after = (
+            alpha_theta + a1 * (bar_theta - alpha_theta),
+            alpha_v + a2 * (bar_v - alpha_v),
+            alpha_omega + a3 * (bar_omega - alpha_omega),
+            self._learn(theta_1, f_1, e_1, self._rates_1, k4),  # (35)
+            self._learn(theta_2, f_2, e_2, self._rates_2, k4),
+            keep * kappa + gain * hypot(e_1, e_2),  # (36)
+        )
+        signals = (x_e, y_e, theta_e, alpha_theta, alpha_v, alpha_omega, e_1, e_2)
+        said = (*signals, *theta_1, *theta_2, kappa)
+        return _new(LawOutput, (tau_right, tau_left, _new(DscState, after), said))
+
+    def _approach(self, x_e: float, y_e: float, k1: float, k2: float) -> tuple[float, float]:
+        """The part of (15) that closes x_e, and (17)."""
+        return -k1 * x_e, -atan(k2 * y_e)
+
+    def _learn(self, row: Row, regressor: Row, error: float, rates: Row, _k4: float) -> Row:
+        """One period of (35) for one row of Ω."""
+        return adapt(row, regressor, error, rates, self._bounds)
+
+    def hold(self, before: DscState | None, after: DscState) -> DscState:
+        """Filters go on; Θ̂ and κ̂ hold still, or would learn the limit."""
+        theta_1, theta_2, kappa = self._estimates if before is None else before[3:]
+        return after._replace(theta_1=theta_1, theta_2=theta_2, kappa=kappa)
+
+    @classmethod
+    def approach_rate_1_s(cls, gains: SurfaceGains) -> float | None:
+        """k_1 of (15)."""
+        return gains.k1
+
+    @classmethod
+    def speed_gain_N_m_s(cls, gains: SurfaceGains) -> float | None:
+        """k_4 of (34)."""
+        return gains.k4

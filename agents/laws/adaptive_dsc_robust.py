@@ -1,0 +1,73 @@
+"""The adaptive law for real rates, real drives and starts off the path.
+
+Four changes to `agents.laws.adaptive_dsc`, all of them that law again to first order on the path:
+
+    v̄ = −V tanh(k_1 x_e / V) + v̄_d ṡ cos θ_e           bounded approach speed    (15)
+    θ̄ = −atan(k_2 y_e / (1 + k_2 |x_e|))                 no spinning far off       (17)
+    |τ| ≤ `torque_limit_wheel_N_m`; Θ̂ and κ̂ hold still while a wheel is at it           (34)
+    Θ̂_r' divided by 1 + h |K_5 F_r²| / (k_4/4)           stable when sampled       (35)
+"""
+
+from dataclasses import dataclass
+from math import atan, tanh
+
+from agents.laws.adaptive_dsc import AdaptiveDsc, DscState
+from agents.laws.dsc_terms import Row, adapt
+from agents.laws.interface import (
+    LawOutput,
+    PathVariable,
+    Reference,
+    RobotMotion,
+    RobotPath,
+    Wheels,
+)
+from configs.parameters import Positive, parameter
+
+
+class AdaptiveDscRobust(AdaptiveDsc):
+    """Equations (8)-(36) with the four changes above."""
+
+    @dataclass(frozen=True, slots=True, kw_only=True)
+    class Gains(AdaptiveDsc.Gains):
+        """Gains of (15)-(36), and the two bounds."""
+
+        v_bar_limit_m_s: Positive = parameter(2.0, "largest approach speed V")
+        torque_limit_wheel_N_m: Positive = parameter(2.0, "per wheel, at the wheel")
+
+    def __init__(
+        self,
+        gains: "AdaptiveDscRobust.Gains",
+        wheels: Wheels,
+        period_s: float,
+        path: RobotPath,
+    ) -> None:
+        super().__init__(gains, wheels, period_s, path)
+        self._v_limit = gains.v_bar_limit_m_s
+        self._tau_limit = gains.torque_limit_wheel_N_m
+
+    def step(
+        self, state: DscState | None, motion: RobotMotion, reference: Reference, along: PathVariable
+    ) -> LawOutput:
+        """One period; at the torque limit the estimates hold still."""
+        out = super().step(state, motion, reference, along)
+        limit, right, left = self._tau_limit, out[0], out[1]
+        if abs(right) > limit or abs(left) > limit:
+            right, left = min(max(right, -limit), limit), min(max(left, -limit), limit)
+            return LawOutput(right, left, self.hold(state, out.state), out.signals)
+        return out
+
+    def _approach(self, x_e: float, y_e: float, k1: float, k2: float) -> tuple[float, float]:
+        limit = self._v_limit
+        return -limit * tanh(k1 * x_e / limit), -atan(k2 * y_e / (1.0 + k2 * abs(x_e)))
+
+    def _learn(self, row: Row, regressor: Row, error: float, rates: Row, k4: float) -> Row:
+        f1, f2, f3, f4 = regressor
+        r1, r2, r3, r4 = rates
+        size = r1 * f1 * f1 + r2 * f2 * f2 + r3 * f3 * f3 + r4 * f4 * f4
+        normalised = error * (1.0 / (1.0 + size / (0.25 * k4)))
+        return adapt(row, regressor, normalised, rates, self._bounds)
+
+    @classmethod
+    def torque_limit_wheel_N_m(cls, gains: "AdaptiveDscRobust.Gains") -> float:
+        """The law's limit."""
+        return gains.torque_limit_wheel_N_m

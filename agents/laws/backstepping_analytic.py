@@ -1,0 +1,157 @@
+"""A baseline: backstepping with analytic derivatives of its virtual controls, without filters.
+
+    x_e' = v − A cos θ_e + ω y_e,  y_e' = A sin θ_e − ω x_e,  θ_e' = ω − W           (9)
+    v̄ = −k_1 x_e + A cos θ_e                                                        (15)
+    θ̄ = −atan(k_2 y_e)                                                              (17)
+
+with A = v̄_d ṡ, W = ω̄_d ṡ. For G = k_2 / (1 + k_2² y_e²) the derivative of θ̄ has ω itself in it,
+
+    θ̄' = −G y_e' = −G A sin θ_e + G x_e ω                                           [1]
+
+so θ_e' = −k_3 (θ_e − θ̄) + θ̄' is solved for it:
+
+    ω̄ = (−k_3 (θ_e − θ̄) + W − G A sin θ_e) / (1 − G x_e)                            [2]
+    e = (v − v̄, ω − ω̄)                                                              [3]
+    u_r = −k_4 e_r − F_r · f Θ,  F as in (32) with v̄', ω̄' for the filters' rates    [4]
+    τ = B u                                                                          (3)
+
+v̄' and ω̄' are the derivatives of (15) and [2] along (9) by the chain rule. They take what the
+paper's law does without: v̄_d' and ω̄_d' by s, the path's third derivative, here by central
+differences of the path; s̈, and with it what the neighbours say, inside the torque; and 1 − G x_e
+away from 0, where the robot would have to spin: it is held at `margin` and above. Θ is the design's
+as in `agents.laws.fixed_dsc`; nothing adapts, and there is no state.
+"""
+
+from dataclasses import dataclass
+from math import atan, cos, sin
+
+from agents.laws.dsc_terms import Eight, path_errors, wheel_torques
+from agents.laws.fixed_dsc import PAPER_THETA, scaled
+from agents.laws.interface import (
+    PATH_ERRORS,
+    Law,
+    LawOutput,
+    PathVariable,
+    Reference,
+    RobotMotion,
+    RobotPath,
+    Signal,
+    Wheels,
+)
+from configs.parameters import NotNegative, Parameters, Positive, parameter
+
+_STEP_M = 1e-4
+"""Of the central differences along the path."""
+
+
+class BacksteppingAnalytic(Law):
+    """Equations (15), (17), [1]-[4]."""
+
+    @dataclass(frozen=True, slots=True, kw_only=True)
+    class Gains(Parameters):
+        """Gains of (15), (17), [2], [4], and the parameters."""
+
+        k1: Positive = parameter(2.0, "(15), of x_e [1/s]")
+        k2: Positive = parameter(3.0, "(17), of y_e [1/m]")
+        k3: Positive = parameter(1.5, "[2], of the heading [1/s]")
+        k4: Positive = parameter(3.0, "[4], of the speeds [N·m·s/m, N·m·s/rad]")
+        margin: Positive = parameter(0.1, "least 1 − G x_e")
+        theta: Eight = parameter(PAPER_THETA, "Θ of the design [kg·m², N·m·s]")
+        factor: NotNegative = parameter(1.0, "the law uses this multiple of theta")
+
+    SIGNALS = (
+        *PATH_ERRORS,
+        Signal("v_bar_m_s", "m/s", "virtual control, (15)"),
+        Signal("omega_bar_rad_s", "rad/s", "virtual control, [2]"),
+        Signal("v_bar_rate_m_s2", "m/s²", "its derivative"),
+        Signal("omega_bar_rate_rad_s2", "rad/s²", "its derivative"),
+        Signal("xi_e1_m_s", "m/s", "speed error, [3]"),
+        Signal("xi_e2_rad_s", "rad/s", "turn rate error, [3]"),
+        Signal("one_minus_G_x_e", "1", "the divisor of [2], before it is held"),
+    )
+
+    def __init__(
+        self,
+        gains: "BacksteppingAnalytic.Gains",
+        wheels: Wheels,
+        period_s: float,  # noqa: ARG002 - nothing is integrated
+        path: RobotPath,
+    ) -> None:
+        self._gains, self._wheels, self._path = gains, wheels, path
+        self._theta = scaled(gains.theta, gains.factor)
+
+    def step(
+        self,
+        state: None,  # noqa: ARG002 - there is none
+        motion: RobotMotion,
+        reference: Reference,
+        along: PathVariable,
+    ) -> LawOutput:
+        """One tick of (9)-[4]."""
+        v, omega = motion.v, motion.omega
+        errors = path_errors(*motion[:3], *reference[:3])  # (8)
+        v_bar, v_rate, omega_bar, omega_rate, divisor = self.virtual(
+            errors, v, omega, reference, along
+        )
+        e_1, e_2 = v - v_bar, omega - omega_bar  # [3]
+        t1, t2, t3, t4, t5, t6, t7, t8 = self._theta
+        known_1 = omega * omega * t1 - v * t2 - omega * t3 - v_rate * t4
+        known_2 = -v * omega * t5 - v * t6 - omega * t7 - omega_rate * t8
+        k4, wheels = self._gains.k4, self._wheels
+        u_1, u_2 = -k4 * e_1 - known_1, -k4 * e_2 - known_2  # [4]
+        right, left = wheel_torques(u_1, u_2, wheels.radius_m, wheels.half_track_m)  # (3)
+        said = (*errors, v_bar, omega_bar, v_rate, omega_rate, e_1, e_2, divisor)
+        return LawOutput(right, left, None, said)
+
+    def virtual(
+        self,
+        errors: tuple[float, float, float],
+        v: float,
+        omega: float,
+        reference: Reference,
+        along: PathVariable,
+    ) -> tuple[float, float, float, float, float]:
+        """v̄, v̄', ω̄, ω̄', and the divisor of [2]."""
+        g, (x_e, y_e, theta_e), (s, s_dot, s_ddot) = self._gains, errors, along
+        _, _, _, v_bar_d, omega_bar_d = reference
+        v_bar_d_s, omega_bar_d_s = self._slopes(s)
+        a, w = v_bar_d * s_dot, omega_bar_d * s_dot
+        a_rate = v_bar_d_s * s_dot * s_dot + v_bar_d * s_ddot
+        w_rate = omega_bar_d_s * s_dot * s_dot + omega_bar_d * s_ddot
+        c, n = cos(theta_e), sin(theta_e)
+        x_rate, y_rate, theta_rate = v - a * c + omega * y_e, a * n - omega * x_e, omega - w  # (9)
+
+        v_bar = -g.k1 * x_e + a * c  # (15)
+        v_bar_rate = -g.k1 * x_rate + a_rate * c - a * n * theta_rate
+
+        square = 1.0 + g.k2 * g.k2 * y_e * y_e
+        slope = g.k2 / square  # G
+        slope_rate = -2.0 * g.k2**3 * y_e * y_rate / (square * square)
+        bar_theta, bar_theta_rate = -atan(g.k2 * y_e), -slope * y_rate  # (17), [1]
+        above = -g.k3 * (theta_e - bar_theta) + w - slope * a * n
+        above_rate = -g.k3 * (theta_rate - bar_theta_rate) + w_rate
+        above_rate -= slope_rate * a * n + slope * (a_rate * n + a * c * theta_rate)
+        divisor = 1.0 - slope * x_e
+        held = max(divisor, g.margin)
+        held_rate = -slope_rate * x_e - slope * x_rate if held == divisor else 0.0
+        omega_bar = above / held  # [2]
+        return v_bar, v_bar_rate, omega_bar, (above_rate - omega_bar * held_rate) / held, divisor
+
+    def _slopes(self, s: float) -> tuple[float, float]:
+        """v̄_d' and ω̄_d' by s."""
+        after, before = self._path(s + _STEP_M), self._path(s - _STEP_M)
+        span = 2.0 * _STEP_M
+        return (after[3] - before[3]) / span, (after[4] - before[4]) / span
+
+    def hold(self, before: None, after: None) -> None:
+        """Nothing is kept."""
+
+    @classmethod
+    def approach_rate_1_s(cls, gains: "BacksteppingAnalytic.Gains") -> float | None:
+        """k_1 of (15)."""
+        return gains.k1
+
+    @classmethod
+    def speed_gain_N_m_s(cls, gains: "BacksteppingAnalytic.Gains") -> float | None:
+        """k_4 of [4]."""
+        return gains.k4

@@ -1,0 +1,261 @@
+"""Tables of a file whose keys depend on a name in them: the law's gains, an own shape's parameters.
+
+    [control]                       [path]
+    law = "my_law:MyLaw"            kind = "my_paths:Clover"
+    k = 2.0                         radius_m = 3.0
+
+The name leads to a class (`configs.plugins`), the class to its parameters, and these are validated
+like any other section: unknown keys, types, bounds. Where the file is, is in the context of the
+validation: {"folder": ...}; {"recorded": True} takes classes that aren't here as they come.
+"""
+
+import contextlib
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from configs.parameters import Parameters
+from configs.plugins import Choice, Kind, Plugin, PluginError, Recorded, find, load
+
+if TYPE_CHECKING:
+    from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, ValidationError
+    from pydantic_core import InitErrorDetails, core_schema
+
+STATED = "stated"
+"""The type of an error that is in our words already: in its context, under `right`."""
+
+
+class Chooser(NamedTuple):
+    """Makes a table a `Choice`: annotates it in a model."""
+
+    kind: Kind
+    key: str  # that holds the name
+    shipped: Mapping[str, str]
+    default: str = ""  # the name if there is none
+
+    def choose(self, table: Mapping[str, Any], folder: str, *, recorded: bool = False) -> Choice:
+        """The choice that a table makes.
+
+        Raises:
+            ValidationError: of the table's keys.
+        """
+        rest = {key: _plain(value) for key, value in table.items() if key != self.key}
+        name = table.get(self.key, self.default)
+        if not isinstance(name, str) or not name:
+            raise _stated(self.key, name, "must be a text, the name of a " + self.kind.word)
+        try:
+            plugin = find(self.kind, name, folder, self.shipped)
+            if recorded and plugin.folder == folder and name not in self.shipped:
+                return Choice(plugin, Recorded(tuple(rest.items())))
+            parameters = parameters_of(plugin)
+        except PluginError as error:
+            if recorded:
+                return Choice(Plugin(self.kind, name, name), Recorded(tuple(rest.items())))
+            raise _stated(self.key, name, str(error)) from error
+        return Choice(plugin, _validated(parameters, rest))
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: "GetCoreSchemaHandler") -> Any:
+        """Tables become choices, and are written as tables."""
+        from pydantic_core import core_schema
+
+        def made(value: Any, info: "core_schema.ValidationInfo") -> Choice:
+            if isinstance(value, Choice):
+                return value
+            if not isinstance(value, Mapping):
+                raise _in_words("must be a table")
+            context = info.context or {}
+            folder, recorded = context.get("folder", ""), context.get("recorded", False)
+            return self.choose(value, folder, recorded=recorded)
+
+        return core_schema.with_info_plain_validator_function(
+            made,
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                lambda choice: table_of(choice, self.key), return_schema=core_schema.any_schema()
+            ),
+        )
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: "GetJsonSchemaHandler") -> Any:
+        """The keys of what is shipped by name; of anything else all keys."""
+        about = f'a shipped {self.kind.word}, or "module:Class" of your own'
+        names = [*self.shipped]
+        key: dict[str, Any] = {"type": "string", "description": about, "examples": names}
+        if self.default:
+            key["default"] = self.default
+        cases = []
+        for name in self.shipped:
+            parameters = parameters_of(find(self.kind, name, "", self.shipped))
+            keys = _adapter(parameters).json_schema()["properties"]
+            case: dict[str, Any] = {"properties": {self.key: {"const": name}}}
+            if name != self.default:
+                case["required"] = [self.key]
+            then = {"properties": {self.key: True, **keys}, "additionalProperties": False}
+            cases.append({"if": case, "then": then})
+        made: dict[str, Any] = {"type": "object", "properties": {self.key: key}}
+        if cases:
+            made["allOf"] = cases
+        if not self.default:
+            made["required"] = [self.key]
+        return made
+
+
+def parameters_of(plugin: Plugin) -> type[Parameters]:
+    """The type of a plugin's parameters.
+
+    Raises:
+        PluginError: the plugin can't be had.
+    """
+    found = load(plugin)
+    parameters: type[Parameters] = found.Gains if plugin.kind is Kind.LAW else found
+    try:
+        _adapter(parameters)
+    except Exception as error:  # pydantic's, of annotations that it doesn't know
+        raise PluginError(f"{parameters.__qualname__}: {str(error).splitlines()[0]}") from error
+    return parameters
+
+
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """Keys of a table that a robot has differently from the fleet's; validated together with it."""
+
+    table: dict[str, Any]
+    folder: str = field(default="", compare=False)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: "GetCoreSchemaHandler") -> Any:
+        """Any table."""
+        from pydantic_core import core_schema
+
+        def made(value: Any, info: "core_schema.ValidationInfo") -> Changes:
+            if isinstance(value, cls):
+                return value
+            if not isinstance(value, Mapping):
+                raise _in_words("must be a table")
+            return cls(dict(value), (info.context or {}).get("folder", ""))
+
+        return core_schema.with_info_plain_validator_function(
+            made,
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                lambda changes: changes.table, return_schema=core_schema.any_schema()
+            ),
+        )
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: "GetJsonSchemaHandler") -> Any:
+        """Any table."""
+        return {"type": "object"}
+
+
+def chosen_anew(choice: Choice, chooser: Chooser, changes: Changes) -> Choice:
+    """What a robot says differently of the fleet's choice.
+
+    With another class it keeps the parameters that both classes have from a common one.
+
+    Raises:
+        ValidationError: of the keys of `changes`.
+    """
+    if not changes.table:
+        return choice
+    name = changes.table.get(chooser.key, choice.name)
+    if isinstance(choice.parameters, Recorded):
+        merged = {**dict(choice.parameters.values), **changes.table}
+        merged.pop(chooser.key, None)
+        return Choice(Plugin(chooser.kind, name, name), Recorded(tuple(merged.items())))
+    kept: dict[str, Any] = {}
+    if isinstance(name, str):
+        with contextlib.suppress(PluginError):  # said by `choose`
+            plugin = find(chooser.kind, name, changes.folder, chooser.shipped)
+            common = _common(type(choice.parameters), parameters_of(plugin))
+            kept = {name: getattr(choice.parameters, name) for name in common}
+    return chooser.choose({chooser.key: name, **kept, **changes.table}, changes.folder)
+
+
+def _common(one: type[Parameters], other: type[Parameters]) -> list[str]:
+    """Names of the fields of the nearest class that both derive from."""
+    nearest = next(base for base in one.__mro__ if issubclass(other, base))
+    return [one.name for one in fields(nearest)] if is_dataclass(nearest) else []
+
+
+def table_of(choice: Choice, key: str) -> dict[str, Any]:
+    """The table of a file that makes this choice, all defaults written out."""
+    if isinstance(choice.parameters, Recorded):
+        return {key: choice.name, **dict(choice.parameters.values)}
+    adapter = _adapter(type(choice.parameters))
+    table: dict[str, Any] = adapter.dump_python(choice.parameters, mode="json", exclude_none=True)
+    return {key: choice.name, **table}
+
+
+_adapters: "dict[type[Parameters], TypeAdapter[Any]]" = {}
+
+
+def _adapter(parameters: type[Parameters]) -> "TypeAdapter[Any]":
+    from pydantic import TypeAdapter
+
+    if parameters not in _adapters:
+        _adapters[parameters] = TypeAdapter(parameters)
+    return _adapters[parameters]
+
+
+def _plain(value: Any) -> Any:
+    """Lists of TOML as the tuples that strict fields want."""
+    if isinstance(value, list):
+        return tuple(map(_plain, value))
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return value
+
+
+def _validated(parameters: type[Parameters], table: dict[str, Any]) -> Parameters:
+    from pydantic import ValidationError
+
+    known = sorted(one.name for one in fields(parameters))  # type: ignore[arg-type]
+    wrong = [_unknown(key, value, known) for key, value in table.items() if key not in known]
+    made: Parameters | None = None
+    try:
+        made = _adapter(parameters).validate_python(
+            {key: value for key, value in table.items() if key in known}
+        )
+    except ValidationError as error:
+        wrong = [_again(item) for item in error.errors(include_url=False)] + wrong
+    except Exception as error:  # raised by the class itself, in its __post_init__
+        text = f"{type(error).__name__}: {error}"
+        raise _in_words(text) from error
+    if wrong or made is None:
+        raise ValidationError.from_exception_data(parameters.__name__, wrong)
+    return made
+
+
+def _again(item: Any) -> "InitErrorDetails":
+    details: dict[str, Any] = {"type": item["type"], "loc": item["loc"], "input": item["input"]}
+    if item["type"] == "value_error":
+        right = str(item["ctx"]["error"])
+        details["type"] = _in_words(right)
+    elif "ctx" in item:
+        details["ctx"] = item["ctx"]
+    made: InitErrorDetails = details  # type: ignore[assignment]
+    return made
+
+
+def _unknown(key: str, value: object, known: list[str]) -> "InitErrorDetails":
+    close = difflib.get_close_matches(key, known, 1)
+    hint = f"; did you mean {close[0]}?" if close else ""
+    right = f"unknown key{hint} (known here: {', '.join(known)})"
+    from pydantic_core import InitErrorDetails
+
+    stated = _in_words(right)
+    return InitErrorDetails(type=stated, loc=(key,), input=value)
+
+
+def _stated(key: str, value: object, right: str) -> "ValidationError":
+    from pydantic import ValidationError
+    from pydantic_core import InitErrorDetails
+
+    stated = _in_words(right)
+    details = InitErrorDetails(type=stated, loc=(key,), input=value)
+    return ValidationError.from_exception_data(key, [details])
+
+
+def _in_words(right: str) -> Any:
+    from pydantic_core import PydanticCustomError
+
+    return PydanticCustomError(STATED, "{right}", {"right": right})

@@ -1,0 +1,264 @@
+"""Laws, path shapes and formation offsets by name: shipped, installed, or in a file of one's own.
+
+    adaptive_dsc      shipped: a row of the tables below
+    lqr               an entry point of the group, from an installed package
+    my_law:MyLaw      class MyLaw of my_law.py beside the scenario file, else on sys.path
+
+A file beside the scenario is loaded by its path, under a name of its own, and its folder is put at
+the end of sys.path for what it imports: it hides no module of anything else. Processes get a
+`Plugin`, which says where the class is, and import it themselves.
+"""
+
+import importlib
+import importlib.util
+import pickle
+import sys
+import traceback
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from configs.errors import ScenarioError
+from configs.parameters import Parameters
+from configs.signals import signals_fault
+
+LAWS = {
+    "adaptive_dsc": "agents.laws.adaptive_dsc:AdaptiveDsc",
+    "adaptive_dsc_robust": "agents.laws.adaptive_dsc_robust:AdaptiveDscRobust",
+    "fixed_dsc": "agents.laws.fixed_dsc:FixedDsc",
+    "backstepping_analytic": "agents.laws.backstepping_analytic:BacksteppingAnalytic",
+}
+"""The laws that are shipped: class by name."""
+
+
+class Kind(Enum):
+    """What a plugin is; the value is its word in messages and its entry point group."""
+
+    LAW = "law", "fleetloop.laws"
+    PATH = "path shape", "fleetloop.paths"
+    OFFSET = "formation offset", "fleetloop.offsets"
+
+    @property
+    def word(self) -> str:
+        """For people."""
+        return self.value[0]
+
+    @property
+    def group(self) -> str:
+        """Of entry points."""
+        return self.value[1]
+
+
+class PluginError(ScenarioError):
+    """A name of a file leads to no usable class; the text says why, without the name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plugin:
+    """Where a class is."""
+
+    kind: Kind
+    name: str  # as in the file
+    target: str  # "module:Class"
+    folder: str = ""  # where the module is looked for first; "" is nowhere
+
+
+def find(kind: Kind, name: str, folder: str, shipped: Mapping[str, str]) -> Plugin:
+    """Where a name leads.
+
+    Raises:
+        PluginError: nowhere.
+    """
+    if name in shipped:
+        return Plugin(kind, name, shipped[name])
+    if ":" in name:
+        return Plugin(kind, name, name, folder)
+    installed = entry_points(kind)
+    if name in installed:
+        return Plugin(kind, name, installed[name])
+    import difflib
+
+    known = sorted({*shipped, *installed})
+    close = difflib.get_close_matches(name, known, 1)
+    hint = f"; did you mean {close[0]}?" if close else ""
+    raise PluginError(
+        f"no such {kind.word}{hint} (known: {', '.join(known)}; one of your own is"
+        f' "module:Class", from module.py beside the scenario)'
+    )
+
+
+def entry_points(kind: Kind) -> dict[str, str]:
+    """What installed packages offer: class by name."""
+    from importlib import metadata
+
+    return {point.name: point.value for point in metadata.entry_points(group=kind.group)}
+
+
+def load(plugin: Plugin) -> Any:
+    """The class of a plugin.
+
+    Raises:
+        PluginError: there is no such module or class, it fails, or it isn't what it should be.
+    """
+    module_name, _, path = plugin.target.partition(":")
+    if not module_name or not path:
+        raise PluginError(f'must be "module:Class", not "{plugin.target}"')
+    module = _module(plugin, module_name)
+    found: Any = module
+    for part in path.split("."):
+        found = getattr(found, part, None)
+        if found is None:
+            names = [n for n, value in vars(module).items() if _is_own(value, module)]
+            has = f"; it has {', '.join(names)}" if names else ""
+            raise PluginError(f"{_where(module)} has no {path}{has}")
+    fault = _FAULTS[plugin.kind](found)
+    if fault is not None:
+        raise PluginError(f"{_where(module)}: {path} is no {plugin.kind.word}: {fault}")
+    return found
+
+
+def _is_own(value: object, module: ModuleType) -> bool:
+    return isinstance(value, type) and value.__module__ == module.__name__
+
+
+def _where(module: ModuleType) -> str:
+    return getattr(module, "__file__", None) or module.__name__
+
+
+def _module(plugin: Plugin, name: str) -> ModuleType:
+    beside = _beside(plugin.folder, name)
+    try:
+        if beside is not None:
+            return _loaded(beside, name)
+        if plugin.folder and plugin.folder not in sys.path:
+            sys.path.append(plugin.folder)
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        if beside is None and error.name is not None and f"{name}.".startswith(f"{error.name}."):
+            looked = f"no {name}.py in {plugin.folder}, and " if plugin.folder else ""
+            raise PluginError(f"{looked}no module {name} is installed") from error
+        raise PluginError(_raised(error)) from error
+    except PluginError:
+        raise
+    except Exception as error:
+        raise PluginError(_raised(error)) from error
+
+
+def _beside(folder: str, name: str) -> Path | None:
+    """The module of this name in a folder, None if there is none."""
+    if not folder or "." in name:
+        return None
+    options = (Path(folder) / f"{name}.py", Path(folder) / name / "__init__.py")
+    return next((path.resolve() for path in options if path.is_file()), None)
+
+
+def _loaded(file: Path, name: str) -> ModuleType:
+    """A module from its file, again only when the file has changed."""
+    about = file.stat()
+    stamp = f"{file} {about.st_mtime_ns} {about.st_size}"
+    unique = f"{name}@{zlib.crc32(stamp.encode()):08x}"
+    if unique in sys.modules:
+        return sys.modules[unique]
+    packages = [str(file.parent)] if file.name == "__init__.py" else None
+    spec = importlib.util.spec_from_file_location(unique, file, submodule_search_locations=packages)
+    if spec is None or spec.loader is None:
+        raise PluginError(f"{file} can't be imported")
+    folder = str(file.parent.parent if packages else file.parent)
+    if folder not in sys.path:
+        sys.path.append(folder)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[unique] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[unique]
+        raise
+    return module
+
+
+def _raised(error: BaseException) -> str:
+    """An error of somebody else's code with the place that raised it."""
+    if isinstance(error, SyntaxError):
+        return f"{error.filename}, line {error.lineno}: {error.msg}"
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f"{frames[-1].filename}, line {frames[-1].lineno}: " if frames else ""
+    return f"{place}{type(error).__name__}: {error}"
+
+
+# --- what a class has to be -----------------------------------------------------------------------
+
+
+def _parameters_fault(found: object) -> str | None:
+    if isinstance(found, type) and issubclass(found, Parameters):
+        if "__dataclass_fields__" in vars(found):
+            return None
+        return f"{found.__name__} must be a dataclass(frozen=True, slots=True, kw_only=True)"
+    return "it must derive from configs.parameters.Parameters"
+
+
+def _law_fault(law: Any) -> str | None:
+    found = law
+    missing = [name for name in ("Gains", "SIGNALS", "step", "hold") if not hasattr(found, name)]
+    if not isinstance(law, type):
+        return "it is no class"
+    if missing:
+        return f"it has no {', no '.join(missing)} (see agents.laws.interface.Law)"
+    fault = _parameters_fault(found.Gains)
+    if fault is not None:
+        return f"its Gains: {fault}"
+    if "law" in found.Gains.__dataclass_fields__:
+        return "its Gains: law is the key that names the law; choose another name"
+    return signals_fault(found.SIGNALS)
+
+
+def _shape_fault(found: Any) -> str | None:
+    fault = _parameters_fault(found)
+    if fault is not None:
+        return fault
+    if not callable(getattr(found, "jet", None)):
+        return "it has no jet(s)"
+    if "kind" in found.__dataclass_fields__:
+        return "kind is the key that names the class; choose another name"
+    return None
+
+
+_FAULTS = {Kind.LAW: _law_fault, Kind.PATH: _shape_fault, Kind.OFFSET: _shape_fault}
+
+
+# --- a plugin with its parameters -----------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A class of a file's choice, with its parameters; a process imports the class first."""
+
+    plugin: Plugin
+    parameters: Parameters
+
+    @property
+    def name(self) -> str:
+        """As in the file."""
+        return self.plugin.name
+
+    def load(self) -> Any:
+        """The class."""
+        return load(self.plugin)
+
+    def __reduce__(self) -> Any:
+        return _restored, (self.plugin, pickle.dumps(self.parameters))
+
+
+def _restored(plugin: Plugin, parameters: bytes) -> Choice:
+    load(plugin)
+    return Choice(plugin, pickle.loads(parameters))
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded(Parameters):
+    """Parameters of a class that isn't here, as a record has them."""
+
+    values: tuple[tuple[str, Any], ...]

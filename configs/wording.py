@@ -1,0 +1,50 @@
+"""Errors of pydantic in the words of a scenario file: what would be right."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from configs.choices import STATED
+from configs.patterns import WORDS
+
+MISSING = "(missing)"
+"""Stands for the value of a key that has none."""
+_WORDS = {
+    "missing": "must be given",
+    "greater_than": "must be greater than {gt}",
+    "greater_than_equal": "must be {ge} or more",
+    "less_than": "must be less than {lt}",
+    "less_than_equal": "must be {le} or less",
+    "finite_number": "must be a finite number",
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "int_parsing": "must be a whole number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "int_parsing_size": "is too large",
+    "bool_type": "must be true or false",
+    "string_type": "must be a text",
+    "path_type": "must be a text, the path of a file",
+    "string_too_short": "must not be empty",
+    "string_too_long": "must have {max_length} characters or fewer",
+    "literal_error": "must be {expected}",
+    "tuple_type": "must be a list",
+    "too_short": "must have {min_length} entries or more",
+    "too_long": "must have {max_length} entries or fewer",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+    "dataclass_type": "must be a table",
+}
+
+
+def right_of(item: Mapping[str, Any]) -> str:
+    """What would be right instead of what one error is about."""
+    kind, about = item["type"], item.get("ctx", {})
+    if kind == "value_error":
+        return str(about["error"])
+    if kind == STATED:
+        return str(about["right"])
+    if kind == "string_pattern_mismatch":
+        return WORDS.get(about["pattern"], f"must match {about['pattern']}")
+    shown = {k: f"{v:g}" if isinstance(v, float) else v for k, v in about.items()}
+    return _WORDS.get(kind, "is of the wrong kind").format(**shown)
