@@ -32,7 +32,7 @@ from typing import BinaryIO, TypeVar
 import setproctitle
 
 from bridge.waiting import readable
-from configs.errors import FleetloopError, PeerLostError
+from configs.errors import ExitStatus, FleetloopError, PeerLostError
 
 GRACE_S = 3.0
 LINGER_S = 2.0
@@ -90,21 +90,21 @@ class Status:
     """Why a process ended before its time: one line on standard output."""
 
     error: str
-    exit_code: int
+    exit_status: int
     kind: str  # name of the error's class
 
     def to_line(self) -> bytes:
         """The line, with its newline."""
-        return json.dumps([self.error, self.exit_code, self.kind]).encode() + b"\n"
+        return json.dumps([self.error, self.exit_status, self.kind]).encode() + b"\n"
 
     @classmethod
     def from_line(cls, line: bytes) -> "Status | None":
         """The status that a line says, None if it says none."""
         try:
-            error, exit_code, kind = json.loads(line)
+            error, exit_status, kind = json.loads(line)
         except (ValueError, TypeError):
             return None
-        return cls(str(error), int(exit_code), str(kind))
+        return cls(str(error), int(exit_status), str(kind))
 
 
 def pack_brief(brief: object) -> bytes:
@@ -127,13 +127,13 @@ def serve(
     """
     if sys.stdin.isatty():
         _tell(f"{name}: started by `fleetloop run`, not by hand")
-        return 2
+        return ExitStatus.USAGE
     keep_to_itself()
     status_line = reserve_stdout()
     brief = _read_brief(sys.stdin.buffer)
     if not isinstance(brief, kind):
         _tell(f"{name}: no {kind.__name__} on standard input")
-        return 2
+        return ExitStatus.USAGE
     name_process(name)
     stop = Stop()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -149,12 +149,14 @@ def serve(
         if peer_lost:
             stop.requested_soon()
         if stop.reason != LAUNCHER_GONE:
-            _say(status_line, Status(str(error), error.exit_code, type(error).__name__), name)
-            return error.exit_code
+            _say(
+                status_line, Status(str(error), int(error.exit_status), type(error).__name__), name
+            )
+            return int(error.exit_status)
         word = None if peer_lost else str(error)
     if word and stop.reason == LAUNCHER_GONE:
         _tell(f"{name}: {LAUNCHER_GONE}; {word}")
-    return 0
+    return ExitStatus.OK
 
 
 def reserve_stdout() -> int:
@@ -256,7 +258,7 @@ def _watch_lifeline(stop: Stop, orphaned: Callable[[], None]) -> None:
     stop.end(LAUNCHER_GONE)
     orphaned()
     threading.Event().wait(GRACE_S)
-    os._exit(3)
+    os._exit(ExitStatus.INFRASTRUCTURE)
 
 
 def _say(descriptor: int, status: Status, name: str) -> None:

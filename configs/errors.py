@@ -1,12 +1,25 @@
 """What a user can cause: one line, and the exit status that the process ends with.
 
-Exit statuses of every command: 0 held, 1 an expectation failed (or a difference was found, or a
-record isn't all there), 2 usage or scenario, 3 infrastructure, 130 interrupted. Anything else is a
-bug and keeps its traceback.
+Any other exception is a bug and keeps its traceback.
 """
 
 from collections.abc import Sequence
+from enum import IntEnum
 from typing import NamedTuple
+
+
+class ExitStatus(IntEnum):
+    """Exit status of every command and of every role's process."""
+
+    OK = 0
+    FAILED = 1
+    """An expectation failed or was not reached, runs differ, or a record isn't all there."""
+    USAGE = 2
+    """An option, a scenario or a deployment is wrong; nothing was started."""
+    INFRASTRUCTURE = 3
+    """The machine, a process, a bus or a network failed."""
+    INTERRUPTED = 130
+    """Ended by a signal, as a shell counts Ctrl-C."""
 
 
 class Complaint(NamedTuple):
@@ -21,13 +34,13 @@ class Complaint(NamedTuple):
 class FleetloopError(Exception):
     """An error that a user can cause or mend; its text is the whole message."""
 
-    exit_code = 3
+    exit_status = ExitStatus.INFRASTRUCTURE
 
 
 class ScenarioError(FleetloopError):
     """A file or an option says something that can't be run; nothing was started."""
 
-    exit_code = 2
+    exit_status = ExitStatus.USAGE
 
     def __init__(self, text: str, complaints: Sequence[Complaint] = ()) -> None:
         super().__init__(text)
@@ -38,7 +51,7 @@ class ScenarioError(FleetloopError):
 class InfrastructureError(FleetloopError):
     """The machine, a process, a bus or a network failed; the text names which and when."""
 
-    exit_code = 3
+    exit_status = ExitStatus.INFRASTRUCTURE
 
 
 class PeerSilentError(InfrastructureError):

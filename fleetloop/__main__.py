@@ -8,6 +8,7 @@ import _signal  # type: ignore[import-not-found]  # `signal` takes imports of it
 import os
 
 INTERRUPTED = 130
+"""`configs.errors.ExitStatus.INTERRUPTED`, before anything is imported."""
 
 for _number in (_signal.SIGINT, _signal.SIGTERM):
     if _signal.getsignal(_number) != _signal.SIG_IGN:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from configs.errors import FleetloopError, ScenarioError
+from configs.errors import ExitStatus, FleetloopError, ScenarioError
 from fleetloop import numbers
 from fleetloop.can.app import app as can_app
 
@@ -413,17 +413,17 @@ def _common(
 
 def main() -> None:
     """Run the command line; every error that a user can cause is one line and an exit status."""
-    status: str | int | None = 0
+    status: str | int | None = ExitStatus.OK
     try:
         app()
     except SystemExit as ended:
         status = ended.code
     except FleetloopError as error:
         sys.stderr.write(f"fleetloop: {error}\n")
-        status = error.exit_code
+        status = int(error.exit_status)
     link = sys.modules.get("bridge.network.zenoh_link")
     if link is not None and link.ZenohLink.stuck:
         sys.stdout.flush()
         sys.stderr.flush()
-        os._exit(status if isinstance(status, int) else 1)
+        os._exit(status if isinstance(status, int) else ExitStatus.FAILED)
     sys.exit(status)

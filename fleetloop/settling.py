@@ -1,4 +1,9 @@
-"""Limits of an error that has settled, the same for a check, a rehearsal, a summary and a table."""
+"""When an error has settled, the same for a check, a rehearsal, a summary, a table and a figure.
+
+An error has settled at the time from which on it stays within ±`SETTLE_BAND`.
+"""
+
+import numpy as np
 
 SETTLE_BAND = 0.05
 """An error within this has settled: [m], [rad], [m/s]."""
@@ -6,3 +11,17 @@ LOST_M = 0.5
 """A robot or a path variable that ends farther off than this, and started closer, is lost."""
 FINAL_S = 5.0
 """The end of a run: what is called final is the greatest error of this last part of its rows."""
+
+
+def settled_from(values: np.ndarray, band: float = SETTLE_BAND) -> int:
+    """The index from which all values are within the band; their number if the last isn't."""
+    outside = np.flatnonzero(~(np.abs(values) <= band))
+    return int(outside[-1]) + 1 if len(outside) else 0
+
+
+def settle_s(t: np.ndarray, values: np.ndarray, band: float = SETTLE_BAND) -> float | None:
+    """Last time outside the band [s]; 0 if never outside, None if outside at the end."""
+    first = settled_from(values, band)
+    if first == 0:
+        return 0.0
+    return round(float(t[first - 1]), 9) if first < len(values) else None

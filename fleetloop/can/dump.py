@@ -20,7 +20,7 @@ from typing import TextIO
 from bridge.can_bus import sockets
 from bridge.drives import protocols
 from bridge.frame import EFF, Frame
-from configs.errors import ScenarioError
+from configs.errors import ExitStatus, ScenarioError
 from fleetloop.can import error_frames, filters, text
 from fleetloop.can.client import Heard, Listener, open_bus
 from fleetloop.can.filters import Filter
@@ -141,12 +141,12 @@ def dump(targets: Sequence[str], options: Options) -> int:
                 _print_all(listener, passes, options)
                 sys.stdout.flush()
             except KeyboardInterrupt:
-                return 130
+                return ExitStatus.INTERRUPTED
             except BrokenPipeError:
                 listener.abandoned = True
             if listener.abandoned:
                 forget_output()
-                return 0
+                return ExitStatus.OK
             for farewell in listener.farewells:
                 note(f"fleetloop: {farewell}")
             return 3 if listener.broken else 0

@@ -15,7 +15,7 @@ from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import to_frame, to_message
 from bridge.drives import protocol
 from bridge.drives.interface import EndpointFile, Versions
-from configs.errors import InfrastructureError, ScenarioError
+from configs.errors import ExitStatus, InfrastructureError, ScenarioError
 from configs.sections import Drive
 from fleetloop.can.client import open_bus
 from fleetloop.terminal import note, say
@@ -46,13 +46,13 @@ def write_endpoints(bus: str | None, firmware: str | None, out: Path | None) -> 
     text = json.dumps(file.contents(versions), indent=2)
     if out is None:
         say(text)
-        return 0
+        return ExitStatus.OK
     try:
         out.write_text(text + "\n")
     except OSError as error:
         raise ScenarioError(f"--out {out}: {error.strerror}") from error
     note(f"{out}: endpoints of firmware {'.'.join(map(str, versions.firmware))}")
-    return 0
+    return ExitStatus.OK
 
 
 def ask(bus: FleetloopBus, name: str, within_s: float) -> Versions:

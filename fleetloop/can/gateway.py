@@ -21,7 +21,7 @@ import can
 
 from bridge.can_bus.interface import BusClosedError
 from bridge.can_bus.pythoncan import to_frame, to_message
-from configs.errors import InfrastructureError
+from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.echo import EchoGuard
 from fleetloop.can.far_bus import FarBus
@@ -209,7 +209,7 @@ def join(channel: str, far_bus: FarBus, *, retry_s: float = 0.0, with_rates: boo
         try:
             status = _pass_on(near, far, far_bus, ways, retry_s)
         except KeyboardInterrupt:
-            status = 130
+            status = ExitStatus.INTERRUPTED
     wall_s = time.monotonic() - start
     names = (f"{channel} → {far_bus.name}", f"{far_bus.name} → {channel}")
     for name, counters in zip(names, ways, strict=True):
@@ -236,12 +236,12 @@ def _pass_on(
                 raise gateway.near_gone
             note(f"fleetloop: {far_bus.name}: {gateway.far_gone}")
             if gateway.guard.storm:
-                return 3
+                return ExitStatus.INFRASTRUCTURE
             reopened = _reopen(far_bus, near, ways[0], retry_s)
     except can.CanError as gone:
         note(f"fleetloop: {gone}")
-        return 0 if isinstance(gone, BusClosedError) else 3
-    return 3
+        return ExitStatus.OK if isinstance(gone, BusClosedError) else ExitStatus.INFRASTRUCTURE
+    return ExitStatus.INFRASTRUCTURE
 
 
 def drain(bus: can.BusABC) -> int:

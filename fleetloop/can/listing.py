@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from bridge.can_bus import sockets
-from configs.errors import InfrastructureError
+from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.census import Census, Node
 from fleetloop.can.client import Listener, open_bus
 from fleetloop.launch.signals import interruptible
@@ -45,7 +45,7 @@ def list_buses(*, seconds: float, bit_rate: int, as_json: bool) -> int:
     try:
         reports = survey(seconds, bit_rate)
     except KeyboardInterrupt:
-        return 130
+        return ExitStatus.INTERRUPTED
     if as_json:
         say(json.dumps([asdict(report) for report in reports], indent=2))
     elif reports:
@@ -55,7 +55,7 @@ def list_buses(*, seconds: float, bit_rate: int, as_json: bool) -> int:
                 note(f"fleetloop: {report.run}/{report.bus}: {report.problem}")
     else:
         note(f"no bus is up in {sockets.base_folder()}")
-    return 0
+    return ExitStatus.OK
 
 
 def survey(seconds: float, bit_rate: int) -> list[BusReport]:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import can
 
 from bridge.can_bus.pythoncan import to_message
-from configs.errors import InfrastructureError
+from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can import text
 from fleetloop.can.client import open_bus
 from fleetloop.launch.signals import interruptible
@@ -48,5 +48,5 @@ def send(
         except can.CanOperationError as error:
             raise InfrastructureError(f"{error}, after {sent} frames") from error
         except KeyboardInterrupt:
-            return 130
-    return 0
+            return ExitStatus.INTERRUPTED
+    return ExitStatus.OK

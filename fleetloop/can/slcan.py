@@ -19,7 +19,7 @@ import can
 
 from bridge.can_bus.interface import BusClosedError, FleetloopBus
 from bridge.can_bus.pythoncan import to_frame, to_message
-from configs.errors import InfrastructureError
+from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.slcan_adapter import Adapter
 from fleetloop.launch.signals import interruptible
@@ -139,15 +139,16 @@ def offer(channel: str, link: Path | None) -> int:
     ):
         say(str(link or port.device))
         note(f"bus {channel} is an slcan adapter at {port.device}; Ctrl-C ends it")
-        status = 0
+        status = ExitStatus.OK
         try:
             while True:
                 port.serve()
         except KeyboardInterrupt:
-            status = 130
+            status = ExitStatus.INTERRUPTED
         except can.CanOperationError as error:
             note(f"fleetloop: {error}")
-            status = 0 if isinstance(error, BusClosedError) else 3
+            ended = isinstance(error, BusClosedError)
+            status = ExitStatus.OK if ended else ExitStatus.INFRASTRUCTURE
         counters = port.counters
         note(
             f"{counters.received} frames to the software, {counters.sent} from it,"

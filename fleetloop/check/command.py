@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.table import Table
 
 from configs.deployment import Deployment, load_deployment
-from configs.errors import Complaint, ScenarioError
+from configs.errors import Complaint, ExitStatus, ScenarioError
 from configs.loading import json_schema, load, shipped
 from configs.overrides import Overrides
 from configs.roles import AGENT
@@ -18,7 +18,6 @@ from fleetloop.check.finding import Finding, named, worst
 from fleetloop.check.rehearsal import rehearse
 from fleetloop.terminal import ResultConsole, say, say_json
 
-FINE, UNSOUND, WRONG = 0, 1, 2
 _VERDICTS = {
     "ok": "sound",
     "warning": "no error; mind the warnings",
@@ -43,14 +42,14 @@ def check_scenario(
         if not as_json:
             raise
         _say_json(problems=_problems(error))
-        return WRONG
+        return ExitStatus.USAGE
     unsound = any(finding.level == "error" for finding in found)
     if as_json:
         _say_json(findings=found)
-        return UNSOUND if unsound else FINE
+        return ExitStatus.FAILED if unsound else ExitStatus.OK
     ResultConsole().print(_table(scenario, found))
     say(_VERDICTS[worst(found)])
-    return UNSOUND if unsound else FINE
+    return ExitStatus.FAILED if unsound else ExitStatus.OK
 
 
 def _table(scenario: Scenario, findings: Sequence[Finding]) -> Table:

@@ -3,7 +3,7 @@
 from bridge.awake import AFTERMATH_S
 from bridge.network.reports import AgentReport, PlantReport, Report
 from configs.roles import AGENT, PLANT, short_name
-from fleetloop.launch.process_run import Outcome
+from fleetloop.launch.outcome import Outcome
 from fleetloop.results.summary import RunStats
 
 MOST_NOTICES = 200

@@ -12,7 +12,7 @@ from agents.__main__ import run
 from bridge.launcher import RUN_ENDED
 from bridge.process import LAUNCHER_GONE, keep_to_itself
 from configs.deployment import load_deployment
-from configs.errors import InfrastructureError, ScenarioError
+from configs.errors import ExitStatus, InfrastructureError, ScenarioError
 from configs.loading import load
 from configs.overrides import Overrides
 from configs.resolve import agent_brief
@@ -20,8 +20,6 @@ from configs.roles import AGENT
 from fleetloop.launch import placement
 from fleetloop.launch.signals import stop_on_signals
 from fleetloop.terminal import note
-
-ENDED, INTERRUPTED = 0, 130
 
 
 def run_agent(source: str, robot: str, deployment_file: Path, overrides: Overrides) -> int:
@@ -54,5 +52,5 @@ def run_agent(source: str, robot: str, deployment_file: Path, overrides: Overrid
         early += ", or the network to it"
     elif not early.startswith(RUN_ENDED):
         note(f"{role}: {early or 'end of the run'}")
-        return INTERRUPTED if early else ENDED
+        return ExitStatus.INTERRUPTED if early else ExitStatus.OK
     raise InfrastructureError(f"{role}: {early}: drives disarmed")

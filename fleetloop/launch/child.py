@@ -1,4 +1,4 @@
-"""The processes that a run starts: bear them, hear why they ended, end them within a bound.
+"""The processes that a run starts: forked, watched for their end, and ended within a bound.
 
 Only processes started here are ever signalled, by their own id. They run in their own session, so a
 Ctrl-C at the terminal reaches the launcher alone; their standard input is their lifeline.
@@ -15,7 +15,7 @@ from pathlib import Path
 
 from bridge.process import Status, pack_brief
 from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
-from fleetloop.launch.fork_server import Nursery
+from fleetloop.launch.fork_server import ForkServer
 
 KILLED, CRASHED, GAVE_UP, PEER_SILENT, PEER_LOST = range(5)
 _CONSEQUENCES = {PeerSilentError.__name__: PEER_SILENT, PeerLostError.__name__: PEER_LOST}
@@ -35,7 +35,9 @@ class Child:
     fds: tuple[int, ...]
     """The numbers that the descriptors given to it have there."""
 
-    def __init__(self, nursery: Nursery, name: str, module: str, fds: Sequence[int] = ()) -> None:
+    def __init__(
+        self, fork_server: ForkServer, name: str, module: str, fds: Sequence[int] = ()
+    ) -> None:
         self.name = name
         self.status: Status | None = None
         self._code: int | None = None
@@ -45,7 +47,7 @@ class Child:
         except OSError as error:
             raise InfrastructureError(f"can't start {name}: {error.strerror}") from error
         try:
-            self._pid, self.fds = nursery.bear(module, stdin, stdout, fds)
+            self._pid, self.fds = fork_server.fork(module, stdin, stdout, fds)
         except InfrastructureError:
             os.close(self._stdin)
             os.close(self._stdout)
@@ -77,7 +79,7 @@ class Child:
         if self._code is None:
             try:
                 pid, status = os.waitpid(self._pid, options)
-            except ChildProcessError:  # still the nursery's
+            except ChildProcessError:  # still the fork server's
                 return None
             if pid:
                 self._code = os.waitstatus_to_exitcode(status)
@@ -118,7 +120,7 @@ class Child:
         return _STATES.get("".join(stat.rpartition(")")[2].split()[:1]), "")
 
     def release(self) -> None:
-        """Tell it that its last word was heard."""
+        """Tell it that its report has arrived."""
         with contextlib.suppress(OSError):
             os.write(self._stdin, b"\n")
 

@@ -1,14 +1,14 @@
-"""The nursery: one process that imports the roles once and forks each process of a run from itself.
+"""The fork server: a process that imports the roles once and forks the processes of a run.
 
-    launcher ──role, pipes──► nursery ──fork──► plant, agents      and fork + exec ──► recorder
+    launcher ──role, pipes──► fork server ──fork──► plant, agents   and fork + exec ──► recorder
 
-It has no thread and no network session, so forking is safe; it ends as soon as all are born, and
+It has no thread and no network session, so forking is safe; it ends as soon as all are started, and
 the launcher adopts them. So a controller is ready without importing anything, and all processes
 have the same memory layout: on a core that they share, caches and branch predictors filled by one
 serve the next, which is worth a third of a lockstep tick.
 
-If the launcher is killed before all are born, the nursery removes the run's folder of sockets;
-later the recorder does.
+If the launcher is killed before all are started, the fork server removes the run's folder of
+sockets; later the recorder does.
 """
 
 import array
@@ -30,27 +30,27 @@ from configs.errors import InfrastructureError
 from configs.roles import STARTED
 from fleetloop import packages
 
-BIRTH_S = 20.0
+START_S = 20.0
 _PR_SET_CHILD_SUBREAPER = 36
 _MAX_FDS = 200
 """Descriptors that travel with one message; the kernel takes 253 and drops the rest silently."""
-_MORE, _ALL_BORN = "+", "."
+_MORE, _ALL_STARTED = "+", "."
 _BATCH = "--batch"
-"""Processes are born as batch work: who is woken waits for its turn instead of interrupting, which
+"""Processes start as batch work: one that is woken waits for its turn instead of interrupting, which
 is worth a seventh of a lockstep tick."""
 _FORKED = tuple(role.module for role in STARTED if role.forked)
 """Forked; any other module gets an interpreter of its own, and no descriptors."""
 
 
-class Born(NamedTuple):
+class Forked(NamedTuple):
     """A process, and the numbers that the descriptors given to it have there."""
 
     pid: int
     fds: tuple[int, ...]
 
 
-class Nursery:
-    """The launcher's end; a context manager that returns when the nursery has ended.
+class ForkServer:
+    """The launcher's end; a context manager that returns when the fork server has ended.
 
     Args:
         folder: the run's folder of sockets, which may not exist yet.
@@ -61,9 +61,9 @@ class Nursery:
         _adopt_orphans()
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket = ours
-        self._socket.settimeout(BIRTH_S)
+        self._socket.settimeout(START_S)
         options = [str(folder), *([_BATCH] if batch else [])]
-        # Ctrl-C is the launcher's business: nursery and roles are born with it blocked.
+        # Ctrl-C is the launcher's business: fork server and roles start with it blocked.
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             with theirs:
@@ -78,11 +78,11 @@ class Nursery:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
-    def bear(self, module: str, stdin: int, stdout: int, fds: Sequence[int] = ()) -> Born:
+    def fork(self, module: str, stdin: int, stdout: int, fds: Sequence[int] = ()) -> Forked:
         """Start a process of a role with these descriptors.
 
         Raises:
-            InfrastructureError: the nursery is gone, doesn't answer, or the system refuses.
+            InfrastructureError: the fork server is gone, doesn't answer, or the system refuses.
         """
         passed = [stdin, stdout, *fds]
         try:
@@ -92,13 +92,13 @@ class Nursery:
             socket.send_fds(self._socket, [module.encode()], passed)
             answer = self._socket.recv(65536)
         except OSError as error:
-            raise InfrastructureError(f"can't start {module}: the nursery: {error}") from error
+            raise InfrastructureError(f"can't start {module}: the fork_server: {error}") from error
         if not answer:
-            raise InfrastructureError(f"can't start {module}: the nursery has ended")
+            raise InfrastructureError(f"can't start {module}: the fork server has ended")
         said = json.loads(answer)
         if isinstance(said, str):
             raise InfrastructureError(f"can't start {module}: {said}")
-        return Born(said[0], tuple(said[1:]))
+        return Forked(said[0], tuple(said[1:]))
 
     def __enter__(self) -> Self:
         return self
@@ -110,10 +110,10 @@ class Nursery:
         traceback: TracebackType | None,
     ) -> None:
         with suppress(OSError):
-            self._socket.send(_ALL_BORN.encode())
+            self._socket.send(_ALL_STARTED.encode())
         self._socket.close()
         try:
-            self._process.wait(BIRTH_S)
+            self._process.wait(START_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
@@ -124,7 +124,7 @@ def _adopt_orphans() -> None:
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
-# --- the nursery itself ---------------------------------------------------------------------------
+# --- the server's own process ---------------------------------------------------------------------
 
 
 def _serve(folder: Path) -> None:
@@ -143,7 +143,7 @@ def _serve(folder: Path) -> None:
         except OSError as error:
             _answer(orders, str(error))
             continue
-        if module == _ALL_BORN:
+        if module == _ALL_STARTED:
             return
         if not module:  # the launcher was killed
             sockets.remove_run_folder(folder)

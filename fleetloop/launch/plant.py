@@ -28,7 +28,7 @@ from bridge.process import Stop, go_realtime, keep_to_itself, name_process, sett
 from bridge.telemetry import PLANT_ROW, RowBuffer
 from configs.brief import NetworkLink, PlantBrief, Settings
 from configs.deployment import Deployment, load_deployment
-from configs.errors import ScenarioError
+from configs.errors import ExitStatus, ScenarioError
 from configs.loading import load
 from configs.overrides import Override, Overrides
 from configs.resolve import plant_brief
@@ -45,7 +45,6 @@ from plant.robot import EmulatedRobot, diverged_robots, emulated_robot
 
 FOREVER_TICKS = 1 << 53
 GO_AHEAD_NS = 1_000_000
-INTERRUPTED = 130
 _WALL_CLOCK = Override("a plant on its own", "clock.mode", "realtime")
 _ROW_NAMES = [signal.name for signal in PLANT_SIGNALS]
 
@@ -117,7 +116,7 @@ def run_plant(source: str, options: Options) -> int:
             _run(brief, hub, end, _buses(brief, folder), options, stop)
         finally:
             end.close(stop.reason or "the plant has ended")
-    return 0
+    return ExitStatus.OK
 
 
 def _join(scenario: Scenario, deployment: Deployment) -> int:
@@ -138,7 +137,8 @@ def _join(scenario: Scenario, deployment: Deployment) -> int:
         name_process("plant")
         word = plant_of_a_run(brief, stop)
     note(f"plant: {word}{f'; {stop.reason}' if stop.reason else ''}")
-    return INTERRUPTED if stop.reason.startswith("interrupted") else 0
+    interrupted = stop.reason.startswith("interrupted")
+    return ExitStatus.INTERRUPTED if interrupted else ExitStatus.OK
 
 
 def _alone(brief: PlantBrief, options: Options) -> PlantBrief:

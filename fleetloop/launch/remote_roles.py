@@ -15,7 +15,7 @@ GRACE_S = 0.5
 """A report may come a little later than the end of the token."""
 
 
-class Elsewhere:
+class RemoteRoles:
     """What became of the roles on other machines."""
 
     def __init__(self, processes: Iterable[str]) -> None:

@@ -10,7 +10,7 @@ from bridge.network.messages import Progress
 from bridge.process import Stop, keep_to_itself
 from configs.brief import NetworkLink
 from configs.deployment import Deployment, load_deployment
-from configs.errors import InfrastructureError, ScenarioError
+from configs.errors import ExitStatus, InfrastructureError, ScenarioError
 from configs.loading import load, to_toml
 from configs.overrides import Overrides
 from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of
@@ -33,7 +33,14 @@ from fleetloop.results.summary import RunStats, Summary, summarise, to_json
 from fleetloop.results.tables import print_report, print_results
 from fleetloop.terminal import RunProgress, note, say_json
 
-EXIT_CODES = {"held": 0, "failed": 1, "not checked": 1, "aborted": 3, "interrupted": 130}
+EXIT_STATUS = {
+    "held": ExitStatus.OK,
+    "failed": ExitStatus.FAILED,
+    "not checked": ExitStatus.FAILED,
+    "aborted": ExitStatus.INFRASTRUCTURE,
+    "interrupted": ExitStatus.INTERRUPTED,
+}
+"""By the verdict of a run, or by how it ended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +130,7 @@ def run_scenario(source: str, options: Options) -> int:
     if not stats.began:
         run_folder.discard(created)
         note(f"{stats.ended}: {stats.reason}; the run did not begin")
-        return EXIT_CODES[stats.ended]
+        return EXIT_STATUS[stats.ended]
     stats.started = started.isoformat(timespec="seconds")
     return _finish(scenario, folder, stats, options)
 
@@ -211,7 +218,7 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options)
         recorded = Record.open(record)
     except RecordError as error:
         note(f"{stats.ended}: {stats.reason}; {error}")
-        return EXIT_CODES["aborted" if stats.ended == "completed" else stats.ended]
+        return EXIT_STATUS["aborted" if stats.ended == "completed" else stats.ended]
     summary = summarise(recorded, scenario, stats)
     unsaved: InfrastructureError | None = None
     try:
@@ -235,6 +242,7 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options)
 
 def exit_status(summary: Summary, *, allow_unchecked: bool) -> int:
     """The exit status of a run; what nobody expected can't be missed."""
-    if summary["verdict"] == "not checked" and not summary["cut_short"]:
-        return 0 if allow_unchecked or not summary["expectations"] else EXIT_CODES["not checked"]
-    return EXIT_CODES[summary["verdict"]]
+    unchecked = summary["verdict"] == "not checked" and not summary["cut_short"]
+    if unchecked and (allow_unchecked or not summary["expectations"]):
+        return ExitStatus.OK
+    return EXIT_STATUS[summary["verdict"]]

@@ -18,7 +18,7 @@ from configs.roles import AGENT, PLANT, RECORDER, STARTED
 from configs.scenario import Scenario
 from fleetloop.launch import placement
 from fleetloop.launch.child import Child
-from fleetloop.launch.fork_server import Nursery
+from fleetloop.launch.fork_server import ForkServer
 
 AFTERWARDS_NS = 60 * 10**9
 """Bus time in which frames may still end after the closing tick, in real time on a slow machine."""
@@ -50,7 +50,7 @@ class Place:
 
 
 def spawn(
-    orders: Orders, links: Links, folder: Path, nursery: Nursery, children: list[Child]
+    orders: Orders, links: Links, folder: Path, fork_server: ForkServer, children: list[Child]
 ) -> None:
     """Start the processes in the order of their roles and add them to `children` as they start.
 
@@ -67,9 +67,9 @@ def spawn(
             place = Place(orders, links[role.identity(robot)], folder, robot, told)
             brief = BRIEFS[role.name](place)
             if isinstance(brief, PlantBrief):
-                children.append(_start_plant(brief, place, nursery))
+                children.append(_start_plant(brief, place, fork_server))
                 continue
-            children.append(Child(nursery, role.process(robot), role.module))
+            children.append(Child(fork_server, role.process(robot), role.module))
             children[-1].tell(brief)
 
 
@@ -81,7 +81,7 @@ def _ours(orders: Orders) -> tuple[str, ...]:
     return tuple(robot for robot in orders.scenario.names if deployment.is_ours(robot))
 
 
-def _start_plant(brief: PlantBrief, place: Place, nursery: Nursery) -> Child:
+def _start_plant(brief: PlantBrief, place: Place, fork_server: ForkServer) -> Child:
     """Open the listening sockets of its buses, and hand them to it."""
     orders = place.orders
     buses = list(dict.fromkeys(orders.scenario.bus_of(robot) for robot in _ours(orders)))
@@ -90,7 +90,7 @@ def _start_plant(brief: PlantBrief, place: Place, nursery: Nursery) -> Child:
         for listener in listeners.values():
             listening.enter_context(listener)
         fds = [listeners[bus].fileno() for bus in buses]
-        child = Child(nursery, PLANT.name, PLANT.module, fds)
+        child = Child(fork_server, PLANT.name, PLANT.module, fds)
     child.tell(replace(brief, listeners=tuple(zip(buses, child.fds, strict=True))))
     return child
 

@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from configs.errors import ExitStatus
 from fleetloop.record.reader import Record
 from fleetloop.results.run_folder import read_record
 from fleetloop.terminal import say
-
-IDENTICAL, DIFFERENT = 0, 1
 
 
 class Difference(NamedTuple):
@@ -71,7 +70,7 @@ def print_comparison(a: Path, b: Path, *, as_json: bool, partial: bool = False) 
         say(f"identical: {_common(record_a, record_b)}, {whole}")
     else:
         say(f"different from {difference}")
-    return IDENTICAL if difference is None else DIFFERENT
+    return ExitStatus.OK if difference is None else ExitStatus.FAILED
 
 
 def _first(robot: str, source: str, a: np.ndarray, b: np.ndarray) -> Difference | None:

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 
 from configs.scenario import Scenario
 from fleetloop.record.reader import Record
+from fleetloop.settling import settled_from
 
 WIDTH_IN, HEIGHT_IN, DPI = 6.4, 3.6, 150
 LEADER = "leader"
@@ -258,11 +259,7 @@ def _over_time(
 
 def _settled(series: Sequence[np.ndarray]) -> int | None:
     """The first index from which all stay within the settle band, None if they don't."""
-    last = 0
-    for values in series:
-        outside = np.flatnonzero(~(np.abs(values) <= 0.05))
-        if len(outside):
-            last = max(last, int(outside[-1]) + 1)
+    last = max(map(settled_from, series), default=0)
     longest = max((len(values) for values in series), default=0)
     return last if last < longest - 2 else None
 

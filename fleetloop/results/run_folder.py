@@ -6,7 +6,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
-from configs.errors import FleetloopError, InfrastructureError, ScenarioError
+from configs.errors import ExitStatus, FleetloopError, InfrastructureError, ScenarioError
 from fleetloop.record.reader import Record
 from fleetloop.record.run_record import CAN_FOLDER
 from fleetloop.terminal import note
@@ -19,7 +19,7 @@ SUMMARY = "summary.json"
 class IncompleteError(FleetloopError):
     """A record that isn't all there, where all of it was asked for."""
 
-    exit_code = 1
+    exit_status = ExitStatus.FAILED
 
 
 class Created(NamedTuple):

@@ -15,7 +15,7 @@ from configs.scenario import Scenario
 from fleetloop.record.reader import Record
 from fleetloop.results import expectations
 from fleetloop.results.expectations import judge, spread, why_not_checked
-from fleetloop.settling import FINAL_S, SETTLE_BAND
+from fleetloop.settling import FINAL_S, settle_s
 
 ERRORS = ("x_e_m", "y_e_m", "theta_e_rad")
 _PACKAGES = ("fleetloop", "eclipse-zenoh", "python-can", "numpy", "msgpack", "mcap", "pydantic")
@@ -117,14 +117,6 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list):
         return [_finite(item) for item in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
-def settle_s(t: np.ndarray, values: np.ndarray, band: float = SETTLE_BAND) -> float | None:
-    """Last time outside the band [s]; 0 if never outside, None if outside at the end."""
-    outside = np.flatnonzero(~(np.abs(values) <= band))
-    if not len(outside):
-        return 0.0
-    return _seconds(t[outside[-1]]) if outside[-1] < len(values) - 1 else None
 
 
 def _seconds(t_s: float) -> float:

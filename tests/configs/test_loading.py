@@ -31,7 +31,7 @@ pose = { x_m = 0.0, y_m = 2.0 }
 def problems(text: str, *changes: str) -> list[str]:
     with pytest.raises(ScenarioError) as caught:
         loads("file.toml", changed(text, *changes))
-    assert caught.value.exit_code == 2
+    assert caught.value.exit_status == 2
     return str(caught.value).splitlines()
 
 

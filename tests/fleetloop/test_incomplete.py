@@ -50,7 +50,7 @@ def test_a_cut_record_is_exported_only_if_asked_for(
     told = r"record\.mcap: cut at byte \d+; in it are r1(, r2)?: 1024 ticks up to 2.046 s"
     with pytest.raises(IncompleteError, match=told) as refused:
         export(cut_run, tmp_path / "a.npz")
-    assert refused.value.exit_code == 1
+    assert refused.value.exit_status == 1
     assert "--partial" in str(refused.value)
     assert not (tmp_path / "a.npz").exists()
     export(cut_run, tmp_path / "a.npz", partial=True)
@@ -67,7 +67,7 @@ def test_a_damaged_record_is_exported_up_to_its_damage_if_asked_for(
 ) -> None:
     with pytest.raises(RecordError, match=r"damaged at byte \d+: .*; --partial takes") as refused:
         export(damaged_run, tmp_path / "a.csv")
-    assert refused.value.exit_code == 2
+    assert refused.value.exit_status == 2
     assert 0 < export(damaged_run, tmp_path / "a.csv", partial=True) < 4000
 
 
@@ -130,7 +130,7 @@ def test_what_is_no_run_is_refused_in_one_line(finished_run: Path, tmp_path: Pat
         ):
             with pytest.raises(FleetloopError) as refused:
                 read(path)
-            assert refused.value.exit_code == 2, name
+            assert refused.value.exit_status == 2, name
             assert "\n" not in str(refused.value)
             assert str(path)[:200] in str(refused.value)
 

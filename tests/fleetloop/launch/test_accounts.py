@@ -3,7 +3,7 @@
 from bridge.awake import Stall
 from bridge.network.reports import AgentReport, PlantReport
 from fleetloop.launch.accounts import stats_of
-from fleetloop.launch.process_run import Outcome
+from fleetloop.launch.outcome import Outcome
 
 
 def outcome(plant: PlantReport, agent: AgentReport) -> Outcome:

@@ -2,13 +2,13 @@
 
 from bridge.network.reports import Report
 from fleetloop.launch.child import CRASHED, GAVE_UP
-from fleetloop.launch.remote_roles import GRACE_S, Elsewhere
+from fleetloop.launch.remote_roles import GRACE_S, RemoteRoles
 
 R2 = "agent/r2"
 
 
 def test_who_has_not_come_is_absent() -> None:
-    far = Elsewhere([R2, "agent/r3"])
+    far = RemoteRoles([R2, "agent/r3"])
     far.note_token(R2, 0.0, there=True)
     far.note_token("plant", 0.0, there=True)
     assert far.absent() == ["agent/r3"]
@@ -16,14 +16,14 @@ def test_who_has_not_come_is_absent() -> None:
 
 
 def test_without_roles_elsewhere_nobody_is_missed() -> None:
-    nobody = Elsewhere([])
+    nobody = RemoteRoles([])
     assert nobody.ended()
     assert nobody.absent() == []
     assert nobody.failure(1e9) is None
 
 
 def test_a_report_is_an_end_and_its_failure_the_runs() -> None:
-    far = Elsewhere([R2])
+    far = RemoteRoles([R2])
     far.note_token(R2, 0.0, there=True)
     far.note_report(R2, Report())
     assert far.ended()
@@ -34,7 +34,7 @@ def test_a_report_is_an_end_and_its_failure_the_runs() -> None:
 
 
 def test_a_token_that_goes_without_a_report_is_a_loss_after_a_grace() -> None:
-    far = Elsewhere([R2])
+    far = RemoteRoles([R2])
     far.note_token(R2, 0.0, there=True)
     far.note_token(R2, 1.0, there=False)
     assert far.failure(1.0 + 0.9 * GRACE_S) is None
@@ -44,7 +44,7 @@ def test_a_token_that_goes_without_a_report_is_a_loss_after_a_grace() -> None:
 
 
 def test_a_token_that_comes_back_is_no_loss() -> None:
-    far = Elsewhere([R2])
+    far = RemoteRoles([R2])
     far.note_token(R2, 0.0, there=True)
     far.note_token(R2, 1.0, there=False)
     far.note_token(R2, 1.2, there=True)

@@ -21,7 +21,7 @@ from bridge.network.reports import (
 from configs.loading import load
 from configs.resolve import schedule
 from fleetloop.launch.accounts import stats_of
-from fleetloop.launch.process_run import Outcome
+from fleetloop.launch.outcome import Outcome
 from fleetloop.launch.words import Words
 
 SCENARIO = load("two_robots")

@@ -1,0 +1,129 @@
+"""The launcher's end of the control plane: tokens, progress, notices and reports of the processes.
+
+Every message changes the account of the run (`Outcome`), the signs of life (`Vitals`) and the
+picture of the roles on other machines (`RemoteRoles`); what is malformed is counted by `Words`.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+
+from bridge.network import keys
+from bridge.network.link import Arrival, Link
+from bridge.network.messages import Progress
+from configs.brief import Schedule
+from configs.roles import PLANT
+from fleetloop.launch.child import Child
+from fleetloop.launch.machine import WATCH_EVERY_S
+from fleetloop.launch.outcome import Outcome
+from fleetloop.launch.remote_roles import RemoteRoles
+from fleetloop.launch.vitals import Vitals
+from fleetloop.launch.words import Words
+
+MAX_NOTICES = 100
+"""Of each process; more would bury the others'."""
+
+
+class ControlPlane:
+    """Takes the messages of one run.
+
+    Args:
+        schedule: of the run: what a progress message may say.
+        remote: the roles on other machines.
+        now: seconds on the launcher's clock of awake time.
+        on_progress: called with the plant's progress.
+        on_notice: called with each process and notice, as they come.
+    """
+
+    def __init__(
+        self,
+        schedule: Schedule,
+        remote: RemoteRoles,
+        now: Callable[[], float],
+        on_progress: Callable[[Progress], None],
+        on_notice: Callable[[str, str], None],
+    ) -> None:
+        self.outcome = Outcome()
+        self.words = Words(schedule)
+        self.vitals = Vitals()
+        self.remote = remote
+        self.children: list[Child] = []
+        self.alive: set[str] = set()
+        """Processes whose liveliness token is there."""
+        self.ticking = False
+        """Whether the plant has begun to tick."""
+        self.now = now
+        self._on_progress = on_progress
+        self.on_notice = on_notice
+
+    def subscribe(self, link: Link, run: str, processes: Iterable[str]) -> None:
+        """Subscribe to the messages of these processes."""
+        link.watch_live(keys.live_all(run), "live")
+        # One by one: a wildcard is wider than any identity's rights and would be refused.
+        for process in processes:
+            link.subscribe(keys.progress(run, process), "progress")
+            link.subscribe(keys.notice(run, process), "notice")
+            link.subscribe(keys.report(run, process), "report")
+
+    def receive(self, link: Link, within_s: float) -> None:
+        """Take the next message, waiting at most so long [s]."""
+        if (arrival := link.receive(within_s)) is not None:
+            self.take(arrival)
+
+    def settle(self, link: Link, children: Sequence[Child], within_s: float) -> list[Child]:
+        """Take messages until these have ended, at most so long [s]; return those that haven't."""
+        deadline = self.now() + within_s
+        while left := [child for child in children if not child.ended()]:
+            left_s = deadline - self.now()
+            if left_s <= 0.0:
+                break
+            self.receive(link, min(left_s, WATCH_EVERY_S))
+        return left
+
+    def child(self, process: str) -> Child | None:
+        """The process of that name on this machine, None if it is on another."""
+        return next((child for child in self.children if child.name == process), None)
+
+    def note(self, process: str, text: str) -> None:
+        """Record what the launcher has noticed about a process."""
+        self._tell(self.outcome.notices.setdefault(process, []), process, text)
+
+    def take(self, arrival: Arrival) -> None:
+        """Take one message."""
+        process = keys.process_of(arrival.key)
+        match arrival.tag:
+            case "live":
+                there = arrival.payload == b"1"
+                (self.alive.add if there else self.alive.discard)(process)
+                self.remote.note_token(process, self.now(), there=there)
+            case "progress":
+                if (progress := self.words.progress(process, arrival.payload)) is not None:
+                    self._take_progress(process, progress)
+            case "notice":
+                if (notice := self.words.notice(process, arrival.payload)) is not None:
+                    self._tell(self.outcome.said.setdefault(process, []), process, notice.text)
+            case _:
+                self._take_report(process, arrival.payload)
+
+    def _take_progress(self, process: str, progress: Progress) -> None:
+        silence = self.vitals.beat(process, progress.tick, self.now())
+        if silence is not None:
+            self.note(process, f"goes on after {silence.lasted_s:.1f} s")
+        if process == PLANT.name:
+            self.ticking = True
+            self.outcome.ticks = progress.tick
+            self.outcome.wall_s = progress.wall_ns * 1e-9
+            self._on_progress(progress)
+
+    def _take_report(self, process: str, payload: bytes) -> None:
+        if (report := self.words.report(process, payload)) is not None:
+            self.vitals.end(process)
+            self.outcome.reports[process] = report
+            self.remote.note_report(process, report)
+            if report.left_early and self.outcome.ended == "completed":
+                self.on_notice(process, f"left the run early: {report.left_early}")
+        if (child := self.child(process)) is not None:
+            child.release()
+
+    def _tell(self, account: list[str], process: str, text: str) -> None:
+        if len(account) < MAX_NOTICES:
+            account.append(text)
+            self.on_notice(process, text)

@@ -1,0 +1,24 @@
+"""How a run over processes went: counters for the summary, and why it ended."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from bridge.network.reports import Report
+
+
+@dataclass(slots=True)
+class Outcome:
+    """The launcher's account of a run."""
+
+    ended: str = "completed"  # "completed", "interrupted", "aborted"
+    reason: str = ""
+    timed: bool = True  # the reason says when
+    ticks: int = 0
+    wall_s: float = 0.0
+    startup_s: float = 0.0
+    teardown_s: float = 0.0
+    cpu_ns: int = 0  # of the launcher, from the first tick on
+    reports: dict[str, Report] = field(default_factory=dict)
+    said: dict[str, list[str]] = field(default_factory=dict)  # notices of a process, as they came
+    notices: dict[str, list[str]] = field(default_factory=dict)  # about a process, by the launcher
+    machine: dict[str, Any] = field(default_factory=dict)
