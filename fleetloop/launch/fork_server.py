@@ -36,7 +36,7 @@ _MAX_FDS = 200
 """Descriptors that travel with one message; the kernel takes 253 and drops the rest silently."""
 _MORE, _ALL_STARTED = "+", "."
 _BATCH = "--batch"
-"""Processes start as batch work: one that is woken waits for its turn instead of interrupting, which
+"""Processes start as batch work: one that is woken waits for its turn and interrupts none, which
 is worth a seventh of a lockstep tick."""
 _FORKED = tuple(role.module for role in STARTED if role.forked)
 """Forked; any other module gets an interpreter of its own, and no descriptors."""
