@@ -48,5 +48,5 @@ class Host(Parameters):
     rearm_limit_s: Seconds = parameter(1.0, "longest wait for closed loop then")
     bus_error_limit_s: SecondsOrZero = parameter(
         5.0,
-        "errors of a bus that isn't ours are borne for this long, then the controller gives up",
+        "errors of a bus that isn't ours are tolerated for this long, then the controller gives up",
     )

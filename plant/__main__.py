@@ -43,8 +43,8 @@ from plant.robot import diverged_robots, emulated_robot
 PLANT_PRIORITY = 45
 """SCHED_FIFO, above the controllers'."""
 GO_SHARE = 1.25
-"""Multiple of the start deadline that the plant waits for the go: whoever misses a peer names it
-first."""
+"""Multiple of the start deadline that the plant waits for the go: a role that misses a peer names
+it first."""
 ARRIVALS_PER_ROBOT = 16
 """Poses of a robot that isn't emulated that are looked at in one tick: the rest waits."""
 EARLY = -1
@@ -52,7 +52,7 @@ EARLY = -1
 
 
 def run(brief: PlantBrief, stop: Stop) -> str:
-    """Wire the plant to its buses and the network, wait for everybody, and run."""
+    """Connect the plant to its buses and the network, wait for all roles, and run."""
     listeners = {bus: socket.socket(fileno=fd) for bus, fd in brief.listeners}
     try:
         link = open_client(brief.network, brief.schedule.start_deadline_s, stop)
@@ -73,7 +73,7 @@ def run(brief: PlantBrief, stop: Stop) -> str:
 
 
 def _controllers(brief: PlantBrief) -> dict[str, dict[str, str]]:
-    """The secrets of those whom the buses wait for, by bus and robot."""
+    """The secrets of the controllers that the buses wait for, by bus and robot."""
     bus_of = {robot.robot: robot.bus for robot in brief.robots}
     found: dict[str, dict[str, str]] = {}
     for robot, secret in brief.controllers:

@@ -16,7 +16,7 @@ x, y [m]   θ [rad]   v [m/s]   ω [rad/s]   ν wheel speeds [rad/s]   τ, Δ [N
 
 from collections.abc import Callable
 from math import cos, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from configs.brief import WheelDisturbance
 from configs.sections import Body
@@ -57,7 +57,10 @@ class RigidBody:
         """No wheel's rim moves faster."""
         self.c = r * r * body.body_mass_kg * a / (2.0 * b)
         self.mbar_1, self.mbar_2 = m11 + m12, m11 - m12
-        right, left = body.damping_right_wheel_N_m_s, body.damping_left_wheel_N_m_s
+        self.damping_wheel_N_m_s = right, left = (
+            body.damping_right_wheel_N_m_s,
+            body.damping_left_wheel_N_m_s,
+        )
         self._damping = (
             0.5 * (right + left) / self.mbar_1,
             0.5 * b * (right - left) / self.mbar_1,
@@ -70,10 +73,24 @@ class RigidBody:
         self._amplitude = disturbance.amplitude_wheel_N_m
         self._rate, self._phase = disturbance.rate_rad_s, disturbance.phase_rad
 
-    def wheel_speeds(self, v: float, omega: float) -> tuple[float, float]:
+    def wheel_speeds(self, v: Any, omega: Any) -> tuple[Any, Any]:
         """(right, left) wheel speeds ν [rad/s], equation (3)."""
         turn = self.b * omega
         return (v + turn) * self.inv_r, (v - turn) * self.inv_r
+
+    def wheel_torques(self, v: Any, omega: Any, v_rate: Any, omega_rate: Any) -> tuple[Any, Any]:
+        """(right, left) wheel torques τ − Δ [N·m] that give these accelerations: (4) inverted.
+
+        Of numbers, or of arrays of them.
+        """
+        nu_right, nu_left = self.wheel_speeds(v, omega)
+        d_right, d_left = self.damping_wheel_N_m_s
+        along = self.mbar_1 * v_rate - self.c * self.b * omega * omega
+        turning = self.b * (self.mbar_2 * omega_rate + self.c / self.b * v * omega)
+        return (
+            (along + turning) * self.inv_r + d_right * nu_right,
+            (along - turning) * self.inv_r + d_left * nu_left,
+        )
 
     def disturbance(self, t_s: float) -> tuple[float, float]:
         """Δ(t) at the (right, left) wheel [N·m]; zero before t = 0."""

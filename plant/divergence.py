@@ -1,12 +1,12 @@
-"""A body whose motion diverged: where the plant says so, and what it says.
+"""Divergence of a body's motion: bounds, and the state before.
 
     |v| + b |ω| ≤ r ν_max                      no wheel turns faster than `FASTEST_WHEEL_RAD_S`  (1)
     |x| + |y| + |θ| + |φ_R| + |φ_L| ≤ `FARTHEST`                        [m] and [rad] together  (2)
 
 The integration holds each of its steps against (1) and (2); what isn't a number is outside as well.
 From then on the body stands still where it was last within them. Its drives have no estimate of
-their encoders any more: they disarm with that error, which nothing clears, so whoever controls the
-robot stops it. Robots beside it notice nothing.
+their encoders any more: they disarm with that error, which nothing clears, so the robot's
+controller stops it. Robots beside it notice nothing.
 """
 
 from typing import NamedTuple

@@ -1,14 +1,14 @@
-"""Says what has happened to robots and buses while it is news, each once."""
+"""Announcement of events of robots and buses, each once."""
 
 from collections.abc import Callable, Mapping
 
 
 class Herald:
-    """Look often enough.
+    """Announces new entries of a table of events, whenever `look` is called.
 
     Args:
-        look: what has happened so far, by whom it happened to.
-        announce: told of each that is new, in words.
+        look: all events so far, in words, by robot or bus.
+        announce: called with each new one.
     """
 
     def __init__(
@@ -16,11 +16,11 @@ class Herald:
     ) -> None:
         self._look = look
         self._announce = announce
-        self._said: set[str] = set()
+        self._announced: set[str] = set()
 
     def look(self) -> None:
-        """Say what is new."""
-        for who, what in self._look().items():
-            if who not in self._said:
-                self._said.add(who)
-                self._announce(f"{who}: {what}")
+        """Announce what is new."""
+        for name, event in self._look().items():
+            if name not in self._announced:
+                self._announced.add(name)
+                self._announce(f"{name}: {event}")

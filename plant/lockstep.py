@@ -1,4 +1,4 @@
-"""The lockstep clock: the plant owns time, everybody else answers.
+"""The lockstep clock: the plant owns time, controllers answer.
 
     bus's tick k   its robots' poses to Zenoh when the schedule localises; then what
                    `plant.bus.ideal` or `plant.bus.timed` do between questions and answers; and on
@@ -35,11 +35,11 @@ from plant.robot import EmulatedRobot
 
 REPORT_EVERY_NS = 100_000_000
 WAIT_S = LOOK_S
-"""Longest wait for an answer before somebody who doesn't answer is looked for."""
+"""Longest wait for an answer before absent controllers are looked for."""
 _STALL_NS = int((LOOK_S + STALL_S) * 1e9)
 ANSWER_SHARE = 0.9
-"""Part of the tick deadline that the plant waits for answers: before that, controllers name who is
-silent; after it, the launcher names the plant."""
+"""Part of the tick deadline that the plant waits for answers: before that, controllers name a
+silent peer; after it, the launcher names the plant."""
 
 
 @dataclass(slots=True)
@@ -64,7 +64,7 @@ class _Lane:
         self.robots = [robot.brief.robot for robot in bus.robots]
         self.tick = tick
         self.asked = ALL
-        self.asked_ns = 0  # when it was asked to answer; 0: nobody was
+        self.asked_ns = 0  # when it was asked to answer; 0: it is not asked
         self.done = False
 
 
@@ -190,7 +190,7 @@ class LockstepLoop:
     # --- all of them ---------------------------------------------------------------------------
 
     def _next_tick(self) -> None:
-        """The slowest have gone on; with nobody left at all, the run is over."""
+        """The slowest have gone on; without any bus left, the run is over."""
         ticks = [lane.tick for lane in self._lanes.values() if not lane.done]
         if not ticks:
             self._slowest = self._schedule.ticks
@@ -222,7 +222,7 @@ class LockstepLoop:
             left_ns = due_ns - time.monotonic_ns()
 
     def _forgive(self, stood_still_ns: int) -> None:
-        """Time in which this process, or who carries messages, stood still is nobody's delay."""
+        """Time in which this process, or the router, stood still doesn't count as a delay."""
         for lane in self._lanes.values():
             if lane.asked_ns:
                 lane.asked_ns += stood_still_ns

@@ -36,10 +36,11 @@ from math import exp, expm1, inf, isfinite, sqrt
 from random import Random
 
 from configs.brief import MotorModel
-from plant.divergence import FASTEST_WHEEL_RAD_S
 from plant.supply import Supply
 
 _MODULATION = sqrt(3.0) / 2.0
+FASTEST_SHAFT_RAD_S = 1e12
+"""Behind the largest gear ratio, 10⁶, of a wheel at `plant.divergence.FASTEST_WHEEL_RAD_S`."""
 
 
 class MotorFault(Enum):
@@ -131,8 +132,8 @@ class Motor:
         """Mean torque at the shaft [N·m] over `dt_s`, for a demand and a speed at its start."""
         if dt_s != self._dt_s:
             self._discretise(dt_s)
-        if not -FASTEST_WHEEL_RAD_S <= speed_shaft_rad_s <= FASTEST_WHEEL_RAD_S:
-            speed_shaft_rad_s = _clamped(speed_shaft_rad_s, FASTEST_WHEEL_RAD_S)
+        if not -FASTEST_SHAFT_RAD_S <= speed_shaft_rad_s <= FASTEST_SHAFT_RAD_S:
+            speed_shaft_rad_s = _clamped(speed_shaft_rad_s, FASTEST_SHAFT_RAD_S)
         asked = self._current_for(demand_shaft_N_m, speed_shaft_rad_s)
         if asked == self._asked_A and not self._pending:
             off = self.current_A - asked
@@ -164,7 +165,7 @@ class Motor:
         """(torque estimate [N·m], current [A]) as the drive has them: noisy, and in steps.
 
         The estimate knows the current and the drive's torque constant, not the motor's. Draws one
-        number from the generator, so call it at instants that don't depend on who listens.
+        number from the generator, so call it at instants that don't depend on listeners.
         """
         model = self._model
         current = self.current_A

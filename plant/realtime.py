@@ -108,7 +108,7 @@ class RealtimeLoop:
             acting.advance(time.monotonic_ns() - power_up_ns)
 
     def _keep_tick(self, power_up_ns: int) -> None:
-        """What a tick brings, bus by bus; who sends torques meanwhile doesn't wait for all."""
+        """One tick, bus by bus; torques that come meanwhile are served between two buses."""
         schedule, tick = self._schedule, self._tick
         bus_ns, t_ns = schedule.bus_time_ns(tick), tick * schedule.period_ns
         if 0 <= tick < schedule.ticks:

@@ -58,7 +58,7 @@ class EmulatedRobot:
         self.divergence: Divergence | None = None
         """Why the body stands still for good, None if it doesn't."""
         self.moved_ns = 0
-        """Bus time up to which the body has moved, for who moves it from event to event."""
+        """Bus time up to which the body has moved, where it moves from event to event."""
         mounting = brief.mounting
         self._gear_right = mounting.right_sign * mounting.gear_ratio
         self._gear_left = mounting.left_sign * mounting.gear_ratio

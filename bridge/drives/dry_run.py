@@ -32,7 +32,7 @@ class DryRun:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What somebody else did to the drives."""
+        """Commands of other hosts to the drives, in words."""
         return self._client.notices
 
     def arm(self, now_ns: int) -> Sequence[Frame]:
@@ -62,5 +62,5 @@ class DryRun:
         return _NOTHING
 
     def estop(self) -> Sequence[Frame]:
-        """Nothing to send: whoever drives the robot goes on."""
+        """Nothing to send: another host may drive the robot."""
         return self.disarm()

@@ -1,4 +1,4 @@
-"""What all drive protocols share: both ends of a protocol, measurements, and a row of `DRIVES`.
+"""The interface of all drive protocols: both ends, measurements, and a row of `DRIVES`.
 
 A client is at the wheels: it converts to and from the shaft by the mounting of its robot. A node is
 at the motor's shaft. Both are pure: frames in, frames out, told the time.
@@ -36,7 +36,7 @@ class DriveClient(Protocol):
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """Commands of others to the drives, in words: for the report."""
+        """Commands of other hosts to the drives, in words."""
 
     def hear(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         """Take any frame from the bus."""
@@ -54,10 +54,10 @@ class DriveClient(Protocol):
         """What of each drive keeps the robot from being armed, "" if nothing does."""
 
     def obstacle(self, now_ns: int) -> str | None:
-        """Why arming must not even be tried now, None if it may."""
+        """The reason not to begin arming now, None if there is none."""
 
     def refusal(self) -> str | None:
-        """What a person has to mend before the drives may be armed again, None if nothing."""
+        """The fault that only a person may clear before the drives are armed again, or None."""
 
     def fault(self, now_ns: int) -> str | None:
         """Why the wheels can't be driven now, None if they can."""

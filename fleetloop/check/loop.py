@@ -154,7 +154,7 @@ def _interval(loop: Loop, v_bar: float, omega_bar: float, s_dot: float, tick: in
     v, omega = v_bar * s_dot, omega_bar * s_dot
     rows = loop.theta[:4], loop.theta[4:]
     at = _Frame(v, omega)
-    steady = _steady_torques(loop.body, v, omega)
+    steady = loop.body.wheel_torques(v, omega, 0.0, 0.0)
     size = 8 + 2 * (whole + 1)
     law = loop.law(loop.gains, loop.wheels, h, lambda _: Reference(0.0, 0.0, 0.0, v_bar, omega_bar))
     along = PathVariable(0.0, s_dot, 0.0)
@@ -194,14 +194,6 @@ def _interval(loop: Loop, v_bar: float, omega_bar: float, s_dot: float, tick: in
 def _moved(body: RigidBody, state: State, torques: tuple[float, float], span_s: float) -> State:
     after = rk4(body, state, torques[0], torques[1], 0.0, span_s)
     return state if after is None else after
-
-
-def _steady_torques(body: RigidBody, v: float, omega: float) -> tuple[float, float]:
-    """Torques that keep a speed and a turn rate: accelerations are affine in them."""
-    a, w = body.accelerations(v, omega, 0.0, 0.0)
-    push = -a * body.mbar_1 / body.r
-    turn = -w * body.mbar_2 * body.b / body.r
-    return push + turn, push - turn
 
 
 class _Frame:

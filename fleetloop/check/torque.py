@@ -1,4 +1,6 @@
-"""What a robot's wheels have to give along its course, against what drives and limits let through.
+"""Torques that a robot's wheels need along its course, against the limits of law, host and drives.
+
+Everything is at the wheel; shaft quantities come there through the gear.
 
     B̄ τ = M̄ ξ' + C̄ ξ + D̄ ξ + Δ̄                                       inverse of (4), ξ = (v, ω)  (1)
     + friction at the wheel: gear × Coulomb + gear² × viscous × ν      realistic motors          (2)
@@ -22,11 +24,12 @@ from math import inf, log1p, pi, sqrt
 import numpy as np
 
 from configs.scenario import Scenario
-from configs.sections import Body, Robot
-from fleetloop.check.body import inertias
+from configs.sections import Robot
+from fleetloop.check.body import inertias, robot_body
 from fleetloop.check.course import Course, Series
 from fleetloop.check.finding import Finding, Level
 from fleetloop.check.law import approach_rate_1_s, speed_gain, torque_limit_wheel_N_m
+from plant.body import RigidBody
 
 START_S = 0.5
 """Accelerations from rest aren't looked at: how fast a robot gets going is its law's business."""
@@ -38,7 +41,7 @@ _MODULATION = sqrt(3.0) / 2.0
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """One thing that bounds a wheel's torque: level at standstill, less so much per wheel speed."""
+    """A bound of a wheel's torque: at standstill, less a slope times the wheel's speed."""
 
     key: str
     words: str
@@ -69,20 +72,18 @@ def torque_findings(scenario: Scenario, courses: list[Course]) -> Iterator[Findi
 
 def needed(scenario: Scenario, course: Course) -> Need:
     """(1) and (2) along a course."""
-    body = scenario.body_of(course.robot)
-    r, b = body.wheel_radius_m, body.half_track_m
-    v, omega = course.v, course.omega
-    right, left = body.damping_right_wheel_N_m_s, body.damping_left_wheel_N_m_s
-    nu = np.column_stack([v + b * omega, v - b * omega]) / r
-    motion = nu * np.array([right, left])
+    body = robot_body(scenario.body_of(course.robot))
+    nu = np.column_stack(body.wheel_speeds(course.v, course.omega))
+    viscous = np.array(body.damping_wheel_N_m_s)
     rest = np.zeros_like(nu)
     if scenario.drive.preset == "realistic":
         gear, motor = scenario.mounting_of(course.robot).gear_ratio, scenario.motor
-        motion = motion + gear**2 * motor.viscous_friction_shaft_N_m_s * nu
+        viscous = viscous + gear**2 * motor.viscous_friction_shaft_N_m_s
         rest = gear * motor.coulomb_friction_shaft_N_m * np.sign(nu)
+    motion = nu * viscous
     push = (course.robot.disturbance or scenario.disturbance).amplitude_wheel_N_m
-    inertial = _inertial(body, course)
-    return Need(np.abs(motion + rest + inertial) + push, motion, rest, nu)
+    whole = motion + rest + _inertial(body, course)
+    return Need(np.abs(whole) + push, motion, rest, nu)
 
 
 def limits(scenario: Scenario, robot: Robot) -> list[Limit]:
@@ -139,18 +140,17 @@ def _drive_limits(scenario: Scenario, robot: Robot) -> list[Limit]:
     return found
 
 
-def _inertial(body: Body, course: Course) -> Series:
+def _inertial(body: RigidBody, course: Course) -> Series:
     """M̄ ξ' + C̄ ξ of (4) at both wheels."""
-    r, b, m_1, m_2 = body.wheel_radius_m, body.half_track_m, *inertias(body)
     if len(course.t_s) < 3:
         return np.zeros((len(course.t_s), 2))
-    c = r * r * body.body_mass_kg * body.com_offset_m / (2.0 * b)
     v, omega = course.v, course.omega
     rate_v, rate_omega = (np.gradient(x, course.t_s) for x in (v, omega))
     rate_v[course.t_s < START_S] = rate_omega[course.t_s < START_S] = 0.0
-    along = m_1 * rate_v - c * b * omega**2
-    turning = m_2 * rate_omega + c / b * v * omega
-    return np.column_stack([along + b * turning, along - b * turning]) / r
+    torques = np.column_stack(body.wheel_torques(v, omega, rate_v, rate_omega))
+    speeds: Series = np.column_stack(body.wheel_speeds(v, omega))
+    inertial: Series = torques - speeds * np.array(body.damping_wheel_N_m_s)
+    return inertial
 
 
 def _torque(scenario: Scenario, course: Course, need: Need, bounds: list[Limit]) -> Finding:

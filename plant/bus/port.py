@@ -1,9 +1,9 @@
-"""The clients of one bus, as the bus sees them; and what every kind of bus offers.
+"""Interfaces of a bus: its port to the clients, and the methods of every kind of bus.
 
 A bus in lockstep is a generator over its ticks (`Steps`). At a question it gives the port what the
-clients hear, and yields whom it waits for; when it is resumed it takes from the port what the
-clients sent. It yields None when the tick is over. Sockets or calls behind the port change nothing
-of what happens on the bus.
+clients hear, and yields the robot that it waits for; when it is resumed it takes from the port what
+the clients sent. It yields None when the tick is over. Sockets or calls behind the port change
+nothing of what happens on the bus.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -14,7 +14,7 @@ from bridge.frame import Frame
 from plant.robot import EmulatedRobot
 
 ALL = ""
-"""Whom a bus waits for: every controller on it; otherwise the name of a robot."""
+"""A bus waits for every controller on it; otherwise for the robot of a name."""
 Steps = Generator[str | None, None, None]
 Begin = Callable[[int], None]
 """Told each tick as it begins, bodies being where they are at that instant."""
@@ -47,7 +47,7 @@ class Bus(Protocol):
 
     robots: Sequence[EmulatedRobot]
     crossed: int
-    """Frames that crossed the bus, whoever sent them."""
+    """Frames that crossed the bus, drives' and clients'."""
     acts_between_ticks: bool
     """In real time, whether `next_ns` has to be looked at between two ticks."""
 

@@ -11,11 +11,11 @@
     the tick is over            start of the next one    controllers that were not asked yet hear
                                                          what there is, and that the tick passed
 
-The last two are lockstep's; in real time nobody is asked. A client joins the wire with the first
-frame that it sends: one that only listens is no node, and changes nothing. An error frame from a
-client is an error flag on order (`wire`). Bodies move from event to event. A drive's frame that
-finds no free mailbox waits for one, the newest of its identifier; a client's that finds no place in
-its transmit queue is refused and counted.
+The last two are lockstep's alone. A client joins the wire with the first frame that it sends: one
+that only listens is no node, and changes nothing. An error frame from a client is an error flag on
+order (`wire`). Bodies move from event to event. A drive's frame that finds no free mailbox waits
+for one, the newest of its identifier; a client's that finds no place in its transmit queue is
+refused and counted.
 """
 
 from collections.abc import Sequence
@@ -101,7 +101,7 @@ class TimedBus:
         self.refused = 0
         """Frames of clients that found no room."""
         self.crossed = 0
-        """Frames that ended on the wire, whoever sent them."""
+        """Frames that ended on the wire, drives' and clients'."""
 
     # --- lockstep --------------------------------------------------------------------------------
 
@@ -200,7 +200,7 @@ class TimedBus:
             robot.move(bus_ns, self._zero_ns, self._step_ns)
 
     def _run_to_question(self, end_ns: int, waiting: Sequence[str]) -> str | None:
-        """Run until the drives of a robot have said the tick; None at its end."""
+        """Run until the drives of a robot have sent all of the tick; None at its end."""
         while True:
             for robot in waiting:
                 if not any(d.node.queue.entries or d.backlog for d in self._of_robot[robot]):
@@ -270,7 +270,7 @@ class TimedBus:
         if key is not None:
             self._freed.append((key, 1))
         can_id = frame.can_id
-        # A set-point concerns nobody but the drive at its address.
+        # A set-point concerns only the drive at its address.
         concerned = [d for d in self._drives if d.drive.setpoint_id == can_id] or self._drives
         for target in concerned:
             if target.node in event.heard_by:

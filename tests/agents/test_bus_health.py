@@ -274,7 +274,7 @@ def test_own_commands_that_an_interface_hands_back_are_not_somebody_elses(monkey
     rig.wire.echoes = True
     rig.wire.others = {S // 10: [Frame(0x00E, bytes(4))] * 3}
     rig.run()
-    assert rig.bench.agent.guard.notices() == ["right drive (node 0): 3 commands of somebody else"]
+    assert rig.bench.agent.guard.notices() == ["right drive (node 0): 3 commands of another host"]
 
 
 def test_drives_that_say_more_often_where_they_are_are_no_second_drive(monkeypatch) -> None:

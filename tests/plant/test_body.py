@@ -14,7 +14,7 @@ from plant.divergence import FARTHEST, FASTEST_WHEEL_RAD_S
 from plant.integrate import rk4
 
 ETSRO = Body()
-CALM = WheelDisturbance(amplitude_wheel_N_m=0.0, rate_rad_s=0.5, phase_rad=0.0)
+UNDISTURBED = WheelDisturbance(amplitude_wheel_N_m=0.0, rate_rad_s=0.5, phase_rad=0.0)
 REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -27,7 +27,7 @@ def run(
 
 
 def test_derived_constants_are_those_of_the_paper_as_printed() -> None:
-    robot = RigidBody(ETSRO, CALM)
+    robot = RigidBody(ETSRO, UNDISTURBED)
     mass, inertia = 2.58, 2.3 * 0.02**2 + 2 * 0.28 * 0.01 + 0.01 + 0.004
     m11 = 0.04**2 / 0.04 * (mass * 0.01 + inertia) + 0.0056
     m12 = 0.04**2 / 0.04 * (mass * 0.01 - inertia)
@@ -37,14 +37,14 @@ def test_derived_constants_are_those_of_the_paper_as_printed() -> None:
 
 
 def test_the_second_wheel_may_count_in_the_mass() -> None:
-    both = RigidBody(replace(ETSRO, wheels_in_mass=2), CALM)
+    both = RigidBody(replace(ETSRO, wheels_in_mass=2), UNDISTURBED)
     extra = 0.04**2 / 4 * 0.28  # r² m_w / 4 in m11 and m12 each
-    assert both.mbar_1 - RigidBody(ETSRO, CALM).mbar_1 == pytest.approx(2 * extra)
+    assert both.mbar_1 - RigidBody(ETSRO, UNDISTURBED).mbar_1 == pytest.approx(2 * extra)
 
 
 def test_equal_torques_from_rest_give_the_closed_form_of_a_first_order_lag() -> None:
     body = replace(ETSRO, com_offset_m=0.0)
-    robot = RigidBody(body, CALM)
+    robot = RigidBody(body, UNDISTURBED)
     end = run(robot, REST, 0.05, 0.05, 2.0)
     rate = 0.02 / robot.mbar_1
     final = 0.04 * 0.05 / 0.02
@@ -55,7 +55,7 @@ def test_equal_torques_from_rest_give_the_closed_form_of_a_first_order_lag() -> 
 
 
 def test_opposite_torques_turn_on_the_spot_with_the_centre_of_mass_on_the_axle() -> None:
-    robot = RigidBody(replace(ETSRO, com_offset_m=0.0), CALM)
+    robot = RigidBody(replace(ETSRO, com_offset_m=0.0), UNDISTURBED)
     end = run(robot, REST, 0.05, -0.05, 1.0)
     assert (end.x, end.y, end.v) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
     rate = 0.02 / robot.mbar_2
@@ -65,7 +65,7 @@ def test_opposite_torques_turn_on_the_spot_with_the_centre_of_mass_on_the_axle()
 @given(st.floats(-2, 2), st.floats(-5, 5))
 def test_without_damping_and_torque_energy_stays(v: float, omega: float) -> None:
     robot = RigidBody(
-        replace(ETSRO, damping_right_wheel_N_m_s=0.0, damping_left_wheel_N_m_s=0.0), CALM
+        replace(ETSRO, damping_right_wheel_N_m_s=0.0, damping_left_wheel_N_m_s=0.0), UNDISTURBED
     )
     end = run(robot, REST._replace(v=v, omega=omega), 0.0, 0.0, 0.5)
 
@@ -81,7 +81,7 @@ def test_without_damping_and_torque_energy_stays(v: float, omega: float) -> None
 @given(st.floats(0, 0.1), st.floats(0, 0.1), st.floats(-2, 2), st.floats(-5, 5))
 def test_damping_with_unequal_sides_never_adds_energy(right, left, v, omega) -> None:
     body = replace(ETSRO, damping_right_wheel_N_m_s=right, damping_left_wheel_N_m_s=left)
-    robot = RigidBody(body, CALM)
+    robot = RigidBody(body, UNDISTURBED)
     dv, domega = robot.accelerations(v, omega, 0.0, 0.0)
     power = robot.mbar_1 * v * dv + 0.01 * robot.mbar_2 * omega * domega
     assert power <= 1e-12
@@ -99,7 +99,7 @@ def test_the_step_is_of_fourth_order() -> None:
 
 
 def test_wheel_angles_follow_from_what_the_body_did() -> None:
-    robot = RigidBody(ETSRO, CALM)
+    robot = RigidBody(ETSRO, UNDISTURBED)
     end = run(robot, REST, 0.06, 0.01, 1.0)
     assert 0.5 * 0.04 / 0.1 * (end.right_wheel_rad - end.left_wheel_rad) == pytest.approx(end.theta)
 
@@ -118,7 +118,7 @@ def test_a_disturbance_acts_like_the_opposite_torque() -> None:
     )  # constant, equal on both wheels
     torque = 0.05 * sin(pi / 4)
     pushed = run(RigidBody(ETSRO, held), REST, 0.0, 0.0, 1.0)
-    driven = run(RigidBody(ETSRO, CALM), REST, -torque, -torque, 1.0)
+    driven = run(RigidBody(ETSRO, UNDISTURBED), REST, -torque, -torque, 1.0)
     assert pushed.v == pytest.approx(driven.v, rel=1e-12)
 
 
@@ -127,13 +127,13 @@ def test_a_disturbance_acts_like_the_opposite_torque() -> None:
 )
 def test_a_step_that_leaves_the_bounds_of_a_motion_leads_nowhere(v: float, omega: float) -> None:
     robot = RigidBody(
-        replace(ETSRO, damping_right_wheel_N_m_s=0.0, damping_left_wheel_N_m_s=0.0), CALM
+        replace(ETSRO, damping_right_wheel_N_m_s=0.0, damping_left_wheel_N_m_s=0.0), UNDISTURBED
     )
     assert rk4(robot, REST._replace(v=v, omega=omega), 0.0, 0.0, 1.5, 0.001) is None
 
 
 def test_the_fastest_motion_is_that_of_the_fastest_wheel() -> None:
-    robot = RigidBody(replace(ETSRO, com_offset_m=0.0, damping_right_wheel_N_m_s=0.0), CALM)
+    robot = RigidBody(replace(ETSRO, com_offset_m=0.0, damping_right_wheel_N_m_s=0.0), UNDISTURBED)
     fastest = REST._replace(v=0.0399 * FASTEST_WHEEL_RAD_S)
     assert rk4(robot, fastest, 0.0, 0.0, 0.0, 0.001) is not None
     assert rk4(robot, fastest, 200.0, 200.0, 0.0, 1.0) is None
@@ -141,4 +141,12 @@ def test_the_fastest_motion_is_that_of_the_fastest_wheel() -> None:
 
 def test_nobody_drives_further_than_numbers_reach() -> None:
     far = REST._replace(x=FARTHEST, v=1.0)
-    assert rk4(RigidBody(ETSRO, CALM), far, 0.0, 0.0, 0.0, 0.001) is None
+    assert rk4(RigidBody(ETSRO, UNDISTURBED), far, 0.0, 0.0, 0.0, 0.001) is None
+
+
+@pytest.mark.parametrize("right_damping", [0.02, 0.05])
+def test_wheel_torques_are_the_inverse_of_the_accelerations(right_damping: float) -> None:
+    body = RigidBody(replace(ETSRO, damping_right_wheel_N_m_s=right_damping), UNDISTURBED)
+    for v, omega, right, left in ((0.6, 0.3, 0.2, -0.1), (-0.4, 2.0, -0.3, 0.5)):
+        rates = body.accelerations(v, omega, right, left)
+        assert body.wheel_torques(v, omega, *rates) == pytest.approx((right, left))

@@ -341,3 +341,11 @@ def test_an_over_temperature_is_felt_at_once_and_heats_nothing() -> None:
 def test_a_rise_that_is_no_number_is_refused() -> None:
     with pytest.raises(ValueError, match="fet_over_temperature = nan: must be a finite rise"):
         motor().inject(MotorFault.FET_OVER_TEMPERATURE, float("nan"))
+
+
+def test_a_shaft_behind_a_gear_is_faster_than_any_wheel() -> None:
+    # Beyond 10⁶ rad/s, a wheel's bound, the back-EMF goes on growing: full braking current.
+    made, slower = motor(**FREE), motor(**FREE)
+    made.step(0.0, 4.5e6, 0.001)
+    slower.step(0.0, 1.5e6, 0.001)
+    assert made.power_W < 2.5 * slower.power_W < 0.0

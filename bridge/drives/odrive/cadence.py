@@ -1,8 +1,8 @@
-"""Tells two senders of one identifier from one, by how many frames come.
+"""Detection of a second sender of one identifier, by the rate of its frames.
 
     ratio = frames in a window / frames that one sender sends in it
 
-CAN has no sender's address: a second drive with the same node id, or somebody who speaks under it,
+CAN has no sender's address: a second drive with the same node id, or another node that uses it,
 shows in the ratio alone, which is near 2. Windows are a second or longer, so what a machine that
 stood still for a fifth of it delivers at once stays below `LIMIT`.
 """

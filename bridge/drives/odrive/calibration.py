@@ -1,4 +1,4 @@
-"""Calibration procedures: what runs, for how long, and what is calibrated then.
+"""Calibration procedures: their steps, durations and results.
 
     asked                        runs
     FULL_CALIBRATION_SEQUENCE    MOTOR_CALIBRATION, then ENCODER_OFFSET_CALIBRATION

@@ -210,9 +210,9 @@ class OdriveClient:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What somebody else did to the drives: for the report."""
+        """Commands of other hosts to the drives, in words."""
         return tuple(
-            f"{axis.name}: {axis.commanded} commands of somebody else"
+            f"{axis.name}: {axis.commanded} commands of another host"
             for axis in self._axes
             if axis.commanded
         )
@@ -263,7 +263,7 @@ class OdriveClient:
         state = f.ONE_U32.pack(AxisState.IDLE)
         return [axis.frame(Command.SET_AXIS_STATE, state) for axis in axes]
 
-    # --- who hears what --------------------------------------------------------------------------
+    # --- other frames ----------------------------------------------------------------------------
 
     def _by_id(self, command: Command) -> dict[int, RemoteAxis]:
         return {f.identifier(axis.node, command): axis for axis in self._axes}

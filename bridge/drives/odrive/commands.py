@@ -1,4 +1,4 @@
-"""What an axis is told: the data of the host's messages, as acts on the axis.
+"""The host's messages to an axis: their data, and their effect on it.
 
 Missing bytes read as zero, extra ones are ignored. Values that no drive takes (NaN, negative
 limits and gains) change nothing; all values of a message are taken, or none.

@@ -1,4 +1,4 @@
-"""Functions that a drive offers as endpoints: called by RxSdo with opcode 1, argument as its value.
+"""Functions of a drive as endpoints: called by RxSdo with opcode 1 and the argument as value.
 
     function               argument    result          what it does
     save_configuration                 bool success    as Reboot 1: False while it isn't idle

@@ -1,4 +1,4 @@
-"""What a drive's measurements mean: derating, and what disarms it.
+"""Derating and disarming by a drive's measurements.
 
     measured                                    consequence
     FET or motor between θ_1 and θ_2            current limit × (θ_2 − θ) / (θ_2 − θ_1)         (1)

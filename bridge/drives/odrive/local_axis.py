@@ -1,4 +1,4 @@
-"""The axis behind the messages: its states, why it disarms, and the torque that it asks for.
+"""The emulated axis behind the messages: its states, disarming, and its torque demand.
 
     state         on                                          to            result
     IDLE          CLOSED_LOOP asked                           CLOSED_LOOP   SUCCESS

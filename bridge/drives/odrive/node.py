@@ -8,7 +8,7 @@
                     calls a function                                      `functions`
     Address         asked: says node id and serial number
                     our serial number or 0: takes the node id
-                    our node id, somebody else's number: goes to 0x3F
+                    our node id, another serial number: goes to 0x3F
     Reboot 0, 1, 2  only in IDLE: silent for a while, then powered up with the saved parameters;
                     1 saves the present ones first, 2 the vendor's
     Reboot 3, DFU   only in IDLE: gone from the bus for good
@@ -192,7 +192,7 @@ class OdriveNode(LocalAxis):
         if report is not None:
             if f.is_request(frame):
                 return (self._frame(command, report(self)),)
-            self.ignored += 1  # somebody imitates a drive
+            self.ignored += 1  # another node imitates a drive
             return _NONE
         if command == Command.ESTOP:
             self.estop()

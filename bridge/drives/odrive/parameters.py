@@ -1,4 +1,4 @@
-"""What a host can set of an axis: kept in RAM, saved by Reboot 1, gone after any other reboot.
+"""The parameters of an axis that a host can set: in RAM, saved by Reboot 1, lost by other reboots.
 
 Floats are finite and not negative, as is everything else; what isn't is refused, and the value
 stays. The vendor's defaults [firmware 0.5.6 source] come with `DriveModel`.

@@ -1,11 +1,11 @@
-"""What a host knows of one ODrive axis, from its frames alone.
+"""The host's picture of one ODrive axis, from its frames alone.
 
     angle, speed    of the wheel, from the newest encoder frame whose numbers are finite
     trouble         why its wheel must not be driven: errors, an e-stop seen on its way to it, two
                     senders of its telemetry
     heard_ns        bus time of its newest heartbeat, stamp_ns of its newest encoder frame
 
-Answers to somebody else's requests are told from a second sender by counting the requests.
+Answers to requests of other hosts are told from a second sender by counting the requests.
 """
 
 from math import pi
@@ -66,9 +66,9 @@ class RemoteAxis:
         self.errors = AxisError(0)
         self.trouble = ""
         self.commanded = 0
-        """Set-points and modes that somebody else sent to it."""
+        """Set-points and modes that other hosts sent to it."""
         self.encoder_frames = 0
-        """Less those that somebody asked for."""
+        """Less those that were requested."""
         self._heartbeats = 0
         self._doubled = ""
         self._encoder_cadence = Cadence(link.encoder_period_ns)

@@ -1,4 +1,4 @@
-"""What an axis says of itself: the data of its messages, as functions of the axis.
+"""The messages of an axis: their data as functions of its state.
 
 Without measurements (an ideal motor) current and torque are the demanded ones, temperatures 25 °C
 and the bus has 24 V. What a single can't hold saturates; NaN stays.

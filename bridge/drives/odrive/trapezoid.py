@@ -7,9 +7,9 @@
     a, d  signed accelerations [rev/s²]   T = T_a + T_v + T_d
 
 The direction is the side of the goal on which braking at once would end. Two things are unlike the
-vendor's planner, which misses the goal in these cases where both limits differ: who is faster than
-v_c brakes with d, and who moves the wrong way turns with the smaller of both. A move too short for
-the cruising speed turns at the speed where accelerating meets braking,
+vendor's planner, which misses the goal in these cases where both limits differ: an axis faster
+than v_c brakes with d, and one that moves the wrong way turns with the smaller of both. A move too
+short for the cruising speed turns at the speed where accelerating meets braking,
 
     v_c² = (d v_0² + 2 a d Δx) / (d − a)                                                        (4)
 """

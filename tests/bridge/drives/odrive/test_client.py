@@ -291,7 +291,7 @@ def test_error_frames_and_other_numbers_are_nothing_to_it(robot: Robot) -> None:
 def test_commands_of_somebody_else_are_noticed(robot: Robot) -> None:
     robot.arm()
     robot.client.hear(identifier(1, Command.SET_INPUT_TORQUE), bytes(4), robot.now_ns)
-    assert robot.client.notices == ("left drive (node 1): 1 commands of somebody else",)
+    assert robot.client.notices == ("left drive (node 1): 1 commands of another host",)
 
 
 def test_a_resting_drive_is_told_idle_again_only_while_it_is_not(robot: Robot) -> None:
