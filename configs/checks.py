@@ -15,7 +15,7 @@ from configs.plugins import Recorded
 from configs.scenario import ETSRO, Scenario
 from configs.sections import Drive, Expect
 from configs.signals import PLANT_SIGNALS, SPREAD, controller_signals
-from configs.wording import MISSING, right_of
+from configs.wording import MISSING, remedy_of
 
 MAX_NODE = 62
 """63 is the address of drives that have none."""
@@ -26,7 +26,7 @@ class Problem(NamedTuple):
 
     key: str  # as in the file, robots by name
     value: object
-    right: str  # what would be right
+    remedy: str  # the values that are allowed, or what to change
 
 
 def cross_problems(scenario: Scenario) -> list[Problem]:
@@ -47,8 +47,8 @@ def _names(scenario: Scenario) -> Iterator[Problem]:
         seen.add(robot.name)
         known = {ETSRO, *scenario.robot_types}
         if robot.type not in known:
-            right = f"no such robot type; known: {', '.join(sorted(known))}"
-            yield Problem(f"robot.{robot.name}.type", robot.type, right)
+            remedy = f"no such robot type; known: {', '.join(sorted(known))}"
+            yield Problem(f"robot.{robot.name}.type", robot.type, remedy)
         if robot.offset.kind == "varying":
             places = [knot.s_m for knot in robot.offset.knots]
             if any(b <= a for a, b in itertools.pairwise(places)):
@@ -58,8 +58,10 @@ def _names(scenario: Scenario) -> Iterator[Problem]:
         if any(a == b for a, b in itertools.pairwise(points)):
             yield Problem("path.points_m", points, "two neighbouring points are the same")
         if scenario.path.closed and points[0] == points[-1]:
-            right = "a closed spline goes back to its first point by itself: leave the last one out"
-            yield Problem("path.points_m", points, right)
+            remedy = (
+                "a closed spline goes back to its first point by itself: leave the last one out"
+            )
+            yield Problem("path.points_m", points, remedy)
         if scenario.path.closed and len(points) < 3:
             yield Problem("path.points_m", points, "a closed spline needs three points or more")
     steps = [step.t_s for step in scenario.leader.steps]
@@ -76,7 +78,7 @@ def _laws(scenario: Scenario) -> Iterator[Problem]:
             for item in error.errors(include_url=False):
                 key = ".".join(str(part) for part in ("robot", robot.name, "control", *item["loc"]))
                 value = MISSING if item["type"] == "missing" else item["input"]
-                yield Problem(key, value, right_of(item))
+                yield Problem(key, value, remedy_of(item))
 
 
 def _expectable(scenario: Scenario) -> list[str]:
@@ -210,11 +212,11 @@ def _encoder_period(scenario: Scenario) -> Iterator[Problem]:
         return
     ratio = control_s / period_s
     if ratio < 1.0 - 1e-6:
-        right = f"at most clock.control_period_s = {control_s:g}: a tick needs news of both wheels"
-        yield Problem("drive.encoder_period_s", period_s, right)
+        remedy = f"at most clock.control_period_s = {control_s:g}: a tick needs news of both wheels"
+        yield Problem("drive.encoder_period_s", period_s, remedy)
     elif scenario.clock.mode == "lockstep" and abs(ratio - round(ratio)) > 1e-6:
-        right = f"must divide clock.control_period_s = {control_s:g}, the tick of lockstep"
-        yield Problem("drive.encoder_period_s", period_s, right)
+        remedy = f"must divide clock.control_period_s = {control_s:g}, the tick of lockstep"
+        yield Problem("drive.encoder_period_s", period_s, remedy)
 
 
 def _nodes(scenario: Scenario) -> Iterator[Problem]:
@@ -224,8 +226,8 @@ def _nodes(scenario: Scenario) -> Iterator[Problem]:
         for side, node in zip(("right", "left"), scenario.nodes_of(name), strict=True):
             key = f"robot.{name}.{side}_node"
             if node > MAX_NODE:
-                right = f"bus {bus} has no node left for it: 0 to {MAX_NODE}"
-                yield Problem(key, node, right)
+                remedy = f"bus {bus} has no node left for it: 0 to {MAX_NODE}"
+                yield Problem(key, node, remedy)
             elif (owner := taken.setdefault((bus, node), f"{name}'s {side} drive")) and (
                 owner != f"{name}'s {side} drive"
             ):
@@ -247,13 +249,13 @@ def _host(scenario: Scenario) -> Iterator[Problem]:
         least["rearm_after_s"] = 2 * heartbeat_s, "two of drive.heartbeat_period_s"
         least["rearm_limit_s"] = 3 * heartbeat_s, "three of drive.heartbeat_period_s"
         if scenario.localisation.source == "odometry":
-            right = "odometry alone doesn't know where a robot is after a fault: false, or fixes"
-            yield Problem("host.rearm", True, right)
+            remedy = "odometry alone doesn't know where a robot is after a fault: false, or fixes"
+            yield Problem("host.rearm", True, remedy)
     for key, (limit, what) in least.items():
         value = getattr(host, key)
         if value is not None and value < limit:
-            right = f"{what}, {limit:g} s, or more, or a healthy robot stops or never arms"
-            yield Problem(f"host.{key}", value, right)
+            remedy = f"{what}, {limit:g} s, or more, or a healthy robot stops or never arms"
+            yield Problem(f"host.{key}", value, remedy)
 
 
 def _expects(scenario: Scenario) -> Iterator[Problem]:
@@ -263,8 +265,8 @@ def _expects(scenario: Scenario) -> Iterator[Problem]:
         if known and expect.signal not in known:
             close = difflib.get_close_matches(expect.signal, known, 1, cutoff=0.5)
             hint = f"; did you mean {close[0]}?" if close else ""
-            right = f"no such signal{hint} (known: {', '.join(known)})"
-            yield Problem(f"{where}.signal", expect.signal, right)
+            remedy = f"no such signal{hint} (known: {', '.join(known)})"
+            yield Problem(f"{where}.signal", expect.signal, remedy)
         for robot in expect.robots or ():
             if robot not in scenario.names:
                 yield Problem(f"{where}.robots", robot, _known(scenario))
@@ -293,14 +295,14 @@ def _window(where: str, expect: Expect, scenario: Scenario) -> Iterator[Problem]
     if expect.to_s is not None and expect.from_s >= expect.to_s:
         yield Problem(f"{where}.from_s", expect.from_s, f"must be below to_s = {expect.to_s:g}")
     elif expect.from_s >= end_s:
-        right = f"the run ends before: must be below duration_s = {end_s:g}"
-        yield Problem(f"{where}.from_s", expect.from_s, right)
+        remedy = f"the run ends before: must be below duration_s = {end_s:g}"
+        yield Problem(f"{where}.from_s", expect.from_s, remedy)
     elif ceil(expect.from_s / period_s - 1e-6) > floor(last_s / period_s + 1e-6):
-        right = f"no tick from there to {last_s:g} s: they are {period_s:g} s apart"
-        yield Problem(f"{where}.from_s", expect.from_s, right)
+        remedy = f"no tick from there to {last_s:g} s: they are {period_s:g} s apart"
+        yield Problem(f"{where}.from_s", expect.from_s, remedy)
     if expect.to_s is not None and expect.to_s > end_s:
-        right = f"the run ends before: at most duration_s = {end_s:g}, or leave it out: to the end"
-        yield Problem(f"{where}.to_s", expect.to_s, right)
+        remedy = f"the run ends before: at most duration_s = {end_s:g}, or leave it out: to the end"
+        yield Problem(f"{where}.to_s", expect.to_s, remedy)
 
 
 def _edges(scenario: Scenario) -> Iterator[Problem]:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from pydantic_core import InitErrorDetails, core_schema
 
 STATED = "stated"
-"""The type of an error that is in our words already: in its context, under `right`."""
+"""The type of an error that is in our words already: in its context, under `remedy`."""
 
 
 class Chooser(NamedTuple):
@@ -228,8 +228,8 @@ def _validated(parameters: type[Parameters], table: dict[str, Any]) -> Parameter
 def _again(item: Any) -> "InitErrorDetails":
     details: dict[str, Any] = {"type": item["type"], "loc": item["loc"], "input": item["input"]}
     if item["type"] == "value_error":
-        right = str(item["ctx"]["error"])
-        details["type"] = _in_words(right)
+        remedy = str(item["ctx"]["error"])
+        details["type"] = _in_words(remedy)
     elif "ctx" in item:
         details["ctx"] = item["ctx"]
     made: InitErrorDetails = details  # type: ignore[assignment]
@@ -239,23 +239,23 @@ def _again(item: Any) -> "InitErrorDetails":
 def _unknown(key: str, value: object, known: list[str]) -> "InitErrorDetails":
     close = difflib.get_close_matches(key, known, 1)
     hint = f"; did you mean {close[0]}?" if close else ""
-    right = f"unknown key{hint} (known here: {', '.join(known)})"
+    remedy = f"unknown key{hint} (known here: {', '.join(known)})"
     from pydantic_core import InitErrorDetails
 
-    stated = _in_words(right)
+    stated = _in_words(remedy)
     return InitErrorDetails(type=stated, loc=(key,), input=value)
 
 
-def _stated(key: str, value: object, right: str) -> "ValidationError":
+def _stated(key: str, value: object, remedy: str) -> "ValidationError":
     from pydantic import ValidationError
     from pydantic_core import InitErrorDetails
 
-    stated = _in_words(right)
+    stated = _in_words(remedy)
     details = InitErrorDetails(type=stated, loc=(key,), input=value)
     return ValidationError.from_exception_data(key, [details])
 
 
-def _in_words(right: str) -> Any:
+def _in_words(remedy: str) -> Any:
     from pydantic_core import PydanticCustomError
 
-    return PydanticCustomError(STATED, "{right}", {"right": right})
+    return PydanticCustomError(STATED, "{remedy}", {"remedy": remedy})

@@ -1,4 +1,4 @@
-"""What the schema has against a file, in the words of the file: key, value, what would be right."""
+"""Errors of a file in terms of the file: key, value, remedy."""
 
 import copy
 import difflib
@@ -12,7 +12,7 @@ from configs.checks import Problem
 from configs.errors import Complaint, ScenarioError
 from configs.parameters import as_tuples
 from configs.scenario import Scenario
-from configs.wording import MISSING, right_of
+from configs.wording import MISSING, remedy_of
 
 _NOTHING = object()
 _KEY = "[key]"  # pydantic's mark for what is wrong with a key rather than its value
@@ -32,8 +32,8 @@ _STAND_INS: dict[object, object] = {
 
 def shown(complaint: Complaint) -> str:
     """One line for people."""
-    where, key, value, right = complaint
-    return f"{where}: {key} = {_shown(value)}: {right}" if key else f"{where}: {right}"
+    where, key, value, remedy = complaint
+    return f"{where}: {key} = {_shown(value)}: {remedy}" if key else f"{where}: {remedy}"
 
 
 def refusal(complaints: Sequence[Complaint]) -> ScenarioError:
@@ -51,7 +51,7 @@ def complaints(
 
 def in_words(error: ValidationError) -> str:
     """What pydantic has against one value, in our words."""
-    return right_of(error.errors(include_url=False)[0])
+    return remedy_of(error.errors(include_url=False)[0])
 
 
 class Salvage(NamedTuple):
@@ -62,7 +62,7 @@ class Salvage(NamedTuple):
 
     def believes(self, problem: Problem) -> bool:
         """Whether a problem is the file's, not one of what was put in for lost keys."""
-        text = f"{problem.key} {problem.right}"
+        text = f"{problem.key} {problem.remedy}"
         return not any(key in text or key.startswith(f"{problem.key}.") for key in self.lost)
 
 
@@ -150,10 +150,10 @@ def _problem(item: dict[str, Any], data: dict[str, Any], model: type[BaseModel])
     if item["type"].startswith("union_tag"):
         tag = holder.get("kind", MISSING)
         tags = item["ctx"].get("expected_tags", "")
-        right = f"must be one of {tags}" if tags else "must be given"
-        return Problem(".".join([*names, "kind"]), tag, right)
+        remedy = f"must be one of {tags}" if tags else "must be given"
+        return Problem(".".join([*names, "kind"]), tag, remedy)
     value = MISSING if item["type"] == "missing" else item["input"]
-    return Problem(".".join(names), value, right_of(item))
+    return Problem(".".join(names), value, remedy_of(item))
 
 
 def _unknown(loc: Sequence[int | str], model: type[BaseModel]) -> str:

@@ -202,15 +202,15 @@ def _problems(deployment: Deployment, scenario: Scenario) -> list[Problem]:
     ]
     for role in STARTED:
         if role.beside_launcher and not deployment.runs_here(role.name):
-            right = f"must name {role.name}: it works where `fleetloop run` is"
-            problems.append(Problem("roles", list(deployment.roles or ()), right))
+            remedy = f"must name {role.name}: it works where `fleetloop run` is"
+            problems.append(Problem("roles", list(deployment.roles or ()), remedy))
     if deployment.elsewhere(scenario) and deployment.network is None:
-        right = f"must be given: {', '.join(deployment.elsewhere(scenario))} come from elsewhere"
-        problems.append(Problem("network", MISSING, right))
+        remedy = f"must be given: {', '.join(deployment.elsewhere(scenario))} come from elsewhere"
+        problems.append(Problem("network", MISSING, remedy))
     realtime = scenario.clock.mode == "realtime"
     if deployment.roles is not None and deployment.elsewhere(scenario) and not realtime:
-        right = 'roles elsewhere need clock.mode = "realtime"; add --clock realtime'
-        problems.append(Problem("roles", list(deployment.roles), right))
+        remedy = 'roles elsewhere need clock.mode = "realtime"; add --clock realtime'
+        problems.append(Problem("roles", list(deployment.roles), remedy))
     for user, buses in (deployment.network.guests if deployment.network else {}).items():
         problems += [
             Problem(f"network.guests.{user}", bus, f"no such bus: {', '.join(scenario.buses)} or *")
@@ -223,16 +223,16 @@ def _problems(deployment: Deployment, scenario: Scenario) -> list[Problem]:
     for robot, section in deployment.robot.items():
         key = f"robot.{robot}"
         if robot not in scenario.names:
-            right = f"no such robot; known: {', '.join(scenario.names)}"
-            problems.append(Problem(key, robot, right))
+            remedy = f"no such robot; known: {', '.join(scenario.names)}"
+            problems.append(Problem(key, robot, remedy))
             continue
         problems += _bus_problems(f"{key}.bus", section.bus, realtime=realtime)
         problems += _emulation_problems(key, section)
         bus = section.bus
         other = places.setdefault((bus.interface, bus.channel or robot), robot)
         if other != robot:
-            right = f"{other} is there with the same node ids; give each robot a bus of its own"
-            problems.append(Problem(f"{key}.bus.channel", bus.channel, right))
+            remedy = f"{other} is there with the same node ids; give each robot a bus of its own"
+            problems.append(Problem(f"{key}.bus.channel", bus.channel, remedy))
     return problems
 
 
@@ -245,14 +245,14 @@ def _bus_problems(key: str, bus: BusSection, *, realtime: bool) -> list[Problem]
     if bus.interface == OURS:
         return problems
     if bus.channel is None:
-        right = f"must be given: what the interface {bus.interface} opens"
-        problems.append(Problem(f"{key}.channel", MISSING, right))
+        remedy = f"must be given: what the interface {bus.interface} opens"
+        problems.append(Problem(f"{key}.channel", MISSING, remedy))
     if not realtime:
-        right = (
+        remedy = (
             'in lockstep the plant holds the bus: "fleetloop"; or run with --clock realtime'
             " at a rate and with gains for it"
         )
-        problems.append(Problem(f"{key}.interface", bus.interface, right))
+        problems.append(Problem(f"{key}.interface", bus.interface, remedy))
     return problems
 
 
@@ -266,8 +266,8 @@ def _emulation_problems(key: str, section: RobotSection) -> list[Problem]:
         )
         problems.append(Problem(f"{key}.emulated", False, f"must be true: {why}"))
     if plant is not None and OURS in (section.bus.interface, plant.interface):
-        right = "both ends must be on interfaces other than fleetloop, whose bus the plant holds"
-        problems.append(Problem(f"{key}.plant_bus.interface", plant.interface, right))
+        remedy = "both ends must be on interfaces other than fleetloop, whose bus the plant holds"
+        problems.append(Problem(f"{key}.plant_bus.interface", plant.interface, remedy))
     elif plant is not None:
         problems += _bus_problems(f"{key}.plant_bus", plant, realtime=True)
     return problems

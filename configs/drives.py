@@ -32,7 +32,7 @@ def load(name: str) -> Any:
     """The row of a protocol, a `bridge.drives.interface.DriveProtocol`.
 
     Raises:
-        ScenarioError: there is none of that name; the text is what would be right.
+        ScenarioError: there is none of that name; the text is the remedy.
     """
     target = DRIVES.get(name, name)
     module_name, _, row = target.partition(":")

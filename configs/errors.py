@@ -28,7 +28,7 @@ class Complaint(NamedTuple):
     where: str  # the file, or the option as it was given
     key: str  # as in the file, robots by name; "" if it is about all of it
     value: object
-    right: str  # what would be right
+    remedy: str  # the values that are allowed, or what to change
 
 
 class FleetloopError(Exception):

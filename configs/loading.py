@@ -1,7 +1,7 @@
 """Read, check and write scenario files.
 
 A scenario is named by the path of a TOML file or by the name of a shipped one. All problems of a
-file come at once, a line each: file, key, value, and what would be right.
+file come at once, a line each: file, key, value, remedy.
 """
 
 import difflib
@@ -141,5 +141,5 @@ def blamed(name: str, problem: Problem, overrides: Sequence[str | Override]) -> 
         override = Override.from_set(text) if isinstance(text, str) else text
         if isinstance(override, Override) and override.is_about(problem.key):
             key = "" if problem.key == override.key else problem.key
-            return Complaint(override.option, key, problem.value, problem.right)
+            return Complaint(override.option, key, problem.value, problem.remedy)
     return Complaint(name, *problem)

@@ -24,8 +24,8 @@ class Override(NamedTuple):
         key, equals, value = text.partition("=")
         parts = [part.strip() for part in key.split(".")]
         if not equals or not all(parts):
-            right = "must read key=value, for example coordination.p=3"
-            return Complaint(option, "", text, right)
+            remedy = "must read key=value, for example coordination.p=3"
+            return Complaint(option, "", text, remedy)
         return cls(option, ".".join(parts), _value(value.strip()))
 
     def is_about(self, key: str) -> bool:
@@ -61,8 +61,8 @@ class Override(NamedTuple):
             return self._complain(f"{last} names nothing there")
         return self._replace(key=".".join([*names, last]))
 
-    def _complain(self, right: str) -> Complaint:
-        return Complaint(self.option, "", self.value, right)
+    def _complain(self, remedy: str) -> Complaint:
+        return Complaint(self.option, "", self.value, remedy)
 
 
 def _value(text: str) -> object:

@@ -1,4 +1,4 @@
-"""Errors of pydantic in the words of a scenario file: what would be right."""
+"""The remedy of an error that pydantic reports, in terms of a scenario file."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -37,13 +37,13 @@ _WORDS = {
 }
 
 
-def right_of(item: Mapping[str, Any]) -> str:
-    """What would be right instead of what one error is about."""
+def remedy_of(item: Mapping[str, Any]) -> str:
+    """The remedy of one error, in a few words."""
     kind, about = item["type"], item.get("ctx", {})
     if kind == "value_error":
         return str(about["error"])
     if kind == STATED:
-        return str(about["right"])
+        return str(about["remedy"])
     if kind == "string_pattern_mismatch":
         return WORDS.get(about["pattern"], f"must match {about['pattern']}")
     shown = {k: f"{v:g}" if isinstance(v, float) else v for k, v in about.items()}

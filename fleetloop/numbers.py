@@ -51,6 +51,6 @@ def finite(value: float | None) -> float | None:
 def speed(value: float) -> float:
     """A check of a multiple of real time; 0: as fast as can be."""
     if value and not SLOWEST <= value <= FASTEST:
-        right = f"must be 0 (as fast as the machine allows), or from {SLOWEST:g} to {FASTEST:g}."
-        raise typer.BadParameter(f"{value:g}: {right}")
+        remedy = f"must be 0 (as fast as the machine allows), or from {SLOWEST:g} to {FASTEST:g}."
+        raise typer.BadParameter(f"{value:g}: {remedy}")
     return value

@@ -62,5 +62,5 @@ def controller(value: object, secret: object) -> tuple[str, str]:
     return value, secret
 
 
-def _wrong(name: str, value: object, right: str) -> can.CanInitializationError:
-    return can.CanInitializationError(f"{name} = {value!r}: {right}")
+def _wrong(name: str, value: object, remedy: str) -> can.CanInitializationError:
+    return can.CanInitializationError(f"{name} = {value!r}: {remedy}")

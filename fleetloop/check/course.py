@@ -124,21 +124,21 @@ def _irregular(scenario: Scenario, robot: Robot, at: float) -> Problem:
     centre = robot_path(reference_path(scenario.path), WorldOffset(0.0, 0.0))
     speed, _ = _speed_and_heading(centre, at)
     if speed < STANDS_STILL:
-        right = f"the path stands still at s = {at:.4g} m; {law}"
+        remedy = f"the path stands still at s = {at:.4g} m; {law}"
         if scenario.path.kind == "spline":
             value: object = scenario.path.points_m
-            return Problem("path.points_m", value, f"{right}: don't turn back on a point")
-        return Problem("path", asdict(scenario.path), right)
+            return Problem("path.points_m", value, f"{remedy}: don't turn back on a point")
+        return Problem("path", asdict(scenario.path), remedy)
     turn = abs(centre(at).omega_bar)
-    right = f"{robot.name}'s path stands still at s = {at:.4g} m; {law}"
+    remedy = f"{robot.name}'s path stands still at s = {at:.4g} m; {law}"
     if turn > 0.0:
-        right += f": keep the offset off the path's centre of curvature, {speed / turn:.4g} m away"
+        remedy += f": keep the offset off the path's centre of curvature, {speed / turn:.4g} m away"
     offset = asdict(robot.offset)
     kind = offset.pop("kind")
     if kind == "structure":
         key = f"robot.{robot.name}.offset.left_m"
-        return Problem(key, offset["left_m"], right)
-    return Problem(f"robot.{robot.name}.offset", offset, right)
+        return Problem(key, offset["left_m"], remedy)
+    return Problem(f"robot.{robot.name}.offset", offset, remedy)
 
 
 def _speed_and_heading(path: RobotPath, s: float) -> tuple[float, float]:

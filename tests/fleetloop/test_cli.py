@@ -70,9 +70,9 @@ def test_check_says_what_is_wrong_in_json_too(tmp_path: Path) -> None:
     assert said["findings"] == []
     (problem,) = said["problems"]
     assert problem["where"] == "--set control.k1=nan"
-    assert problem["right"] == "must be a finite number"
+    assert problem["remedy"] == "must be a finite number"
     done = fleetloop("check", "nowhere.toml", "--json", cwd=tmp_path)
-    assert "no such file" in json.loads(done.stdout)["problems"][0]["right"]
+    assert "no such file" in json.loads(done.stdout)["problems"][0]["remedy"]
     listed = json.loads(fleetloop("check", "--json", cwd=tmp_path).stdout)["shipped"]
     assert [one["name"] for one in listed] == list(shipped())
 
