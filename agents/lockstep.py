@@ -7,7 +7,6 @@ others still compute, and a graph with cycles can't deadlock.
 """
 
 import errno
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,6 +19,7 @@ from agents.guard import Phase
 from bridge.awake import LOOK_S, AwakeClock
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import can_id_of, to_message
+from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.frame import Frame
 from bridge.network.barrier import Hellos
 from bridge.network.link import Arrival, Link, Publisher
@@ -60,8 +60,16 @@ class LockstepLoop:
     """Runs one agent on its bus and its link."""
 
     def __init__(
-        self, agent: Agent, bus: FleetloopBus, link: Link, path: Publisher, hellos: Hellos
+        self,
+        agent: Agent,
+        bus: FleetloopBus,
+        link: Link,
+        path: Publisher,
+        hellos: Hellos,
+        *,
+        clock: Clock = SYSTEM_CLOCK,
     ) -> None:
+        self._clock = clock
         self._agent = agent
         self._schedule = agent.brief.schedule
         self._robot = agent.brief.robot
@@ -77,7 +85,7 @@ class LockstepLoop:
 
     def await_first_frame(self, stop: Stop) -> can.Message | None:
         """Say hello until the plant's first frame comes; None when told to stop."""
-        clock = AwakeClock(held=launcher_stopped)
+        clock = AwakeClock(held=launcher_stopped, clock=self._clock)
         deadline = clock.now() + self._schedule.start_deadline_s
         while not stop.requested:
             self._hellos.say()
@@ -99,7 +107,7 @@ class LockstepLoop:
         agent = self._agent
         counters = self.counters
         message: can.Message | None = first
-        asked_ns = time.monotonic_ns()
+        asked_ns = self._clock.monotonic_ns()
         hear, clock, schedule = (
             agent.hear,
             BusClock(self._schedule, agent.heard_since),
@@ -114,16 +122,16 @@ class LockstepLoop:
                 hear(can_id_of(message), message.data, now_ns)
                 tick = clock.due(now_ns)
             if tick is not None:
-                came_ns = time.monotonic_ns()
+                came_ns = self._clock.monotonic_ns()
                 if schedule.owes(tick):
                     self._listen(tick, stop)
-                heard_ns = time.monotonic_ns()
+                heard_ns = self._clock.monotonic_ns()
                 self._send(agent.step(tick) if not stop.requested else agent.leave())
                 if schedule.shares(tick + 1):
                     self._path.put(agent.share(tick + 1).encode())
                 counters.bus_ns += came_ns - asked_ns
                 counters.listen_ns += heard_ns - came_ns
-                asked_ns = time.monotonic_ns()
+                asked_ns = self._clock.monotonic_ns()
                 counters.compute_ns += asked_ns - heard_ns
                 counters.ticks += 1
                 if agent.phase is Phase.DONE:
@@ -150,7 +158,7 @@ class LockstepLoop:
             # Who is asked too late may find it waiting; who is flooded finds that there is no end.
             arrival = self._link.receive(LOOK_S if left_s > 0.0 else 0.0)
             if clock is None:
-                clock = AwakeClock(held=launcher_stopped)
+                clock = AwakeClock(held=launcher_stopped, clock=self._clock)
                 deadline = clock.now() + within_s
             left_s = deadline - clock.now()
             if arrival is not None and left_s > -within_s:
@@ -164,7 +172,7 @@ class LockstepLoop:
         message = self._receive(LOOK_S)
         if message is not None or self._bus.asked:
             return message
-        clock = AwakeClock(held=launcher_stopped)
+        clock = AwakeClock(held=launcher_stopped, clock=self._clock)
         deadline = clock.now() + within_s - LOOK_S
         while (message := self._receive(LOOK_S)) is None and not self._bus.asked:
             if clock.now() > deadline:

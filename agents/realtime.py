@@ -12,7 +12,6 @@ from then on. Its own frames, where the interface hands them back, are nobody el
 What an interface's errors do is in `agents.bus_health`.
 """
 
-import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -27,7 +26,7 @@ from agents.lockstep import did_not_start, give
 from bridge.awake import STALL_S, Lateness
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import can_id_of, to_frame, to_message
-from bridge.clock import implausible_start, monotonic_of
+from bridge.clock import SYSTEM_CLOCK, Clock, implausible_start, monotonic_of
 from bridge.frame import ERR, Frame
 from bridge.network.barrier import Hellos
 from bridge.network.link import Link, Publisher, waiting
@@ -78,7 +77,10 @@ class RealtimeLoop:
         path: Publisher,
         hellos: Hellos,
         beat: Publisher,
+        *,
+        clock: Clock = SYSTEM_CLOCK,
     ) -> None:
+        self._clock = clock
         self._agent = agent
         self._schedule = agent.brief.schedule
         self._robot = agent.brief.robot
@@ -98,7 +100,7 @@ class RealtimeLoop:
 
     def await_go(self, stop: Stop) -> int | None:
         """Say hello until the launcher says when tick 0 is; None when told to stop."""
-        deadline = time.monotonic() + self._schedule.start_deadline_s
+        deadline = self._clock.monotonic_s() + self._schedule.start_deadline_s
         while not stop.requested:
             self._drop_backlog()
             self._hellos.say()
@@ -112,7 +114,7 @@ class RealtimeLoop:
                 elif (epoch_ns := self._epoch_ns(arrival.payload)) is not None:
                     return epoch_ns
                 arrival = self._link.receive(0.0)
-            if time.monotonic() > deadline:
+            if self._clock.monotonic_s() > deadline:
                 raise did_not_start(self._agent)
         return None
 
@@ -126,8 +128,8 @@ class RealtimeLoop:
         if go is None:
             refusals.note("go", LAUNCHER.name, "not well formed")
             return None
-        epoch_ns = monotonic_of(go.epoch_ns)
-        if far := implausible_start(epoch_ns, self._schedule.longest_start_s):
+        epoch_ns = monotonic_of(go.epoch_ns, self._clock)
+        if far := implausible_start(epoch_ns, self._schedule.longest_start_s, self._clock):
             refusals.note("go", LAUNCHER.name, "clocks", far)
             return None
         self._agent.last_tick = min(self._schedule.ticks, max(go.ticks, 0))
@@ -150,7 +152,7 @@ class RealtimeLoop:
         while agent.phase is not Phase.DONE:
             due_ns = epoch_ns + tick * period_ns + phase_ns
             self._read_until(due_ns)
-            now_ns = time.monotonic_ns()
+            now_ns = self._clock.monotonic_ns()
             agent.late_s = late_s = (now_ns - due_ns) * 1e-9
             if lateness.note(tick, late_s):
                 self._name_stall(tick, late_s)
@@ -189,9 +191,9 @@ class RealtimeLoop:
 
         A bus that fails says so again when it is used.
         """
-        deadline = time.monotonic() + BACKLOG_S
+        deadline = self._clock.monotonic_s() + BACKLOG_S
         with suppress(can.CanError, OSError):
-            while self._bus.recv(0.0) is not None and time.monotonic() < deadline:
+            while self._bus.recv(0.0) is not None and self._clock.monotonic_s() < deadline:
                 pass
 
     def _hear_peers(self) -> None:
@@ -205,19 +207,19 @@ class RealtimeLoop:
             for can_id, data in frames:
                 send(to_message(can_id, data))
                 if self._echoes is not None:
-                    self._echoes.sent(Frame(can_id, data), time.monotonic())
+                    self._echoes.sent(Frame(can_id, data), self._clock.monotonic_s())
         except (can.CanError, OSError) as error:
             self._bear(error)
             self._agent.guard.note_unsent(tick)
         else:
-            self._sent_ns = time.monotonic_ns()
+            self._sent_ns = self._clock.monotonic_ns()
             if health.since_ns is not None:
                 health.sent()
                 self._agent.guard.bus_fault = None
 
     def _bear(self, error: Exception) -> None:
         """Count an error of the bus, stop the wheels if it lasts, raise if it is the end."""
-        health, now_ns = self._health, time.monotonic_ns()
+        health, now_ns = self._health, self._clock.monotonic_ns()
         health.failed(error, now_ns)
         self._agent.guard.bus_fault = health.fault(now_ns)
         self.counters.unsent, self.counters.bus_errors = health.unsent, health.errors
@@ -227,7 +229,7 @@ class RealtimeLoop:
         agent = self._agent
         polled = False
         while True:
-            left_ns = due_ns - time.monotonic_ns()
+            left_ns = due_ns - self._clock.monotonic_ns()
             if left_ns <= 0 and polled:
                 return
             try:
@@ -235,12 +237,12 @@ class RealtimeLoop:
             except (can.CanError, OSError) as error:
                 self._bear(error)
                 # An interface that is down may say so at once, again and again.
-                time.sleep(max(due_ns - time.monotonic_ns(), 0) * 1e-9)
+                self._clock.sleep(max(due_ns - self._clock.monotonic_ns(), 0) * 1e-9)
                 return
             polled = message is None
             if message is None:
                 continue
-            came_ns = time.monotonic_ns()
+            came_ns = self._clock.monotonic_ns()
             bus_ns = came_ns - self._power_up_ns
             can_id = can_id_of(message)
             if can_id & ERR:

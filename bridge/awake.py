@@ -7,9 +7,10 @@ well, so the time doesn't count. Nor does time in which the launcher is stopped:
 all messages.
 """
 
-import time
 from collections.abc import Callable
 from typing import NamedTuple
+
+from bridge.clock import SYSTEM_CLOCK, Clock
 
 LOOK_S = 0.1
 STALL_S = 0.25
@@ -35,11 +36,11 @@ class AwakeClock:
         stall_s: what is later than that by so much is a stall [s].
         held: whether those that are waited for are held up at this moment; asked after real waits.
         on_stall: told of every stall: how long it was [s].
-        monotonic: the clock of the machine [s].
+        clock: the machine's.
     """
 
     __slots__ = (
-        *("_held", "_look_s", "_looked_s", "_lost_s", "_monotonic", "_on_stall", "_stall_s"),
+        *("_held", "_look_s", "_looked_s", "_lost_s", "_clock", "_on_stall", "_stall_s"),
         "longest_late_s",
     )
 
@@ -50,21 +51,21 @@ class AwakeClock:
         stall_s: float = STALL_S,
         held: Callable[[], bool] = _never,
         on_stall: Callable[[float], None] = lambda _: None,
-        monotonic: Callable[[], float] = time.monotonic,
+        clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         self._look_s = look_s
         self._stall_s = stall_s
         self._held = held
         self._on_stall = on_stall
-        self._monotonic = monotonic
-        self._looked_s = monotonic()
+        self._clock = clock
+        self._looked_s = clock.monotonic_s()
         self._lost_s = 0.0
         self.longest_late_s = 0.0
         """The longest that a look came later than it should have."""
 
     def now(self) -> float:
         """Seconds on a clock that stood still while this process did."""
-        now_s = self._monotonic()
+        now_s = self._clock.monotonic_s()
         gap_s = now_s - self._looked_s
         self._looked_s = now_s
         self.longest_late_s = max(self.longest_late_s, gap_s - self._look_s)
@@ -77,7 +78,7 @@ class AwakeClock:
 
     def resume(self) -> None:
         """What was done since the last look took its time, and was no wait."""
-        self._looked_s = self._monotonic()
+        self._looked_s = self._clock.monotonic_s()
 
 
 class Stall(NamedTuple):

@@ -22,7 +22,6 @@ import pickle
 import signal
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
@@ -31,6 +30,7 @@ from typing import BinaryIO, TypeVar
 
 import setproctitle
 
+from bridge.clock import process_cpu_ns
 from bridge.waiting import readable
 from configs.errors import ExitStatus, FleetloopError, PeerLostError
 
@@ -223,7 +223,7 @@ def processor_wait_ns() -> int:
 
 def cpu_ns() -> int:
     """Processor time of this process so far, all threads; a run counts from its first tick."""
-    return time.process_time_ns()
+    return process_cpu_ns()
 
 
 def settle_memory() -> None:

@@ -6,9 +6,10 @@ brings its own, and nobody else here does.
 """
 
 import signal
-import time
 from types import FrameType, TracebackType
 from typing import Self
+
+from bridge.clock import process_cpu_ns, thread_cpu_ns
 
 SAMPLE_S = 0.002
 PARTS = ("bus", "drives", "law", "plant", "Zenoh", "record", "other")
@@ -53,8 +54,8 @@ class Sampler:
         return parts
 
     def __enter__(self) -> Self:
-        self._process_ns -= time.process_time_ns()
-        self._thread_ns -= time.thread_time_ns()
+        self._process_ns -= process_cpu_ns()
+        self._thread_ns -= thread_cpu_ns()
         signal.signal(signal.SIGPROF, self._sample)
         signal.setitimer(signal.ITIMER_PROF, SAMPLE_S, SAMPLE_S)
         return self
@@ -66,5 +67,5 @@ class Sampler:
         traceback: TracebackType | None,
     ) -> None:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
-        self._process_ns += time.process_time_ns()
-        self._thread_ns += time.thread_time_ns()
+        self._process_ns += process_cpu_ns()
+        self._thread_ns += thread_cpu_ns()

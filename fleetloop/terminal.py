@@ -6,7 +6,6 @@ seconds, so that a CI log shows life and nothing else.
 
 import json
 import sys
-import time
 from types import TracebackType
 from typing import Any, Self
 
@@ -16,6 +15,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn
 from rich.table import Table
 from rich.text import Text
 
+from bridge.clock import SYSTEM_CLOCK
 from fleetloop.streams import forget_output, spelled_for
 
 PLAIN_EVERY_S = 5.0
@@ -112,6 +112,6 @@ class RunProgress:
             self._bar.update(
                 self._task, completed=max(t_s, 0.0), description=self._name, factor=factor
             )
-        elif not self._quiet and t_s > 0 and (now := time.monotonic()) >= self._next_line:
+        elif not self._quiet and t_s > 0 and (now := SYSTEM_CLOCK.monotonic_s()) >= self._next_line:
             self._next_line = now + PLAIN_EVERY_S
             note(f"{self._name}: {t_s:.2f} / {self._duration_s:g} s  {factor.strip()}")

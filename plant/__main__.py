@@ -5,7 +5,6 @@ inherited file descriptors.
 """
 
 import socket
-import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
@@ -13,7 +12,7 @@ from functools import partial
 from bridge.awake import Stall
 from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
-from bridge.clock import implausible_start, monotonic_of
+from bridge.clock import SYSTEM_CLOCK, implausible_start, monotonic_of
 from bridge.launcher import follow_launcher
 from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
@@ -231,8 +230,8 @@ def _serve_until_go(
     """Say hello and serve the buses until the launcher says when tick 0 is."""
     limit_s = GO_SHARE * brief.schedule.start_deadline_s
     wrong: str | None = None
-    deadline = time.monotonic() + limit_s
-    while time.monotonic() < deadline and not stop.requested:
+    deadline = SYSTEM_CLOCK.monotonic_s() + limit_s
+    while SYSTEM_CLOCK.monotonic_s() < deadline and not stop.requested:
         hellos.say()
         end.serve(0.02)
         for arrival in waiting(link):
@@ -244,7 +243,7 @@ def _serve_until_go(
             if wrong is None:
                 return epoch_ns
     if stop.requested:
-        return time.monotonic_ns()
+        return SYSTEM_CLOCK.monotonic_ns()
     raise InfrastructureError(
         f"plant: not ready after {limit_s:g} s: {wrong or 'no go from the launcher'}"
     )

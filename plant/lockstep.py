@@ -14,7 +14,6 @@ the controllers arm their drives and the bodies are held as the scenario puts th
 with one closing tick at which the controllers disarm.
 """
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -22,6 +21,7 @@ from typing import NamedTuple
 
 from bridge.awake import LOOK_S, STALL_S
 from bridge.can_bus.hub import Hub
+from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.network.link import Publisher
 from bridge.network.messages import PoseFix, Progress
 from bridge.process import Stop, launcher_stopped
@@ -87,7 +87,10 @@ class LockstepLoop:
         rows: Sequence[RowBuffer],
         report: Callable[[Progress], None],
         taps: Mapping[str, Tap],
+        *,
+        clock: Clock = SYSTEM_CLOCK,
     ) -> None:
+        self._clock = clock
         self._schedule = schedule = brief.schedule
         self._period_ns, self._ticks = schedule.period_ns, schedule.ticks
         self._tick_wall_ns = int(schedule.period_ns / brief.speed) if brief.speed > 0.0 else 0
@@ -119,19 +122,19 @@ class LockstepLoop:
             InfrastructureError: a controller did not answer within the tick deadline.
             PeerLostError: a controller left its bus.
         """
-        self._start_ns = now_ns = next_report_ns = time.monotonic_ns()
+        self._start_ns = now_ns = next_report_ns = self._clock.monotonic_ns()
         hub = self._hub
         for lane in self._lanes.values():
             self._go_on(lane, now_ns)
         while self._at_slowest and not stop.requested:
             answered = hub.collect(WAIT_S)
-            after_ns = time.monotonic_ns()
+            after_ns = self._clock.monotonic_ns()
             self.counters.waited_ns += after_ns - now_ns
             if after_ns - now_ns > _STALL_NS or (not answered and launcher_stopped()):
                 self._forgive(after_ns - now_ns)
             for bus in answered:
                 self._go_on(self._lanes[bus], after_ns)
-            now_ns = time.monotonic_ns()
+            now_ns = self._clock.monotonic_ns()
             if now_ns - after_ns > _STALL_NS:
                 self._forgive(now_ns - after_ns)
             if not answered:
@@ -139,7 +142,7 @@ class LockstepLoop:
             elif now_ns >= next_report_ns:
                 next_report_ns = now_ns + REPORT_EVERY_NS
                 self._report(self.progress())
-        self.counters.wall_ns = time.monotonic_ns() - self._start_ns
+        self.counters.wall_ns = self._clock.monotonic_ns() - self._start_ns
         for bus, lane in self._lanes.items():
             self.counters.frames[bus] = lane.bus.crossed
 
@@ -147,7 +150,9 @@ class LockstepLoop:
         """How far the slowest robot is."""
         tick = self._slowest
         self.counters.ticks = max(tick, 0)
-        return Progress(tick, tick * self._schedule.period_ns, time.monotonic_ns() - self._start_ns)
+        return Progress(
+            tick, tick * self._schedule.period_ns, self._clock.monotonic_ns() - self._start_ns
+        )
 
     # --- one bus -------------------------------------------------------------------------------
 
@@ -198,7 +203,7 @@ class LockstepLoop:
         self._slowest = min(ticks)
         self._at_slowest = ticks.count(self._slowest)
         if self._slowest <= 0:
-            self._start_ns = time.monotonic_ns()
+            self._start_ns = self._clock.monotonic_ns()
         elif self._tick_wall_ns:
             self._pace()
 
@@ -214,12 +219,12 @@ class LockstepLoop:
     def _pace(self) -> None:
         """Wait for the wall time of the slowest's tick; the buses are served meanwhile."""
         due_ns = self._start_ns + self._slowest * self._tick_wall_ns
-        left_ns = due_ns - time.monotonic_ns()
+        left_ns = due_ns - self._clock.monotonic_ns()
         if left_ns < -self._tick_wall_ns:
             self.counters.overruns += 1
         while left_ns > 0:
             self._hub.serve(left_ns * 1e-9)
-            left_ns = due_ns - time.monotonic_ns()
+            left_ns = due_ns - self._clock.monotonic_ns()
 
     def _forgive(self, stood_still_ns: int) -> None:
         """Time in which this process, or the router, stood still doesn't count as a delay."""

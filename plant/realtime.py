@@ -9,12 +9,12 @@ Every wait ends at an absolute time. A drive that heard no set-point says its en
 cyclically, as always.
 """
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 
 from bridge.awake import Lateness
 from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
+from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.network.link import Publisher
 from bridge.network.messages import PoseFix, Progress
 from bridge.process import Stop
@@ -43,7 +43,10 @@ class RealtimeLoop:
         report: Callable[[Progress], None],
         taps: Mapping[str, Tap],
         record_others: Callable[[int], None] = lambda _: None,
+        *,
+        clock: Clock = SYSTEM_CLOCK,
     ) -> None:
+        self._clock = clock
         self._schedule = brief.schedule
         self._record_others = record_others
         self._zero_ns = brief.schedule.bus_time_ns(0)
@@ -67,7 +70,7 @@ class RealtimeLoop:
         """How far the plant is."""
         tick = self._tick
         self.counters.ticks = max(tick, 0)
-        wall_ns = max(time.monotonic_ns() - self._epoch_ns, 0)
+        wall_ns = max(self._clock.monotonic_ns() - self._epoch_ns, 0)
         return Progress(tick, tick * self._schedule.period_ns, wall_ns)
 
     def run(self, epoch_ns: int, stop: Stop) -> None:
@@ -77,7 +80,7 @@ class RealtimeLoop:
         power_up_ns = epoch_ns - self._zero_ns
         while self._tick <= schedule.ticks and not stop.requested:
             due_ns = power_up_ns + schedule.bus_time_ns(self._tick)
-            now_ns = time.monotonic_ns()
+            now_ns = self._clock.monotonic_ns()
             if now_ns < due_ns:
                 self._serve((due_ns - now_ns) * 1e-9, power_up_ns)
                 continue
@@ -89,23 +92,23 @@ class RealtimeLoop:
                 self._next_report_ns = now_ns + REPORT_EVERY_NS
                 self._report(self.progress())
         self._tick = min(self._tick, schedule.ticks)
-        deadline = time.monotonic() + FAREWELL_S
-        while self._end.clients() and time.monotonic() < deadline and not stop.requested:
+        deadline = self._clock.monotonic_s() + FAREWELL_S
+        while self._end.clients() and self._clock.monotonic_s() < deadline and not stop.requested:
             self._serve(0.01, power_up_ns)
-        self.counters.wall_ns = max(time.monotonic_ns() - epoch_ns, 0)
+        self.counters.wall_ns = max(self._clock.monotonic_ns() - epoch_ns, 0)
         for name, bus in self._buses.items():
             self.counters.frames[name] = bus.crossed
 
     def _serve(self, wait_s: float, power_up_ns: int) -> None:
         """Serve the buses until something came or is due, at most `wait_s`."""
         for acting in self._acting:
-            left_ns = acting.next_ns() + power_up_ns - time.monotonic_ns()
+            left_ns = acting.next_ns() + power_up_ns - self._clock.monotonic_ns()
             wait_s = min(wait_s, max(left_ns, 0) * 1e-9)
         self._end.serve(wait_s)
         for bus in self._end.pending():
-            self._buses[bus].react(time.monotonic_ns() - power_up_ns)
+            self._buses[bus].react(self._clock.monotonic_ns() - power_up_ns)
         for acting in self._acting:
-            acting.advance(time.monotonic_ns() - power_up_ns)
+            acting.advance(self._clock.monotonic_ns() - power_up_ns)
 
     def _keep_tick(self, power_up_ns: int) -> None:
         """One tick, bus by bus; torques that come meanwhile are served between two buses."""

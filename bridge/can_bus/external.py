@@ -17,7 +17,6 @@ to be opened again. Neither ends the plant. Interfaces without a file descriptor
 
 import contextlib
 import select
-import time
 from collections.abc import Mapping, Sequence
 
 import can
@@ -25,6 +24,7 @@ import can
 from bridge.can_bus.drive_port import DrivePort, FrameCounters
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import open_bus, to_frame, to_message
+from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.frame import Frame
 from bridge.waiting import readable
 from configs.brief import Settings
@@ -94,7 +94,8 @@ class ExternalBuses:
         InfrastructureError: one of them can't be opened.
     """
 
-    def __init__(self, settings: Mapping[str, Settings]) -> None:
+    def __init__(self, settings: Mapping[str, Settings], *, clock: Clock = SYSTEM_CLOCK) -> None:
+        self._clock = clock
         self._all = {name: _Attachment(name, bus) for name, bus in settings.items()}
         self._by_fd: dict[int, _Attachment] = {}
         self._epoll = select.epoll()
@@ -118,7 +119,7 @@ class ExternalBuses:
                 if bus is not None:
                     bus.send(to_message(can_id, data))
                     if echoes is not None:
-                        echoes.sent(Frame(can_id, data), time.monotonic())
+                        echoes.sent(Frame(can_id, data), self._clock.monotonic_s())
             except _FAILURES as error:
                 self._note_failure(attachment, error)
                 bus = None
@@ -165,7 +166,7 @@ class ExternalBuses:
 
     def troubles(self) -> dict[str, str]:
         """Buses that failed at times: how often, how long, what it said, what was lost."""
-        now_s = time.monotonic()
+        now_s = self._clock.monotonic_s()
         found = {}
         for name, attachment in self._all.items():
             counters, since_s = attachment.counters, attachment.failing_since_s
@@ -238,7 +239,9 @@ class ExternalBuses:
                 counters.garbage += 1
                 continue
             frame = to_frame(message)
-            if attachment.echoes is not None and attachment.echoes.is_echo(frame, time.monotonic()):
+            if attachment.echoes is not None and attachment.echoes.is_echo(
+                frame, self._clock.monotonic_s()
+            ):
                 continue
             counters.from_clients += 1
             if attachment.failing_since_s is not None:
@@ -251,20 +254,20 @@ class ExternalBuses:
     def _note_failure(self, attachment: _Attachment, error: Exception) -> None:
         attachment.reason = str(error)
         if attachment.failing_since_s is None:
-            attachment.failing_since_s = time.monotonic()
+            attachment.failing_since_s = self._clock.monotonic_s()
             attachment.retry_s = attachment.failing_since_s + REOPEN_S
             attachment.counters.outages += 1
             self._failing += 1
 
     def _note_recovery(self, attachment: _Attachment) -> None:
         if attachment.failing_since_s is not None:
-            attachment.out_s += time.monotonic() - attachment.failing_since_s
+            attachment.out_s += self._clock.monotonic_s() - attachment.failing_since_s
             attachment.failing_since_s = None
             attachment.deaf = 0
             self._failing -= 1
 
     def _reopen(self) -> None:
-        now_s = time.monotonic()
+        now_s = self._clock.monotonic_s()
         for attachment in self._all.values():
             if attachment.failing_since_s is None or now_s < attachment.retry_s:
                 continue

@@ -24,7 +24,6 @@ emulation of the wire reads with `submitted` the frames that clients want to sen
 """
 
 import socket
-import time
 from collections.abc import Mapping, Sequence
 
 from bridge.can_bus.connection import Bus, BusCounters, Connection
@@ -42,6 +41,7 @@ from bridge.can_bus.packet import (
     split,
 )
 from bridge.can_bus.server import ClientServer
+from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.frame import ERR, Frame
 from bridge.waiting import readable
 
@@ -67,7 +67,9 @@ class Hub:
         *,
         queue: int = 0,
         controllers: Mapping[str, Mapping[str, str]] = _NOBODY,
+        clock: Clock = SYSTEM_CLOCK,
     ) -> None:
+        self._clock = clock
         self._buses = {
             name: Bus(name, sock, queue, controllers.get(name, {}))
             for name, sock in listeners.items()
@@ -204,9 +206,9 @@ class Hub:
 
     def await_controllers(self, timeout_s: float) -> tuple[str, ...]:
         """Wait until all robots' controllers have joined; return the robots whose have not."""
-        deadline = time.monotonic() + timeout_s
+        deadline = self._clock.monotonic_s() + timeout_s
         while missing := self._missing():
-            left_s = deadline - time.monotonic()
+            left_s = deadline - self._clock.monotonic_s()
             if left_s <= 0:
                 return missing
             self._handle(left_s)

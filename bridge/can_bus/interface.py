@@ -27,7 +27,6 @@ What a program doesn't read is kept for it within bounds; what is lost beyond th
 import errno
 import logging
 import socket
-import time
 from collections import deque
 from typing import Any
 
@@ -54,6 +53,7 @@ from bridge.can_bus.packet import (
 )
 from bridge.can_bus.pythoncan import to_frame, to_message
 from bridge.can_bus.transport import JoinError, Transport, connect
+from bridge.clock import SYSTEM_CLOCK
 from bridge.frame import Frame
 
 FLUSH_S = 10.0
@@ -163,9 +163,9 @@ class FleetloopBus(can.BusABC):
             if deadline is None:
                 wait_s = timeout
                 if timeout is not None:
-                    deadline = time.monotonic() + timeout
+                    deadline = SYSTEM_CLOCK.monotonic_s() + timeout
             else:
-                wait_s = max(0.0, deadline - time.monotonic())
+                wait_s = max(0.0, deadline - SYSTEM_CLOCK.monotonic_s())
             # A question without a frame says that a tick has passed.
             if not self._receive(wait_s) or (self._owes and not inbox):
                 return None
@@ -308,9 +308,9 @@ class FleetloopBus(can.BusABC):
 
     def _await_room(self, timeout: float | None) -> None:
         """Take a place in the transmit queue, waiting at most `timeout`; None: not at all."""
-        deadline = time.monotonic() + (timeout or 0.0)
+        deadline = SYSTEM_CLOCK.monotonic_s() + (timeout or 0.0)
         while (self._said - self._gone) & 0xFFFF_FFFF >= self._queue:
-            left_s = max(deadline - time.monotonic(), 0.0)
+            left_s = max(deadline - SYSTEM_CLOCK.monotonic_s(), 0.0)
             # That a frame has left is told by what is there to read, also for who only sends. A
             # synchronous client holds the bus's time: waiting would be for ever.
             if self._synchronous or not self._receive(left_s):
@@ -332,10 +332,10 @@ class FleetloopBus(can.BusABC):
             return
 
     def _send_late(self, data: bytes, timeout: float | None) -> None:
-        deadline = time.monotonic() + (PATIENCE_S if timeout is None else timeout)
-        while (left_s := deadline - time.monotonic()) > 0.0 and self._transport.await_writable(
-            left_s
-        ):
+        deadline = SYSTEM_CLOCK.monotonic_s() + (PATIENCE_S if timeout is None else timeout)
+        while (
+            left_s := deadline - SYSTEM_CLOCK.monotonic_s()
+        ) > 0.0 and self._transport.await_writable(left_s):
             try:
                 self._send_now(data)
             except BlockingIOError:

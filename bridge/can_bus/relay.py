@@ -21,7 +21,6 @@ import queue
 import select
 import socket
 import threading
-import time
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -38,6 +37,7 @@ from bridge.can_bus.packet import (
     REFUSED,
     encode_text,
 )
+from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.network import keys
 from bridge.network.link import Publisher
 from bridge.network.zenoh_link import ZenohLink
@@ -149,7 +149,10 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
         folder: Path,
         buses: Sequence[str],
         granted: Mapping[str, Sequence[str]],
+        *,
+        clock: Clock = SYSTEM_CLOCK,
     ) -> None:
+        self._clock = clock
         self._link = link
         self._folder = folder
         self._buses = tuple(buses)
@@ -213,7 +216,9 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
     # --- on the relay's own ----------------------------------------------------------------------
 
     def _serve(self) -> None:
-        while self._over_at is None or (self._unheard and time.monotonic() < self._over_at):
+        while self._over_at is None or (
+            self._unheard and self._clock.monotonic_s() < self._over_at
+        ):
             for fd, event in self._epoll.poll(0.02 if self._over_at else None):
                 if fd == self._wake:
                     os.eventfd_read(self._wake)
@@ -233,7 +238,7 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
             except queue.Empty:
                 return
             if not place:
-                self._over_at = time.monotonic() + GOODBYE_S
+                self._over_at = self._clock.monotonic_s() + GOODBYE_S
                 self._end_all()
                 continue
             with self._only(place):

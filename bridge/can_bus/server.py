@@ -16,7 +16,6 @@ import errno
 import hmac
 import os
 import select
-import time
 from collections.abc import Callable, Sequence
 
 from bridge.can_bus.connection import Bus, Connection
@@ -35,6 +34,7 @@ from bridge.can_bus.packet import (
     decode,
     encode_text,
 )
+from bridge.clock import SYSTEM_CLOCK
 
 MAX_CLIENTS = 64
 MAX_UNIDENTIFIED = 64
@@ -132,7 +132,7 @@ class ClientServer:
         os.close(self._spare)
 
     def _let_catch_up(self, behind: Sequence[Connection]) -> None:
-        now_s = time.monotonic()
+        now_s = SYSTEM_CLOCK.monotonic_s()
         deadline = now_s + GOODBYE_S
         poller = select.poll()
         clients = {client.sock.fileno(): client for client in behind}
@@ -142,7 +142,7 @@ class ClientServer:
         while clients:
             # A socket is polled as writable when a good part of it is free: look more often.
             poller.poll(_LOOK_MS)
-            now_s = time.monotonic()
+            now_s = SYSTEM_CLOCK.monotonic_s()
             for fd, client in tuple(clients.items()):
                 before = len(client.backlog)
                 drained = client.drain()

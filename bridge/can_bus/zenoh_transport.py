@@ -17,7 +17,6 @@ import os
 import queue
 import secrets
 import threading
-import time
 from collections import deque
 
 import zenoh
@@ -28,6 +27,7 @@ from bridge.can_bus.packet import (
     REFUSED,
     encode_text,
 )
+from bridge.clock import SYSTEM_CLOCK
 from bridge.network import keys
 from bridge.network.client import open_client
 from configs.brief import NetworkLink
@@ -49,7 +49,7 @@ class ZenohTransport:
             OSError: no router there, the login was refused, or nobody relays that bus.
             ScenarioError: user or channel can't be names.
         """
-        deadline = time.monotonic() + timeout_s
+        deadline = SYSTEM_CLOCK.monotonic_s() + timeout_s
         place = keys.guest_line(network.user, secrets.token_hex(8), channel)
         self._packets: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._lock = threading.Lock()  # packets and descriptor change together
@@ -80,7 +80,7 @@ class ZenohTransport:
                 if self._news.wait_for(self._has_packets, again_s):
                     return
             again_s = min(2.0 * again_s, _LAST_HELLO_S)
-            if time.monotonic() > deadline:
+            if SYSTEM_CLOCK.monotonic_s() > deadline:
                 self._ended.set()  # nobody to wait for
                 self.close()
                 raise TimeoutError(

@@ -6,10 +6,10 @@ first on its link, where a declaration still under way could swallow it. Nothing
 process waits for the next hello between two rounds of its own.
 """
 
-import time
 from collections.abc import Callable, Iterable
 
 from bridge.awake import LOOK_S, AwakeClock
+from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.network.link import Arrival, Link, Publisher, waiting
 from bridge.process import Stop, launcher_stopped
 from configs.errors import InfrastructureError
@@ -22,7 +22,8 @@ class Hellos:
         every_s: from one round to the next, however often one is asked for.
     """
 
-    def __init__(self, every_s: float) -> None:
+    def __init__(self, every_s: float, *, clock: Clock = SYSTEM_CLOCK) -> None:
+        self._clock = clock
         self._hellos: list[tuple[Publisher, bytes]] = []
         self._every_s = every_s
         self._next_s = 0.0
@@ -34,13 +35,13 @@ class Hellos:
 
     def say(self) -> float:
         """Say all of them once, if it is time; return how long it is until the next round."""
-        now = time.monotonic()
+        now = self._clock.monotonic_s()
         if now >= self._next_s:
             # Never sooner: a hello that answers a hello would be a storm on a ring.
             self._next_s = now + self._every_s
             for publisher, payload in self._hellos:
                 publisher.put(payload)
-        return max(self._next_s - time.monotonic(), 0.0)
+        return max(self._next_s - self._clock.monotonic_s(), 0.0)
 
 
 def await_hellos(

@@ -4,10 +4,9 @@ A refused login is reported at once; a router that isn't there yet is waited for
 reason of a refusal to peers only, so a refused client asks again as a peer (`login`).
 """
 
-import time
-
 import zenoh
 
+from bridge.clock import SYSTEM_CLOCK
 from bridge.network.session import (
     ONE_THREAD,
     WAIT_BEFORE_CLOSE,
@@ -59,16 +58,16 @@ def open_polled(
 def _client(network: NetworkLink, timeout_s: float, stop: Stop | None) -> zenoh.Session:
     """Try until it opens; a refused login is told at once, who isn't there yet is waited for."""
     wake = [] if stop is None else [stop.wake_fd]
-    deadline = time.monotonic() + timeout_s
+    deadline = SYSTEM_CLOCK.monotonic_s() + timeout_s
     pause_s = _FIRST_RETRY_S
     while True:
-        left_s = min(max(deadline - time.monotonic(), _FIRST_RETRY_S), _ATTEMPT_S)
+        left_s = min(max(deadline - SYSTEM_CLOCK.monotonic_s(), _FIRST_RETRY_S), _ATTEMPT_S)
         with few_threads(ONE_THREAD):
             session = open_bounded(_login_config("client", network, left_s), left_s + 1.0)
         if not isinstance(session, str):
             return session
         reason = _reason(network)
-        if reason.final or time.monotonic() + pause_s > deadline:
+        if reason.final or SYSTEM_CLOCK.monotonic_s() + pause_s > deadline:
             within = "" if reason.final else f" within {timeout_s:g} s"
             raise InfrastructureError(
                 f"{network.user}: no session with the router at {network.endpoint}{within}:"

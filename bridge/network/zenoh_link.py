@@ -8,7 +8,6 @@ the process ends (`bridge.network.session.keep`). `client` opens links to a rout
 
 import os
 import threading
-import time
 from collections.abc import Callable
 from types import TracebackType
 from typing import Self
@@ -16,6 +15,7 @@ from typing import Self
 import zenoh
 from zenoh.handlers import Callback, RingChannel
 
+from bridge.clock import SYSTEM_CLOCK
 from bridge.network.link import ROOM_BYTES, Arrival, Dropped, Inbox, Publisher
 from bridge.network.session import keep
 
@@ -176,13 +176,13 @@ class PolledLink(ZenohLink):
     def _receive(self, timeout_s: float) -> Arrival | None:
         if (arrival := self._look()) is not None or timeout_s <= 0.0:
             return arrival
-        deadline = time.monotonic() + timeout_s
+        deadline = SYSTEM_CLOCK.monotonic_s() + timeout_s
         looks, pause_s = 0, _PAUSE_S
-        while (left_s := deadline - time.monotonic()) > 0.0:
+        while (left_s := deadline - SYSTEM_CLOCK.monotonic_s()) > 0.0:
             if looks < _YIELDS:
                 os.sched_yield()
             else:
-                time.sleep(min(pause_s, left_s))
+                SYSTEM_CLOCK.sleep(min(pause_s, left_s))
                 pause_s = min(1.5 * pause_s, _LONGEST_PAUSE_S)
             looks += 1
             if (arrival := self._look()) is not None:

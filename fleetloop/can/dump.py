@@ -10,7 +10,6 @@ a silence, when nobody reads any more, or by a signal (exit status 130).
 import contextlib
 import io
 import sys
-import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from datetime import datetime
 from typing import TextIO
 
 from bridge.can_bus import sockets
+from bridge.clock import SYSTEM_CLOCK
 from bridge.drives import protocols
 from bridge.frame import EFF, Frame
 from configs.errors import ExitStatus, ScenarioError
@@ -183,7 +183,7 @@ def _print_all(listener: Listener, wanted: dict[str, Filter], options: Options) 
     left = options.count if options.count is not None else sys.maxsize
     silent_at = _deadline(options.silence_s)
     while not listener.over:
-        wait_s = None if silent_at is None else silent_at - time.monotonic()
+        wait_s = None if silent_at is None else silent_at - SYSTEM_CLOCK.monotonic_s()
         if wait_s is not None and wait_s <= 0:
             return
         heard = [item for item in listener.listen(wait_s) if wanted[item.bus].passes(item[1][0])]
@@ -199,7 +199,7 @@ def _print_all(listener: Listener, wanted: dict[str, Filter], options: Options) 
 
 
 def _deadline(silence_s: float | None) -> float | None:
-    return None if silence_s is None else time.monotonic() + silence_s
+    return None if silence_s is None else SYSTEM_CLOCK.monotonic_s() + silence_s
 
 
 def _descriptor(stream: TextIO) -> int | None:

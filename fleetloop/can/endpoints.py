@@ -6,13 +6,13 @@ the first drive that is heard, with a remote frame, as any host may.
 """
 
 import json
-import time
 from pathlib import Path
 
 import can
 
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import to_frame, to_message
+from bridge.clock import SYSTEM_CLOCK
 from bridge.drives import protocol
 from bridge.drives.interface import EndpointFile, Versions
 from configs.errors import ExitStatus, InfrastructureError, ScenarioError
@@ -62,9 +62,9 @@ def ask(bus: FleetloopBus, name: str, within_s: float) -> Versions:
         InfrastructureError: none is heard or answers in time, or the bus ended.
     """
     query = _file().query()
-    deadline = time.monotonic() + within_s
+    deadline = SYSTEM_CLOCK.monotonic_s() + within_s
     try:
-        while query.versions is None and (left_s := deadline - time.monotonic()) > 0.0:
+        while query.versions is None and (left_s := deadline - SYSTEM_CLOCK.monotonic_s()) > 0.0:
             message = bus.recv(left_s)
             request = query.hear(to_frame(message)) if message is not None else None
             if request is not None:

@@ -14,13 +14,13 @@ with 3, or tries for `retry_s` to open it again; what our bus says meanwhile is 
 
 import contextlib
 import threading
-import time
 from dataclasses import dataclass, field
 
 import can
 
 from bridge.can_bus.interface import BusClosedError
 from bridge.can_bus.pythoncan import to_frame, to_message
+from bridge.clock import SYSTEM_CLOCK
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.echo import EchoGuard
@@ -126,7 +126,7 @@ class Gateway:
 
     def _send_out(self, message: can.Message) -> None:
         frame = to_frame(message)
-        now_s = time.monotonic()
+        now_s = SYSTEM_CLOCK.monotonic_s()
         with self._lock:
             self.guard.sent(frame, now_s)
         # A message of its own: some interfaces take the channel from the message.
@@ -174,7 +174,7 @@ class Gateway:
         except ValueError:
             counters.no_frames += 1
             return
-        now_s = time.monotonic()
+        now_s = SYSTEM_CLOCK.monotonic_s()
         with self._lock:
             echo = self.guard.is_echo(frame, now_s)
         if echo:
@@ -199,7 +199,7 @@ def join(channel: str, far_bus: FarBus, *, retry_s: float = 0.0, with_rates: boo
         InfrastructureError: one of the buses can't be opened.
     """
     ways = Counters(), Counters()
-    start = time.monotonic()
+    start = SYSTEM_CLOCK.monotonic_s()
     with contextlib.ExitStack() as until_joined:
         far = until_joined.enter_context(far_bus.open())
         near = open_bus(channel)
@@ -210,7 +210,7 @@ def join(channel: str, far_bus: FarBus, *, retry_s: float = 0.0, with_rates: boo
             status = _pass_on(near, far, far_bus, ways, retry_s)
         except KeyboardInterrupt:
             status = ExitStatus.INTERRUPTED
-    wall_s = time.monotonic() - start
+    wall_s = SYSTEM_CLOCK.monotonic_s() - start
     names = (f"{channel} → {far_bus.name}", f"{far_bus.name} → {channel}")
     for name, counters in zip(names, ways, strict=True):
         rates = f"; {counters.passed / wall_s:.0f}/s, at most {counters.most_per_s} in a second"
@@ -255,8 +255,8 @@ def drain(bus: can.BusABC) -> int:
 def _reopen(
     far_bus: FarBus, near: can.BusABC, outward: Counters, retry_s: float
 ) -> can.BusABC | None:
-    deadline = time.monotonic() + retry_s
-    while time.monotonic() < deadline:
+    deadline = SYSTEM_CLOCK.monotonic_s() + retry_s
+    while SYSTEM_CLOCK.monotonic_s() < deadline:
         threading.Event().wait(RETRY_EVERY_S)
         outward.lost += drain(near)
         try:

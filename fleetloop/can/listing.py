@@ -6,12 +6,12 @@ a bus has is the kernel's word: connections to the bus's socket (`/proc/net/unix
 
 import contextlib
 import json
-import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from bridge.can_bus import sockets
+from bridge.clock import SYSTEM_CLOCK
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.census import Census, Node
 from fleetloop.can.client import Listener, open_bus
@@ -73,11 +73,11 @@ def survey(seconds: float, bit_rate: int) -> list[BusReport]:
         census = {name: Census(bit_rate) for name in buses}
         with Listener(buses) as listener:
             listener.listen(0.0)  # what gathered while the others were opened
-            start = time.monotonic()
-            while not listener.over and (left := start + seconds - time.monotonic()) > 0:
+            start = SYSTEM_CLOCK.monotonic_s()
+            while not listener.over and (left := start + seconds - SYSTEM_CLOCK.monotonic_s()) > 0:
                 for name, frame, stamp_ns in listener.listen(left):
                     census[name].count(frame, stamp_ns)
-            wall_s = time.monotonic() - start
+            wall_s = SYSTEM_CLOCK.monotonic_s() - start
     return [
         _report(path, census.get(str(path)), clients, wall_s, problems.get(str(path), ""))
         for path in paths

@@ -4,12 +4,12 @@ A frame goes to all other clients and the drives of the bus, as from any node. R
 deadlines of the wall clock, so the mean rate holds.
 """
 
-import time
 from collections.abc import Callable, Sequence
 
 import can
 
 from bridge.can_bus.pythoncan import to_message
+from bridge.clock import SYSTEM_CLOCK
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can import text
 from fleetloop.can.client import open_bus
@@ -26,7 +26,7 @@ def send(
     *,
     count: int = 1,
     gap_s: float = 0.0,
-    wait: Callable[[float], object] = time.sleep,
+    wait: Callable[[float], object] = SYSTEM_CLOCK.sleep,
 ) -> int:
     """Send frames in order, `count` times, a gap between them; return the exit status.
 
@@ -37,11 +37,15 @@ def send(
     messages = [to_message(*text.parse(frame)) for frame in frames]
     with open_bus(channel) as bus:
         sent = 0
-        start = time.monotonic()
+        start = SYSTEM_CLOCK.monotonic_s()
         try:
             for _ in range(count):
                 for message in messages:
-                    if sent and gap_s and (left := start + sent * gap_s - time.monotonic()) > 0:
+                    if (
+                        sent
+                        and gap_s
+                        and (left := start + sent * gap_s - SYSTEM_CLOCK.monotonic_s()) > 0
+                    ):
                         wait(left)
                     bus.send(message, FULL_S)
                     sent += 1

@@ -9,10 +9,10 @@ import os
 import select
 import signal
 import threading
-import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from bridge.clock import SYSTEM_CLOCK
 from bridge.process import Status, pack_brief
 from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
 from fleetloop.launch.fork_server import ForkServer
@@ -174,10 +174,10 @@ def cause(children: Iterable[Child]) -> Failure | None:
 def await_end(children: Iterable[Child], within_s: float) -> list[Child]:
     """Wait until all have ended, at most `within_s`; return those that have not."""
     children = list(children)
-    deadline = time.monotonic() + within_s
+    deadline = SYSTEM_CLOCK.monotonic_s() + within_s
     for child in children:
         if not child.ended():
-            child.await_end(max(deadline - time.monotonic(), 0.0))
+            child.await_end(max(deadline - SYSTEM_CLOCK.monotonic_s(), 0.0))
     return [child for child in children if not child.ended()]
 
 

@@ -4,7 +4,6 @@ What the processes do with sockets and sessions happens here by calls, in the sa
 the same bytes, so a run over processes must leave the same record, bit for bit.
 """
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple, Protocol
@@ -12,6 +11,7 @@ from typing import NamedTuple, Protocol
 from agents.agent import Agent
 from agents.bus_clock import BusClock
 from bridge.can_bus.packet import Key, Submitted, Transmitted
+from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.frame import Frame
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix, Progress
 from bridge.process import Stop, settled_memory
@@ -123,7 +123,10 @@ class InProcessRun:
         writer: Keeper,
         on_progress: Callable[[Progress], None],
         on_notice: Callable[[str, str], None] = lambda *_: None,
+        *,
+        clock: Clock = SYSTEM_CLOCK,
     ) -> None:
+        self._clock = clock
         self._schedule = plant.schedule
         self._robots = [emulated_robot(brief) for brief in plant.robots]
         self._truths = [
@@ -204,19 +207,19 @@ class InProcessRun:
 
     def _run(self, stop: Stop) -> None:
         schedule = self._schedule
-        start_ns = time.monotonic_ns()
+        start_ns = self._clock.monotonic_ns()
         for tick in range(-schedule.countdown_ticks, schedule.ticks + 1):
             if stop.requested:
                 break
             if tick == 0:
-                start_ns = time.monotonic_ns()
+                start_ns = self._clock.monotonic_ns()
             self._tick(tick)
             self.ticks = max(tick, 0)
             if tick % PROGRESS_EVERY_TICKS == 0:
-                wall_ns = time.monotonic_ns() - start_ns
+                wall_ns = self._clock.monotonic_ns() - start_ns
                 self._herald.look()
                 self._on_progress(Progress(tick, tick * schedule.period_ns, wall_ns))
-        self.wall_s = (time.monotonic_ns() - start_ns) * 1e-9
+        self.wall_s = (self._clock.monotonic_ns() - start_ns) * 1e-9
 
     def _tick(self, tick: int) -> None:
         """One tick of all buses, one after the other: within a tick they don't meet."""

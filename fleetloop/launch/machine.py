@@ -7,12 +7,12 @@ others owed in that time isn't held against them.
 
 import os
 import signal
-import time
 from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any, Self
 
 from bridge.awake import AwakeClock
+from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.process import processor_wait_ns
 
 WATCH_EVERY_S = 0.05
@@ -25,12 +25,20 @@ class MachineWatch:
     Args:
         scenario_s: how far the run is [s].
         on_stall: told of each stall, in words.
+        clock: the machine's.
     """
 
-    def __init__(self, scenario_s: Callable[[], float], on_stall: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        scenario_s: Callable[[], float],
+        on_stall: Callable[[str], None],
+        *,
+        clock: Clock = SYSTEM_CLOCK,
+    ) -> None:
+        self._clock = clock
         self._scenario_s = scenario_s
         self._tell = on_stall
-        self.clock = AwakeClock(look_s=WATCH_EVERY_S, on_stall=self._note)
+        self.clock = AwakeClock(look_s=WATCH_EVERY_S, on_stall=self._note, clock=clock)
         self._count = self._stops = self._continued = 0
         self._total_s = self._longest_s = self._longest_at_s = 0.0
         self._last = ""
@@ -39,7 +47,7 @@ class MachineWatch:
 
     def lately(self, within_s: float) -> str:
         """The last stall in words, "" if it ended longer ago than that."""
-        return self._last if time.monotonic() - self._last_s <= within_s else ""
+        return self._last if self._clock.monotonic_s() - self._last_s <= within_s else ""
 
     def report(self) -> dict[str, Any]:
         """For the summary."""
@@ -66,7 +74,7 @@ class MachineWatch:
         if self._continued:
             self._stops, self._continued = self._stops + 1, 0
             self._last = f"stopped for {lasted_s:.2f} s at t = {at_s:.2f} s (Ctrl-Z), and continued"
-        self._last_s = time.monotonic()
+        self._last_s = self._clock.monotonic_s()
         self._tell(self._last)
 
     def _on_continue(self, _number: int, _frame: FrameType | None) -> None:

@@ -14,7 +14,6 @@ import json
 import os
 import sys
 import threading
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from typing import Any
 from bridge.can_bus import sockets
 from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
+from bridge.clock import SYSTEM_CLOCK
 from bridge.network.messages import Progress
 from bridge.process import Stop, go_realtime, keep_to_itself, name_process, settled_memory
 from bridge.telemetry import PLANT_ROW, RowBuffer
@@ -188,7 +188,7 @@ def _run(
         threading.Thread(target=_serve_stdin, args=(robots, loop, stop), daemon=True).start()
     _say_ready(brief, buses, as_json=options.as_json)
     with settled_memory():
-        loop.run(time.monotonic_ns() + GO_AHEAD_NS, stop)
+        loop.run(SYSTEM_CLOCK.monotonic_ns() + GO_AHEAD_NS, stop)
     watch.look()
     for bus, trouble in end.troubles().items():
         note(f"BUS {bus}: {trouble}")

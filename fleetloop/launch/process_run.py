@@ -13,13 +13,12 @@ failures, `fleetloop.launch.ending` ends the processes.
 """
 
 import contextlib
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from bridge.can_bus import sockets
 from bridge.can_bus.relay import Relay
-from bridge.clock import wall_of
+from bridge.clock import SYSTEM_CLOCK, Clock, wall_of
 from bridge.network import keys
 from bridge.network.barrier import Hellos
 from bridge.network.messages import Go, LeaderSpeed, Progress
@@ -65,7 +64,9 @@ class ProcessRun:
         on_progress: Callable[[Progress], None],
         on_notice: Callable[[str, str], None] = lambda *_: None,
         deployment: Deployment | None = None,
+        clock: Clock = SYSTEM_CLOCK,
     ) -> None:
+        self._clock = clock
         self._scenario = scenario
         self._deployment = deployment or Deployment()
         self._orders = Orders(scenario, self._deployment, record, speed, profile)
@@ -75,6 +76,7 @@ class ProcessRun:
         self._machine = MachineWatch(
             lambda: self.outcome.ticks * self._schedule.period_s,
             lambda text: self._plane.note(LAUNCHER.name, text),
+            clock=clock,
         )
         self._now = self._machine.clock.now
         self._remote = RemoteRoles(self._deployment.elsewhere(scenario))
@@ -97,7 +99,7 @@ class ProcessRun:
         """
         refuse_shadowed_roles(("agents", "plant", "fleetloop"))
         open_files.ensure(len(self._processes))
-        began = time.monotonic()
+        began = self._clock.monotonic_s()
         try:
             with self._machine, self._started() as link:
                 self._machine.clock.resume()
@@ -107,13 +109,13 @@ class ProcessRun:
                     self._ending.tell_remote_roles(link, str(error))
                     raise
                 if failure is None and not stop.requested:
-                    self.outcome.startup_s = time.monotonic() - began
+                    self.outcome.startup_s = self._clock.monotonic_s() - began
                     began_ns = cpu_ns()
                     failure = self._watch(link, stop)
                     self.outcome.cpu_ns = cpu_ns() - began_ns
-                ending = time.monotonic()
+                ending = self._clock.monotonic_s()
                 self._ending.end(link, stop, failure)
-                self.outcome.teardown_s = time.monotonic() - ending
+                self.outcome.teardown_s = self._clock.monotonic_s() - ending
             self._complete_account(link)
         finally:
             end(self._plane.children, grace_s=0.0)
@@ -152,7 +154,7 @@ class ProcessRun:
         """Publish the leader's speed until all tokens are there, then go until the plant ticks."""
         run, ticks = self._run, self._schedule
         go = link.publisher(keys.go(run))
-        hellos = Hellos(ticks.hello_every_s)
+        hellos = Hellos(ticks.hello_every_s, clock=self._clock)
         speed = LeaderSpeed(leader_brief(self._scenario).speed_steps)
         hellos.add(link.publisher(keys.leader_speed(run)), speed.encode())
         deadline = self._now() + ticks.start_deadline_s
@@ -176,7 +178,7 @@ class ProcessRun:
                 )
             if ready and not gone:
                 gone = True
-                epoch_ns = wall_of(time.monotonic_ns() + countdown_ns)
+                epoch_ns = wall_of(self._clock.monotonic_ns() + countdown_ns, self._clock)
                 hellos.add(go, Go(epoch_ns, ticks.ticks).encode())
             self._plane.receive(link, min(hellos.say(), WATCH_EVERY_S))
             self._report_refusals(link)
@@ -213,7 +215,7 @@ class ProcessRun:
 
     def _report_refusals(self, link: RouterLink) -> None:
         """Look for floods now and then; announce what the router refused or cut off."""
-        now_s = time.monotonic()
+        now_s = self._clock.monotonic_s()
         if now_s >= self._next_look_s:
             self._next_look_s = now_s + LOOK_EVERY_S
             link.look_for_floods(max(self.outcome.ticks, 0), now_s)

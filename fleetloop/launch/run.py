@@ -1,11 +1,11 @@
 """`fleetloop run`: one scenario from file to results."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from bridge.clock import SYSTEM_CLOCK
 from bridge.network.messages import Progress
 from bridge.process import Stop, keep_to_itself
 from configs.brief import NetworkLink
@@ -111,7 +111,7 @@ def run_scenario(source: str, options: Options) -> int:
             else:
                 run = ProcessRun(
                     scenario,
-                    run=f"{folder.name}-{time.monotonic_ns() % 1_000_000:06d}",
+                    run=f"{folder.name}-{SYSTEM_CLOCK.monotonic_ns() % 1_000_000:06d}",
                     record=folder / run_folder.RECORD,
                     speed=options.speed,
                     profile=options.profile,
@@ -163,7 +163,7 @@ def _in_process(
     stop: Stop,
 ) -> RunStats:
     network = NetworkLink("in-process", "", "", "")
-    began = time.monotonic()
+    began = SYSTEM_CLOCK.monotonic_s()
     record = folder / run_folder.RECORD
     period_ns = schedule(scenario).period_ns
     run: InProcessRun | None = None
@@ -188,7 +188,7 @@ def _in_process(
                 on_progress,
                 on_notice,
             )
-            startup_s = time.monotonic() - began
+            startup_s = SYSTEM_CLOCK.monotonic_s() - began
             run.run(stop)
     except InfrastructureError as error:
         if run is None:

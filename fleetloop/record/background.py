@@ -5,13 +5,13 @@ background is raised by the next `add`, or by `close`.
 """
 
 import threading
-import time
 from collections.abc import Callable
 from functools import partial
 from queue import Queue
 from types import TracebackType
 from typing import Self
 
+from bridge.clock import SYSTEM_CLOCK
 from fleetloop.record.run_record import RunRecord
 from fleetloop.record.writer import Source
 
@@ -63,7 +63,7 @@ class BackgroundWriter:
                 continue
             try:
                 write()
-                if (now_s := time.monotonic()) >= look_s:
+                if (now_s := SYSTEM_CLOCK.monotonic_s()) >= look_s:
                     look_s = now_s + LOOK_EVERY_S
                     self._record.check_place()
             except Exception as error:  # raised in the thread that fills

@@ -4,12 +4,12 @@ It stands apart from the lockstep path, so that neither writing nor a slow disk 
 outlives the launcher for as long as it takes to complete the file. Started by `fleetloop run`.
 """
 
-import time
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
 from bridge.can_bus import sockets
+from bridge.clock import SYSTEM_CLOCK
 from bridge.frame import MAX_DATA
 from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
@@ -173,14 +173,14 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         link.declare_live(keys.live(name, RECORDER.name))
         next_report = 0.0
         began_ns = cpu_ns()
-        quiet_since = time.monotonic()
+        quiet_since = SYSTEM_CLOCK.monotonic_s()
         while recorder.unfinished:
             arrival = link.receive(PROGRESS_EVERY_S)
-            now = time.monotonic()
+            now = SYSTEM_CLOCK.monotonic_s()
             if arrival is not None and recorder.take(arrival):
                 quiet_since = now
             elif arrival is not None:
-                time.sleep(0.0)  # of a flood: let the network's thread have its turn
+                SYSTEM_CLOCK.sleep(0.0)  # of a flood: let the network's thread have its turn
             elif stop.requested and now - quiet_since > QUIET_S:
                 break
             if now >= next_report:

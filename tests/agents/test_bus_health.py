@@ -7,9 +7,9 @@ from types import SimpleNamespace
 
 import can
 import pytest
+from support.clocks import ManualClock
 from support.robot_bench import ZERO, Bench, set_points
 
-import agents.realtime
 from agents.bus_health import TOLERATED_NS, BusHealth
 from agents.guard import Phase
 from agents.realtime import RealtimeLoop
@@ -60,26 +60,10 @@ def test_a_full_queue_is_a_fault_when_it_lasts_and_never_the_end() -> None:
     assert "No buffer space" in health.fault(60 * S)
 
 
-class Clock(SimpleNamespace):
-    """A monotonic clock that moves when somebody waits."""
-
-    now_ns = 10 * S
-
-    def monotonic_ns(self) -> int:
-        self.now_ns += 1000
-        return self.now_ns
-
-    def monotonic(self) -> float:
-        return self.now_ns * 1e-9
-
-    def sleep(self, seconds: float) -> None:
-        self.now_ns += round(seconds * 1e9)
-
-
 class Wire(can.BusABC):
     """A hardware interface with the two drives of a bench on it, that can be taken down."""
 
-    def __init__(self, bench: Bench, clock: Clock, power_up_ns: int) -> None:
+    def __init__(self, bench: Bench, clock: ManualClock, power_up_ns: int) -> None:
         super().__init__(channel="can0")
         self.bench, self.clock, self.power_up_ns = bench, clock, power_up_ns
         self.error: Exception | None = None
@@ -129,7 +113,7 @@ class Wire(can.BusABC):
 class PoseLink:
     """A network on which the localisation system speaks every 10 ms, and nobody else."""
 
-    def __init__(self, bench: Bench, clock: Clock, epoch_ns: int) -> None:
+    def __init__(self, bench: Bench, clock: ManualClock, epoch_ns: int) -> None:
         self.bench, self.clock, self.epoch_ns = bench, clock, epoch_ns
 
     def receive(self, _timeout_s: float) -> None:
@@ -142,11 +126,8 @@ class PoseLink:
 class Rig:
     """A controller's loop in real time on a wire, by a clock of its own."""
 
-    def __init__(
-        self, monkeypatch, *overrides: str, duration_s: float = 3.0, ours=False, **changes
-    ) -> None:
-        self.clock = Clock()
-        monkeypatch.setattr(agents.realtime, "time", self.clock)
+    def __init__(self, *overrides: str, duration_s: float = 3.0, ours=False, **changes) -> None:
+        self.clock = ManualClock(10 * S, reading_ns=1000)
         self.bench = Bench("r1", *overrides, f"until_s={duration_s}")
         if not ours:
             host = self.bench.agent.brief.host
@@ -159,7 +140,13 @@ class Rig:
         self.link = PoseLink(self.bench, self.clock, epoch_ns)
         nowhere = SimpleNamespace(put=lambda _: None)
         self.loop = RealtimeLoop(
-            self.bench.agent, self.wire, self.link, nowhere, Hellos(0.02), nowhere
+            self.bench.agent,
+            self.wire,
+            self.link,
+            nowhere,
+            Hellos(0.02, clock=self.clock),
+            nowhere,
+            clock=self.clock,
         )
         self.epoch_ns = epoch_ns
 
@@ -174,8 +161,8 @@ class Rig:
         return [str(event) for event in self.bench.agent.guard.events]
 
 
-def test_an_interface_taken_down_and_up_is_survived_and_driven_on_after_arming(monkeypatch) -> None:
-    rig = Rig(monkeypatch, *REARM)
+def test_an_interface_taken_down_and_up_is_survived_and_driven_on_after_arming() -> None:
+    rig = Rig(*REARM)
     down_ns, up_ns = 13 * S // 10, 19 * S // 10
     rig.wire.plan = {down_ns: DOWN, up_ns: None}
     rig.run()
@@ -192,24 +179,24 @@ def test_an_interface_taken_down_and_up_is_survived_and_driven_on_after_arming(m
     assert set_points(after[:2]) == [ZERO, ZERO]
 
 
-def test_a_bus_that_stays_down_ends_the_controller_with_the_reason(monkeypatch) -> None:
-    rig = Rig(monkeypatch, *REARM, duration_s=6.0)
+def test_a_bus_that_stays_down_ends_the_controller_with_the_reason() -> None:
+    rig = Rig(*REARM, duration_s=6.0)
     rig.wire.plan = {S: DOWN}
     with pytest.raises(InfrastructureError, match=r"r1: gave up its bus after 2\.0 s.*is down"):
         rig.run()
     assert rig.bench.phase is Phase.STOPPED
 
 
-def test_our_own_bus_that_fails_ends_the_controller_at_once(monkeypatch) -> None:
-    rig = Rig(monkeypatch, *REARM, ours=True)
+def test_our_own_bus_that_fails_ends_the_controller_at_once() -> None:
+    rig = Rig(*REARM, ours=True)
     rig.wire.plan = {S: DOWN}
     with pytest.raises(PeerLostError):
         rig.run()
     assert rig.wire.bus_ns < S + S // 50
 
 
-def test_a_full_transmit_queue_stops_the_robot_and_it_comes_back(monkeypatch) -> None:
-    rig = Rig(monkeypatch, *REARM)
+def test_a_full_transmit_queue_stops_the_robot_and_it_comes_back() -> None:
+    rig = Rig(*REARM)
     rig.wire.plan = {S: FULL, 15 * S // 10: None}
     rig.run()
     phases = [event.phase for event in rig.bench.agent.guard.events]
@@ -217,39 +204,39 @@ def test_a_full_transmit_queue_stops_the_robot_and_it_comes_back(monkeypatch) ->
     assert rig.loop.counters.unsent > 10
 
 
-def test_an_error_for_one_moment_stops_nothing(monkeypatch) -> None:
-    rig = Rig(monkeypatch, *REARM)
+def test_an_error_for_one_moment_stops_nothing() -> None:
+    rig = Rig(*REARM)
     rig.wire.plan = {S: FULL, S + 5_000_000: None}
     rig.run()
     assert rig.events == []
     assert 1 <= rig.loop.counters.unsent <= 4
 
 
-def test_an_interface_that_comes_up_during_the_countdown_is_armed(monkeypatch) -> None:
-    rig = Rig(monkeypatch, "clock.mode='realtime'", "clock.countdown_s=1.0", duration_s=0.5)
+def test_an_interface_that_comes_up_during_the_countdown_is_armed() -> None:
+    rig = Rig("clock.mode='realtime'", "clock.countdown_s=1.0", duration_s=0.5)
     rig.wire.plan = {0: DOWN, S // 2: None}
     rig.run()
     assert rig.events == []
 
 
-def test_drives_that_never_speak_end_it_at_tick_0(monkeypatch) -> None:
-    rig = Rig(monkeypatch, "clock.mode='realtime'", "clock.countdown_s=0.5")
+def test_drives_that_never_speak_end_it_at_tick_0() -> None:
+    rig = Rig("clock.mode='realtime'", "clock.countdown_s=0.5")
     rig.bench.axes.clear()
     with pytest.raises(InfrastructureError, match="no heartbeat heard yet"):
         rig.run()
     assert rig.wire.bus_ns < S
 
 
-def test_error_frames_are_counted_and_are_no_drives(monkeypatch) -> None:
-    rig = Rig(monkeypatch, *REARM, duration_s=0.2)
+def test_error_frames_are_counted_and_are_no_drives() -> None:
+    rig = Rig(*REARM, duration_s=0.2)
     rig.wire.others = {S // 10: [Frame(ERR | 0x004, bytes(8)), Frame(ERR | 0x002, bytes(8))]}
     rig.run()
     assert rig.loop.counters.error_frames == 2
     assert rig.events == []
 
 
-def test_what_the_bus_gathered_while_the_controller_waited_is_no_second_drive(monkeypatch) -> None:
-    rig = Rig(monkeypatch, *REARM, duration_s=1.5)
+def test_what_the_bus_gathered_while_the_controller_waited_is_no_second_drive() -> None:
+    rig = Rig(*REARM, duration_s=1.5)
     both = [Frame(0x001, bytes(8)), Frame(0x021, bytes(8))]
     for _ in range(10):
         rig.wire.inbox += both  # heartbeats, encoder frames
@@ -266,19 +253,19 @@ def test_what_the_bus_gathered_while_the_controller_waited_is_no_second_drive(mo
     ],
 )
 def test_own_commands_that_an_interface_hands_back_are_not_somebody_elses(monkeypatch, bus) -> None:
-    rig = Rig(monkeypatch, *REARM, duration_s=0.3, bus=bus)
+    rig = Rig(*REARM, duration_s=0.3, bus=bus)
     rig.wire.echoes = True
     rig.run()
     assert rig.bench.agent.guard.notices() == []
-    rig = Rig(monkeypatch, *REARM, duration_s=0.3, bus=bus)
+    rig = Rig(*REARM, duration_s=0.3, bus=bus)
     rig.wire.echoes = True
     rig.wire.others = {S // 10: [Frame(0x00E, bytes(4))] * 3}
     rig.run()
     assert rig.bench.agent.guard.notices() == ["right drive (node 0): 3 commands of another host"]
 
 
-def test_drives_that_say_more_often_where_they_are_are_no_second_drive(monkeypatch) -> None:
-    rig = Rig(monkeypatch, *REARM, "drive.encoder_period_s=0.001", duration_s=1.5)
+def test_drives_that_say_more_often_where_they_are_are_no_second_drive() -> None:
+    rig = Rig(*REARM, "drive.encoder_period_s=0.001", duration_s=1.5)
     rig.run()
     assert rig.events == []
     assert rig.bench.agent.brief.drives.encoder_period_ns == 1_000_000

@@ -1,6 +1,7 @@
 """A clock that stands still while its process does."""
 
 import pytest
+from support.clocks import ManualClock
 
 from bridge.awake import AFTERMATH_S, LATE_S, LOOK_S, STALL_S, AwakeClock, Lateness
 
@@ -9,18 +10,18 @@ class Machine:
     """A clock that is set by hand."""
 
     def __init__(self) -> None:
-        self.now_s = 1000.0
+        self.time = ManualClock(1000 * 10**9)
         self.stalls: list[float] = []
         self.held = False
         self.clock = AwakeClock(
             held=lambda: self.held,
             on_stall=self.stalls.append,
-            monotonic=lambda: self.now_s,
+            clock=self.time,
         )
         self.began_s = self.clock.now()
 
     def passes(self, seconds: float) -> None:
-        self.now_s += seconds
+        self.time.passes(seconds)
 
     def awake_s(self) -> float:
         return round(self.clock.now() - self.began_s, 6)
