@@ -144,9 +144,9 @@ def run(
     ] = False,
 ) -> None:
     """Run a scenario, record everything, check its expectations, print and save the results."""
-    from fleetloop.launch.run import Options, run_scenario
+    from fleetloop.launch.run import RunOptions, run_scenario
 
-    options = Options(
+    options = RunOptions(
         in_process=in_process,
         speed=speed,
         overrides=_changes(overrides, clock=clock, seed=seed, duration=duration),
@@ -216,10 +216,10 @@ def plant(
     ] = False,
 ) -> None:
     """Emulate drives and physics alone, in real time, for your own CAN host code."""
-    from fleetloop.launch.plant import Options, run_plant
+    from fleetloop.launch.plant import PlantOptions, run_plant
 
     _refuse_lockstep(clock)
-    options = Options(
+    options = PlantOptions(
         robots=_listed("--robots", robots),
         duration_s=duration,
         deployment=deployment,

@@ -78,7 +78,7 @@ class Bus:
         name: of the bus.
         listener: its socket.
         queue: frames that may wait at a client; 0: frames take no time.
-        controllers: secrets by robot, of those who may be synchronous.
+        controllers: secrets of the clients that may be synchronous, by robot.
     """
 
     __slots__ = (

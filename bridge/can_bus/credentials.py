@@ -5,7 +5,7 @@
     user           a guest of the run's deployment; with TLS its certificate's common name
     password       with tcp: the one in the deployment's file of users,
     users          or a file of the program's own with the line USER:PASSWORD
-    ca             with tls: who signed the router's certificate and the guest's, PEM
+    ca             with tls: the authority of the router's certificate and the guest's, PEM
     certificate    with tls: the guest's, PEM
     private_key    with tls: the guest's, PEM
 

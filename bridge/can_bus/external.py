@@ -157,7 +157,7 @@ class ExternalBuses:
         return taken
 
     def clients(self) -> int:
-        """How many buses are open: nobody knows who listens on them."""
+        """Number of open buses: their listeners are unknown."""
         return sum(attachment.bus is not None for attachment in self._all.values())
 
     def counters(self, name: str) -> ExternalBusCounters:
@@ -184,7 +184,7 @@ class ExternalBuses:
         """A descriptor that is readable when there is something to handle."""
         return self._epoll.fileno()
 
-    def close(self, reason: str) -> None:  # noqa: ARG002 - nobody there understands it
+    def close(self, reason: str) -> None:  # noqa: ARG002 - an external bus has no goodbye
         """Leave all buses. Idempotent."""
         for attachment in self._all.values():
             self._shut(attachment)

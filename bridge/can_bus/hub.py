@@ -57,7 +57,7 @@ class Hub:
         wake_fd: a descriptor that ends a wait.
         queue: frames that may wait at a client, on buses with bit timing; 0: they have none.
         controllers: of each bus the secrets of its robots' controllers, by robot. Bus time waits
-            for these and for nobody else.
+            for these only.
     """
 
     def __init__(
@@ -269,7 +269,7 @@ class Hub:
             self._settle(client)
 
     def _release(self, bus: Bus) -> None:
-        """What was said is taken: read those again who said so much."""
+        """The received frames were taken: resume reading from paused clients."""
         held, bus.held = bus.held, []
         for client in held:
             client.held = False

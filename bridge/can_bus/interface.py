@@ -3,12 +3,12 @@
     can.Bus(interface="fleetloop", channel="r1")
     can.Bus(interface="fleetloop", channel="r1", endpoint="tls/host:7447", user="me", ...)
 
-The second form is for another machine: the same bus with the same promises, over Zenoh, for whom
-the run's deployment lets in.
+The second form is for another machine: the same bus with the same guarantees, over Zenoh, for the
+guests of the run's deployment.
 
-Works between processes, without kernel module or root; lossless and in order for who reads; no echo
-of own frames unless asked; classic CAN only. `Message.timestamp` is bus time: seconds since the bus
-was powered up. Linux.
+Works between processes, without kernel module or root; lossless and in order for a client that
+reads; no echo of own frames unless asked; classic CAN only. `Message.timestamp` is bus time:
+seconds since power-up of the bus. Linux only.
 
 `batched=True` suits a program that reads until nothing is left and then acts: frames of one instant
 arrive in one packet, and frames that it sends leave with its next `recv`. `synchronous` is for the
@@ -57,9 +57,9 @@ from bridge.clock import SYSTEM_CLOCK
 from bridge.frame import Frame
 
 FLUSH_S = 10.0
-"""How long a hub that doesn't read may keep waiting who gathers what it sends."""
+"""How long a batched client waits for a hub that doesn't read."""
 PATIENCE_S = 1.0
-"""How long a hub that doesn't read may keep a sender waiting who gives no time itself."""
+"""How long a sender without a timeout waits for a hub that doesn't read."""
 _LOG = logging.getLogger("can.fleetloop")  # as python-can's own interfaces name theirs
 _IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ignore_config"})
 
@@ -75,7 +75,7 @@ class FleetloopBus(can.BusABC):
         channel: bus name ("r1"), run and bus ("<run>/r1"), or the path of the bus's socket.
         can_filters: see `can.BusABC.set_filters`.
         synchronous: the robot whose controller this is, and for which bus time then waits.
-        secret: what the run told that controller and nobody else.
+        secret: of that controller, from the run.
         batched: frames of one instant travel together; a descriptor is readable once for all.
         receive_own_messages: frames sent come back, with `is_rx` False.
         connect_timeout: how long to wait for the bus to answer [s], above 0.
@@ -311,7 +311,7 @@ class FleetloopBus(can.BusABC):
         deadline = SYSTEM_CLOCK.monotonic_s() + (timeout or 0.0)
         while (self._said - self._gone) & 0xFFFF_FFFF >= self._queue:
             left_s = max(deadline - SYSTEM_CLOCK.monotonic_s(), 0.0)
-            # That a frame has left is told by what is there to read, also for who only sends. A
+            # Credit returns with packets from the hub, also for a client that only sends. A
             # synchronous client holds the bus's time: waiting would be for ever.
             if self._synchronous or not self._receive(left_s):
                 raise can.CanOperationError(

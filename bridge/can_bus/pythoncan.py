@@ -18,11 +18,11 @@ _new = object.__new__
 _new_frame = tuple.__new__
 
 
-def open_bus(who: str, settings: Settings) -> can.BusABC:
+def open_bus(user: str, settings: Settings) -> can.BusABC:
     """`can.Bus(**settings)`, verbatim: python-can checks what its interface takes.
 
     Raises:
-        InfrastructureError: naming who wanted it, the interface, the channel and the reason.
+        InfrastructureError: naming the user of the bus, the interface, the channel and the reason.
     """
     options: dict[str, Any] = dict(settings)
     try:
@@ -31,7 +31,7 @@ def open_bus(who: str, settings: Settings) -> can.BusABC:
     # a serial.SerialException on slcan, a wrong option a TypeError.
     except (can.CanError, OSError, TypeError, ValueError, ImportError) as error:
         named = f"{options.get('interface')} channel {options.get('channel')!r}"
-        raise InfrastructureError(f"{who}: no CAN bus: {named}: {error}") from error
+        raise InfrastructureError(f"{user}: no CAN bus: {named}: {error}") from error
 
 
 def to_message(

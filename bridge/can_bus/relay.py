@@ -54,7 +54,7 @@ _EVENTS = 256
 MAX_LINES = 32
 """Lines that one user may have open at a time: each costs two descriptors."""
 MAX_HELD_BYTES = 16 * 1024 * 1024
-"""What may wait here of one user; who keeps to its lines' windows never gets there."""
+"""Bound of the unhandled packets of one user; connections within their credit never reach it."""
 _EVENT_BYTES = 256
 _BYE = bytes((BYE,))
 _HANG_UP = select.EPOLLHUP | select.EPOLLERR
@@ -171,7 +171,7 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
         self._epoll.register(self._wake, READ)
         self._thread = threading.Thread(target=self._serve, daemon=True)
         for user in granted:
-            # One by one: guests must be told that somebody hears them, and may see no wider key.
+            # One by one: guests must learn of the subscriber, and may see no wider key.
             link.each_keyed(keys.guest_lines("up", user), self._hear)
             link.each_live(keys.guest_lines("alive", user), self._note)
             link.declare_live(keys.guest_relay(user))
@@ -231,7 +231,7 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
         self._epoll.close()
 
     def _take_events(self) -> None:
-        """Take some; who says much does not keep the hub's words from the others."""
+        """Take some events, so that a flood does not delay packets of the hub."""
         for _ in range(_EVENTS):
             try:
                 place, packet, alive = self._events.get_nowait()
@@ -269,7 +269,7 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
         guest = self._guests.get(place)
         kind = packet[0] if packet else 0
         if guest is None:
-            # Who isn't alive has left: what it said before it left may come later than its end.
+            # A guest without a token has left; its last packets may arrive after that.
             if kind == HELLO and place in self._alive and self._over_at is None:
                 self._join(place, packet)
             elif kind == BYE:
@@ -313,7 +313,7 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
         elif ALL_BUSES not in granted and bus not in granted:
             _refuse(down, f"{user!r} may open {', '.join(granted) or 'no bus'}, not {bus!r}")
         elif sum(_user_of(other) == user for other in self._guests) >= MAX_LINES:
-            _refuse(down, f"{user!r} has {MAX_LINES} lines open already")
+            _refuse(down, f"{user!r} has {MAX_LINES} connections open already")
         else:
             sock = None
             try:

@@ -4,10 +4,10 @@
     <base>/<run>/.fleetloop-lock              else /tmp/fleetloop-<uid>
 
 A channel is named by its bus ("r1"), by run and bus ("20261123-101500-paper/r1") or by the path of
-its socket. Sockets that nobody listens on any more are no buses.
+its socket. Sockets without a listener are ignored.
 
-The base must be this user's: whoever could write there could pretend to be a bus. Who started a run
-holds its lock, so what a killed one left is known and goes when the next one starts.
+The base must belong to this user: another writer could pretend to be a bus. The launcher of a run
+holds its lock, so the leftovers of a killed run are known, and removed when the next one starts.
 """
 
 import contextlib
@@ -111,7 +111,7 @@ def _danger(base: Path) -> str:
 
 
 def _sweep(base: Path) -> None:
-    """Remove the folders of runs whose lock nobody holds and whose buses nobody serves."""
+    """Remove the folders of runs whose lock is free and whose buses have no listener."""
     for path in base.glob(f"*/{LOCK}"):
         with contextlib.suppress(OSError), path.open() as lock:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -162,7 +162,7 @@ def remove_run_folder(folder: Path) -> None:
 
 
 def live_buses() -> list[Path]:
-    """The sockets of all buses that somebody listens on, in order of their names."""
+    """The sockets of all buses with a listener, in order of their names."""
     base = base_folder()
     with contextlib.suppress(OSError):
         if not _danger(base):

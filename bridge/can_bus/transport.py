@@ -38,7 +38,7 @@ class Transport(Protocol):
         """A descriptor that is readable when a packet is there; −1 once it is closed."""
 
     def close(self) -> None:
-        """Leave; what was sent arrives, and who waits in another thread wakes. Idempotent."""
+        """Leave; sent packets arrive, and waits in other threads end. Idempotent."""
 
 
 class JoinError(OSError):
@@ -83,7 +83,7 @@ class UnixTransport:
         try:
             poller.register(self._socket, select.POLLOUT)
         except ValueError:
-            return True  # it is closed: whoever sends now hears that
+            return True  # it is closed: the next send raises
         return bool(poller.poll(timeout_s * 1e3))
 
     def receive(self, wait_s: float | None) -> bytes | None:
@@ -109,7 +109,7 @@ class UnixTransport:
         return self._socket.fileno()
 
     def close(self) -> None:
-        """Close the socket; whoever waits at it in another thread wakes."""
+        """Close the socket; waits in other threads end."""
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()

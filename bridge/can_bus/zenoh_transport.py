@@ -46,7 +46,7 @@ class ZenohTransport:
         """Connect, and say hello until the relay answers.
 
         Raises:
-            OSError: no router there, the login was refused, or nobody relays that bus.
+            OSError: no router there, the login was refused, or no relay serves that bus.
             ScenarioError: user or channel can't be names.
         """
         deadline = SYSTEM_CLOCK.monotonic_s() + timeout_s
@@ -81,10 +81,10 @@ class ZenohTransport:
                     return
             again_s = min(2.0 * again_s, _LAST_HELLO_S)
             if SYSTEM_CLOCK.monotonic_s() > deadline:
-                self._ended.set()  # nobody to wait for
+                self._ended.set()  # no BYE will come
                 self.close()
                 raise TimeoutError(
-                    f"nobody at {network.endpoint} answers to {network.user!r} within"
+                    f"no relay at {network.endpoint} answers to {network.user!r} within"
                     f" {timeout_s:g} s: the run there has no such guest, or this isn't its"
                     " certificate"
                 )
@@ -98,7 +98,7 @@ class ZenohTransport:
             with contextlib.suppress(OSError):
                 self._say(answer)
         if kind in _ENDS:
-            # Not before it was answered: who waits for it then closes the session.
+            # After the answer: the waiting thread then closes the session.
             self._ended.set()
 
     def _keep_or_answer(self, packet: bytes, kind: int) -> bytes | None:
@@ -194,7 +194,7 @@ class ZenohTransport:
         """Say goodbye, wait until the hub has what was sent before it, and leave."""
         with self._news:
             readable, self._readable = self._readable, -1
-            self._packets.put(b"")  # whoever waits in another thread
+            self._packets.put(b"")  # ends waits in other threads
             self._news.notify_all()
         if readable < 0:
             return

@@ -9,11 +9,11 @@ of buses on other machines: they put their lines up and hear their lines down; w
 open is the relay's decision.
 
 Plant and controllers may watch the launcher's token and hear its last word: on other machines that
-is how they learn that the run is over, and why. Who comes from another machine has a password that
+is how they learn that the run is over, and why. A process on another machine has a password that
 was agreed on before, or a certificate whose common name is the identity; then the password is no
 secret and proves nothing. The plant hears the poses of the robots that it doesn't emulate.
 
-Whoever may say something may still not say it at any length or rate: the router drops what is
+A right has limits of length and rate: the router drops what is
 longer than anything honest on that key (`bridge.network.messages.MOST_BYTES`). In real time, where
 the newest wins, it also drops what comes faster than `MOST_PER_PERIOD` times as often as the
 schedule says. In lockstep every message counts and two may arrive together, so there is no rate for
@@ -23,7 +23,7 @@ count, and of a controller that says far more than the ticks allow nothing more 
 
 The launcher's own session is inside the router and isn't subject to the rules. Flows are named from
 the router's side: a process that publishes is an ingress put, and it must be told (egress
-declare_subscriber) that somebody listens; a process that hears is an ingress declare_subscriber and
+declare_subscriber) of a subscriber; a process that hears is an ingress declare_subscriber and
 an egress put.
 """
 

@@ -38,7 +38,7 @@ def open_client(network: NetworkLink, timeout_s: float, stop: Stop | None = None
     """Connect to the router as `network.user`.
 
     Raises:
-        InfrastructureError: nobody answers there, or the login was refused.
+        InfrastructureError: no answer from there, or the login was refused.
         StoppedError: `stop` was requested before.
     """
     return ZenohLink(_client(network, timeout_s, stop))
@@ -51,12 +51,12 @@ def open_polled(
     *,
     depth: int = POLLED_DEPTH,
 ) -> PolledLink:
-    """The same for who looks at given times and keeps the last `depth` messages on each key."""
+    """Connect with a polled link that keeps the newest `depth` messages on each key."""
     return PolledLink(_client(network, timeout_s, stop), depth)
 
 
 def _client(network: NetworkLink, timeout_s: float, stop: Stop | None) -> zenoh.Session:
-    """Try until it opens; a refused login is told at once, who isn't there yet is waited for."""
+    """Try until it opens; a refused login ends the attempts, an absent router does not."""
     wake = [] if stop is None else [stop.wake_fd]
     deadline = SYSTEM_CLOCK.monotonic_s() + timeout_s
     pause_s = _FIRST_RETRY_S

@@ -42,7 +42,7 @@ _NO_DATA = (
     (0x06, 0, 0, 0xFFFF_FFFF),  # take it
     (0x06, 0, 0, 0),  # drop it
 )
-"""A classic BPF program that takes acknowledgements, which who answers waits for, and no data."""
+"""A classic BPF program that passes acknowledgements, awaited by the sender, and drops data."""
 
 
 class Received(NamedTuple):
@@ -82,7 +82,7 @@ class FloodGuard:
         """Take nothing more from peers that say too much; return which.
 
         Args:
-            users: where controllers are, as "address:port"; nobody else is looked at.
+            users: where controllers are, as "address:port"; other peers are ignored.
             ticks: how far the run is.
             now_s: seconds on any clock.
         """

@@ -13,7 +13,7 @@
     fleetloop/<run>/@report/<process>        a process's last word, to the launcher
     fleetloop/@guest/<user>/<line>/<bus>/..  a client of a bus on another machine: up, down, alive;
                                              <run>/<bus> if it names the run as well
-    fleetloop/@guest/<user>/@relay           liveliness token: somebody takes this user's lines
+    fleetloop/@guest/<user>/@relay           liveliness token: the relay serves this user
 
 A process is `launcher`, `plant`, `recorder` or `agent/<robot>`. Chunks that begin with @ are
 verbatim: no wildcard of data subscriptions matches them.

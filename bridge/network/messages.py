@@ -4,7 +4,7 @@ A message is a msgpack array that begins with the version of its layout. Decodin
 long, the wrong types, a wrong length, an unknown version or a number that isn't finite give None,
 never an exception; the caller counts it. Text is for people: what doesn't print, such as a
 terminal's escapes, is replaced. Times are scenario time in ns. A message may be well formed and
-still be impossible: that is for those to say who know the run.
+still be impossible: readers that know the run check that.
 
     message        layout                                        key
     PathState      [1, tick, t_ns, s, v_hat]                     robot/<name>/path
@@ -180,7 +180,7 @@ class Notice(NamedTuple):
 
 
 class Go(NamedTuple):
-    """Everybody is ready; in real time, tick 0 is at this reading of the wall clock."""
+    """All processes are ready; in real time, tick 0 is at this reading of the wall clock."""
 
     epoch_ns: int
     ticks: int  # of the run

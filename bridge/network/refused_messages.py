@@ -9,7 +9,7 @@ from collections import Counter
 from typing import NamedTuple
 
 FLOOD = 1000
-"""More refused messages of one sender than anybody says by mistake."""
+"""More refused messages of one sender than a mistake explains."""
 MOST_KINDS = 32
 """Of senders and kinds that are told apart; what comes later counts as others."""
 
@@ -48,7 +48,7 @@ class Refusals:
         self._counts[key] = self._counts.get(key, 0) + count
 
     def floods(self) -> list[str]:
-        """Senders of whom so much was refused that whoever heard them had no time for others."""
+        """Senders of so many refused messages that their reader had no time for others."""
         counts: Counter[str] = Counter()
         for key, count in self._counts.items():
             counts[key.sender] += count

@@ -54,7 +54,7 @@ class Report:
     notices: Texts = ()
     """Events of its run, in words."""
     flooders: Texts = ()
-    """Senders of whom it refused so much that it had no time for others."""
+    """Senders of so many refused messages that it had no time for others."""
     missing_privileges: Texts = ()
     """What the kernel refused of what real time needs."""
     cpu_ns: int = 0

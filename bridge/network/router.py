@@ -48,7 +48,7 @@ class RouterLink(ZenohLink):
         super().__init__(session)
         self.endpoint = endpoint
         self.denials = denials
-        """Whom the router refused, from its log."""
+        """Refusals by the router, from its log."""
         self._guard = FloodGuard()
         denials.turn_away = deafen
 
@@ -71,9 +71,9 @@ def open_router(
 ) -> Iterator[RouterLink]:
     """Be the router at `endpoint`, or at a free loopback port if None, and enforce `access`.
 
-    Those on other machines come in at `outside`. `folder` must be private: the user dictionary is
-    written there while the router opens. Who doesn't read is cut off after `unread_s`; who doesn't
-    hear the router for `lease_s` takes it for gone.
+    Clients on other machines connect at `outside`. `folder` must be private: it holds the user
+    dictionary while the router opens. A client that doesn't read is cut off after `unread_s`; a
+    client that hears nothing of the router for `lease_s` takes it for gone.
 
     Raises:
         InfrastructureError: an endpoint is taken or can't be listened on.
@@ -157,10 +157,10 @@ def hasty(endpoint: str) -> str:
 
 
 def accept_many(config: zenoh.Config, identities: int) -> None:
-    """Let those who open connections and say nothing keep nobody out.
+    """Bound connections without a login, so that they keep no other client out.
 
-    Each costs a descriptor until `_HANDSHAKE_S`; those beyond the limit are hung up on, and whoever
-    means it tries again at once. They get a quarter of the descriptors at most.
+    Each costs a descriptor until `_HANDSHAKE_S`; further connections are closed, and honest clients
+    retry at once. They get a quarter of the descriptors at most.
     """
     descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     pending = min(max(descriptors // 4, 2 * identities, _LEAST_PENDING), MOST_PENDING)
@@ -170,7 +170,7 @@ def accept_many(config: zenoh.Config, identities: int) -> None:
 
 
 def await_first_words(endpoints: Sequence[str]) -> None:
-    """Let the kernel keep connections until their first bytes: who listens here, speaks second.
+    """Let the kernel hold back connections until their first bytes: the client speaks first.
 
     The sockets are Zenoh's, which has no setting for it; where they can't be had or the kernel
     doesn't do it they stay as they are.

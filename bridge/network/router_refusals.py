@@ -77,7 +77,7 @@ class Denials:
         self.flooders: set[str] = set()
         """Users one of whose sessions was cut off because it said too much."""
         self.turn_away: Callable[[str], None] = lambda _: None
-        """Told, on the log's thread, where somebody is who was cut off for saying too much."""
+        """Called, on the log's thread, with the address of a returning flooder."""
         self._caching: dict[str, str] = {}  # the key whose permissions a thread looks up in advance
 
     def take(self, line: str) -> None:
@@ -120,7 +120,7 @@ class Denials:
         return {peer: user for user, peer in known if user.startswith(prefix)}
 
     def note_flood(self, user: str, peer: str) -> None:
-        """Somebody was cut off because he said too much."""
+        """A user was cut off because it sent too much."""
         self.flooders.add(user)
         self._count(
             f"cut off {_shown(user)} from {_host(peer)}: it said far more than the schedule lets"
@@ -128,7 +128,7 @@ class Denials:
         )
 
     def logins_of(self, user: str) -> list[str]:
-        """What was refused to who wanted to be `user`."""
+        """Refused logins as `user`."""
         return [note for note in self.notes() if f"the login of {_shown(user)} " in note]
 
     def _take_syn(self, kind: str, peer: str, text: str) -> None:
@@ -154,7 +154,7 @@ class Denials:
             self.cut_off.add(user)
             self._count(
                 f"cut off {_shown(user)} from {_host(peer)}: it did not read what it asked for, and"
-                " everybody else would have waited for it"
+                " all other clients would have waited for it"
             )
 
     def _take_rights(self, thread: str, text: str) -> None:
@@ -219,7 +219,7 @@ def _plain(text: str) -> str:
 
 
 def _shown(name: str) -> str:
-    return f"'{_plain(name)}'" if name else "somebody"
+    return f"'{_plain(name)}'" if name else "an unknown user"
 
 
 def _host(peer: str) -> str:

@@ -77,7 +77,7 @@ def open_bounded(config: zenoh.Config, timeout_s: float) -> zenoh.Session | str:
     """A session, or why there is none; "" if that took too long.
 
     Opened in a thread of its own: a peer that accepts and never answers would hang it. A session
-    that opens after all when nobody waits for it any more is closed.
+    that opens later than that is closed.
     """
     result: list[zenoh.Session | str] = []
     lock = threading.Lock()

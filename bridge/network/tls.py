@@ -69,7 +69,7 @@ def _common_names(files: TlsFiles, key: str, *, ours_listens: bool) -> list[str]
 def _shown(
     shows: ssl.SSLContext, checks: ssl.SSLContext, *, ours_listens: bool
 ) -> dict[str, Any] | None:
-    """What who checks sees of a certificate."""
+    """The certificate as the checking end sees it."""
     up, down = ssl.MemoryBIO(), ssl.MemoryBIO()
     ours = shows.wrap_bio(down, up, server_side=ours_listens)
     other = checks.wrap_bio(up, down, server_side=not ours_listens)

@@ -113,7 +113,7 @@ class ZenohLink:
         self.each_live(key_expr, lambda key, alive: put(Arrival(tag, key, b"1" if alive else b"0")))
 
     def dropped(self) -> list[Dropped]:
-        """The subscriptions that had no room for all, because nobody took what came before."""
+        """The subscriptions that lost messages because their buffer was full."""
         return self._inbox.dropped()
 
     stuck = False
@@ -150,7 +150,7 @@ class ZenohLink:
 
 
 class PolledLink(ZenohLink):
-    """A link for who looks at given times: what comes wakes nobody and runs no Python.
+    """A link that is polled at given times: an arriving message wakes no thread and runs no Python.
 
     `receive` looks at all subscribers in turn. Waiting is looking again: a few times giving way to
     others, then with pauses that grow.

@@ -18,7 +18,7 @@ import zenoh
 
 _PIPE_BYTES = 1 << 20
 _PAUSE_S = 0.02
-"""Between looks: many lines at a time cost less, and nobody waits for the reader."""
+"""Between reads: many lines at a time cost less, and no writer waits for the reader."""
 _ZENOHS = re.compile(rb"\d{4}-\d\d-\d\dT[\d:.]+Z +[A-Z]+ ")
 _begun = threading.Lock()
 
@@ -63,8 +63,8 @@ def listening(take: Callable[[str], None], is_ours: Callable[[str], bool]) -> It
         yield
     finally:
         _flush()
-        with contextlib.suppress(OSError):  # somebody has closed it
-            if os.fstat(1).st_ino == ours:  # nobody has led it elsewhere
+        with contextlib.suppress(OSError):  # closed meanwhile
+            if os.fstat(1).st_ino == ours:  # not redirected meanwhile
                 os.dup2(before, 1)
         over.set()
         reader.join(1.0)

@@ -9,7 +9,7 @@ In order, the first that applies:
                                                   see a bit error: an active one destroys the frame
                                                   for all, passive ones drop out, the rest go on
     a fault that corrupts it                      form error at the delimiter of the CRC
-    nobody else to hear it                        acknowledge error after the acknowledge slot
+    no other node to acknowledge it               acknowledge error after the acknowledge slot
     else                                          it passes
 
 An injected error flag is six dominant bits in a row, at once whatever is on the wire. In a frame

@@ -119,7 +119,7 @@ class Endless(Queue):
 
 
 class ReceiveFifo:
-    """What a controller has received and nobody has read: bxCAN's three, `ReceiveFifoLocked` off.
+    """Received frames that firmware has not read: bxCAN's three, `ReceiveFifoLocked` off.
 
     When full, the newest frame overwrites the one before it and `overruns` counts the loss.
     """

@@ -61,7 +61,7 @@ class Segment:
         self.recovery = Recovery(bit_rate)
         self._moves: list[tuple[Node, Segment]] = []
         self._troubled = False  # a node has receive errors left to work off
-        self._plain = False  # nothing but arbitration decides who sends, and that it passes
+        self._plain = False  # arbitration alone decides, and every frame succeeds
         self._listeners: tuple[Node, ...] = ()
         self._others: dict[Node, tuple[Node, ...]] = {}
 
@@ -148,7 +148,7 @@ class Segment:
     # --- transmissions ---------------------------------------------------------------------------
 
     def next_ns(self) -> int | None:
-        """When the next event comes, if nobody does anything."""
+        """Time of the next event, without further input; None: no event is due."""
         plan = self._plan
         if plan is None and self._first_ns is not None:
             plan = self._plan = self._arbitrate(self._first_ns)

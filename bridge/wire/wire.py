@@ -2,7 +2,7 @@
 
     submit     a node wants to send a frame at an instant; False: its queue is full, or it is off
     advance    what happened through an instant: frames delivered, error frames, changes of state
-    next_ns    when the next of these will happen, if nobody submits anything before
+    next_ns    time of the next event, unless a node submits a frame before
 
 * When the wire is free the lowest arbitration field wins; all others wait, at most one frame when
   theirs is lower still. A data frame beats a remote one of its identifier, 11 bits beat 29 with the
@@ -19,7 +19,7 @@
   same calls give the same events, however often `next_ns` and `advance` are asked in between.
 
 Bounds: everything that happens takes bits of the wire, so `advance` returns after as many steps as
-frames fit into the time, even with a node that babbles or that nobody acknowledges. Not modelled:
+frames fit into the time, even with a babbling or unacknowledged node. Not modelled:
 propagation, clock tolerance, and that a node which drops out of a clash is back some bits later.
 """
 
@@ -96,7 +96,7 @@ class Wire:
             self._segment(node).recovery.start(node, self.now_ns)
 
     def disconnect(self, node: Node) -> None:
-        """Open the line to a node: it hears and reaches nobody. Its frame on the wire goes on."""
+        """Open the line to a node: it is isolated. Its frame on the wire goes on."""
         if node.attached and self._segment(node) is self._main:
             segment = Segment(self.bitrate_bit_s, self._faults)
             self._apart.append(segment)
@@ -151,7 +151,7 @@ class Wire:
         return events
 
     def next_ns(self) -> int | None:
-        """When the next event happens; None: never, if nobody submits anything."""
+        """Time of the next event, unless a node submits a frame; None: no event is due."""
         if self._events:
             return self._events[0][0]
         return self._next_ns()

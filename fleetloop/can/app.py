@@ -68,10 +68,10 @@ def dump(
     nanoseconds: Annotated[bool, typer.Option("-N", help="Time to the nanosecond.")] = False,
 ) -> None:
     """Print what goes over buses, as candump does."""
-    from fleetloop.can.dump import Options
+    from fleetloop.can.dump import DumpOptions
     from fleetloop.can.dump import dump as dump_buses
 
-    options = Options(
+    options = DumpOptions(
         stamps=stamps,
         nanoseconds=nanoseconds,
         log_format=log_format,

@@ -33,7 +33,7 @@ STAMPS = "adzA"
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class DumpOptions:
     """What to print of a frame, and when to end."""
 
     stamps: str = ""  # of STAMPS, or empty
@@ -91,7 +91,7 @@ class Printer:
 
     __slots__ = ("_indent", "_options", "_stamps", "_width")
 
-    def __init__(self, options: Options, names: Sequence[str]) -> None:
+    def __init__(self, options: DumpOptions, names: Sequence[str]) -> None:
         kind = options.stamps
         if options.log_format and kind != "z":
             kind = "a"
@@ -121,7 +121,7 @@ class Printer:
 
 
 @interruptible
-def dump(targets: Sequence[str], options: Options) -> int:
+def dump(targets: Sequence[str], options: DumpOptions) -> int:
     """Print the frames of buses, each named as `BUS[,filter]*`; return the exit status.
 
     Raises:
@@ -177,7 +177,7 @@ def _short(channel: str) -> str:
     return channel.rpartition("/")[2].removesuffix(sockets.SUFFIX)
 
 
-def _print_all(listener: Listener, wanted: dict[str, Filter], options: Options) -> None:
+def _print_all(listener: Listener, wanted: dict[str, Filter], options: DumpOptions) -> None:
     printer = Printer(options, list(wanted))
     write, flush = sys.stdout.write, sys.stdout.flush
     left = options.count if options.count is not None else sys.maxsize

@@ -36,7 +36,7 @@ FAILURES = 10
 
 
 @dataclass(slots=True)
-class Counters:
+class GatewayCounters:
     """What went one way, and what didn't."""
 
     passed: int = 0
@@ -79,8 +79,8 @@ class Gateway:
     near: can.BusABC
     far: can.BusABC
     guard: EchoGuard
-    outward: Counters = field(default_factory=Counters)
-    inward: Counters = field(default_factory=Counters)
+    outward: GatewayCounters = field(default_factory=GatewayCounters)
+    inward: GatewayCounters = field(default_factory=GatewayCounters)
     over: threading.Event = field(default_factory=threading.Event)
     near_gone: can.CanError | None = None
     far_gone: str = ""
@@ -198,7 +198,7 @@ def join(channel: str, far_bus: FarBus, *, retry_s: float = 0.0, with_rates: boo
     Raises:
         InfrastructureError: one of the buses can't be opened.
     """
-    ways = Counters(), Counters()
+    ways = GatewayCounters(), GatewayCounters()
     start = SYSTEM_CLOCK.monotonic_s()
     with contextlib.ExitStack() as until_joined:
         far = until_joined.enter_context(far_bus.open())
@@ -222,7 +222,7 @@ def _pass_on(
     near: can.BusABC,
     far: can.BusABC,
     far_bus: FarBus,
-    ways: tuple[Counters, Counters],
+    ways: tuple[GatewayCounters, GatewayCounters],
     retry_s: float,
 ) -> int:
     """Pass frames on, over as many openings of the far bus as it takes; the exit status."""
@@ -253,7 +253,7 @@ def drain(bus: can.BusABC) -> int:
 
 
 def _reopen(
-    far_bus: FarBus, near: can.BusABC, outward: Counters, retry_s: float
+    far_bus: FarBus, near: can.BusABC, outward: GatewayCounters, retry_s: float
 ) -> can.BusABC | None:
     deadline = SYSTEM_CLOCK.monotonic_s() + retry_s
     while SYSTEM_CLOCK.monotonic_s() < deadline:

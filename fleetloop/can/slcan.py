@@ -31,7 +31,7 @@ _AT_ONCE = 256
 
 
 @dataclass(slots=True)
-class Counters:
+class SlcanCounters:
     """What went through the adapter."""
 
     received: int = 0  # by the software
@@ -43,7 +43,7 @@ class Port:
     """The adapter between a bus and a pseudo-terminal."""
 
     def __init__(self, bus: FleetloopBus) -> None:
-        self.counters = Counters()
+        self.counters = SlcanCounters()
         self._bus = bus
         self._adapter = Adapter()
         self._kept = bytearray()

@@ -50,7 +50,7 @@ _ROW_NAMES = [signal.name for signal in PLANT_SIGNALS]
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class PlantOptions:
     """What the command line says."""
 
     robots: tuple[str, ...] = ()
@@ -85,7 +85,7 @@ class _Watch:
                 note(f"STOPPED {robot}: {why}; its drives are disarmed for good")
 
 
-def run_plant(source: str, options: Options) -> int:
+def run_plant(source: str, options: PlantOptions) -> int:
     """Emulate drives and bodies until told to stop; return the exit status.
 
     Raises:
@@ -141,7 +141,7 @@ def _join(scenario: Scenario, deployment: Deployment) -> int:
     return ExitStatus.INTERRUPTED if interrupted else ExitStatus.OK
 
 
-def _alone(brief: PlantBrief, options: Options) -> PlantBrief:
+def _alone(brief: PlantBrief, options: PlantOptions) -> PlantBrief:
     """Only these robots, without countdown, for as long as it takes."""
     emulated = tuple(robot.robot for robot in brief.robots)
     for robot in options.robots:
@@ -175,7 +175,7 @@ def _run(
     hub: Hub,
     end: DrivePort,
     buses: dict[str, Settings],
-    options: Options,
+    options: PlantOptions,
     stop: Stop,
 ) -> None:
     robots = [emulated_robot(robot) for robot in brief.robots]

@@ -44,7 +44,7 @@ EXIT_STATUS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class RunOptions:
     """What the command line says about a run."""
 
     in_process: bool = False
@@ -60,7 +60,7 @@ class Options:
     """Run what `fleetloop check` calls an error."""
 
 
-def run_scenario(source: str, options: Options) -> int:
+def run_scenario(source: str, options: RunOptions) -> int:
     """Run a scenario, save and print its results; return the exit status.
 
     Raises:
@@ -135,7 +135,7 @@ def run_scenario(source: str, options: Options) -> int:
     return _finish(scenario, folder, stats, options)
 
 
-def _look_ahead(source: str, scenario: Scenario, options: Options) -> None:
+def _look_ahead(source: str, scenario: Scenario, options: RunOptions) -> None:
     """Say what `fleetloop check` has against a scenario, but for its rehearsal: here is the run.
 
     Raises:
@@ -149,7 +149,7 @@ def _look_ahead(source: str, scenario: Scenario, options: Options) -> None:
         raise ScenarioError(f"{source}: would not work as it is; --force runs it all the same")
 
 
-def _deployment(scenario: Scenario, options: Options) -> Deployment:
+def _deployment(scenario: Scenario, options: RunOptions) -> Deployment:
     if options.deployment is None:
         return Deployment()
     return load_deployment(options.deployment, scenario)
@@ -209,7 +209,7 @@ def _in_process(
     )
 
 
-def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: Options) -> int:
+def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: RunOptions) -> int:
     record = folder / run_folder.RECORD
     if not record.exists():
         gone = stats.reason or f"{record} is not there: the run's folder was removed or moved"

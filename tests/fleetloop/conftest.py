@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.controller_rows import SIGNALS
 
-from fleetloop.launch.run import Options, run_scenario
+from fleetloop.launch.run import RunOptions, run_scenario
 from fleetloop.record.reader import Record
 from fleetloop.record.writer import RecordWriter
 
@@ -14,7 +14,7 @@ from fleetloop.record.writer import RecordWriter
 @pytest.fixture(scope="package")
 def finished_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("runs") / "done"
-    assert run_scenario("two_robots", Options(in_process=True, out=folder, as_json=True)) == 0
+    assert run_scenario("two_robots", RunOptions(in_process=True, out=folder, as_json=True)) == 0
     return folder
 
 

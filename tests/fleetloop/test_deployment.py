@@ -11,9 +11,8 @@ from configs.loading import load
 from fleetloop.check.command import check_scenario
 from fleetloop.launch import placement
 from fleetloop.launch.agent import run_agent
-from fleetloop.launch.plant import Options as PlantOptions
-from fleetloop.launch.plant import run_plant
-from fleetloop.launch.run import Options, run_scenario
+from fleetloop.launch.plant import PlantOptions, run_plant
+from fleetloop.launch.run import RunOptions, run_scenario
 
 HERE = 'roles = ["plant", "recorder", "agent/r1"]\n[network]\nendpoint = "tcp/127.0.0.1:7447"\n'
 
@@ -26,14 +25,14 @@ def where(tmp_path: Path) -> Path:
 
 
 def test_a_run_without_network_has_nothing_to_place(where, tmp_path) -> None:
-    options = Options(in_process=True, deployment=where, out=tmp_path / "run")
+    options = RunOptions(in_process=True, deployment=where, out=tmp_path / "run")
     with pytest.raises(ScenarioError, match="--in-process has no buses and no network to place"):
         run_scenario("two_robots", options)
     assert not (tmp_path / "run").exists()
 
 
 def test_credentials_are_missed_before_a_folder_is_made(where, tmp_path) -> None:
-    options = Options(deployment=where, out=tmp_path / "run")
+    options = RunOptions(deployment=where, out=tmp_path / "run")
     with pytest.raises(ScenarioError, match="agent-r2"):
         run_scenario("two_robots_100hz", options)
     assert not (tmp_path / "run").exists()

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.image import imread
 
 from configs.loading import load
-from fleetloop.launch.run import Options, run_scenario
+from fleetloop.launch.run import RunOptions, run_scenario
 from fleetloop.record.reader import Record
 from fleetloop.results.diff import compare, print_comparison
 from fleetloop.results.report import write_report
@@ -48,7 +48,7 @@ def test_the_scenario_in_the_folder_repeats_the_run(finished_run: Path, tmp_path
     again = tmp_path / "again"
     scenario = str(finished_run / "scenario.toml")
     assert load(scenario) == load("two_robots")
-    run_scenario(scenario, Options(in_process=True, out=again, figures=False, as_json=True))
+    run_scenario(scenario, RunOptions(in_process=True, out=again, figures=False, as_json=True))
     assert (again / "record.mcap").read_bytes() == (finished_run / "record.mcap").read_bytes()
 
 
@@ -74,7 +74,7 @@ def test_the_page_stands_alone_and_says_the_verdict(finished_run: Path) -> None:
 def test_page_summary_and_terminal_say_the_same_of_what_went_wrong(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    options = Options(
+    options = RunOptions(
         in_process=True, out=tmp_path / "a", overrides=("robot.r1.v_m_s=1e6",), force=True
     )
     assert run_scenario("two_robots", options) == 1
@@ -109,7 +109,7 @@ def test_the_first_difference_is_named_by_tick_robot_and_field(
 ) -> None:
     other = tmp_path / "other"
     changed = ("robot.r2.pose.x_m=1.951",)
-    options = Options(in_process=True, overrides=changed, out=other, figures=False, as_json=True)
+    options = RunOptions(in_process=True, overrides=changed, out=other, figures=False, as_json=True)
     run_scenario("two_robots", options)
     capsys.readouterr()
     assert print_comparison(finished_run, other, as_json=False) == 1

@@ -6,12 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fleetloop.launch.run import Options, run_scenario
+from fleetloop.launch.run import RunOptions, run_scenario
 from fleetloop.record.reader import Record
 
 
 def run(name: str, folder: Path, *overrides: str) -> dict:
-    options = Options(in_process=True, out=folder, figures=False, as_json=True, overrides=overrides)
+    options = RunOptions(
+        in_process=True, out=folder, figures=False, as_json=True, overrides=overrides
+    )
     assert run_scenario(name, options) == 0
     summary: dict = json.loads((folder / "summary.json").read_text())
     return summary

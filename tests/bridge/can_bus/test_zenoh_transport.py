@@ -239,7 +239,7 @@ def test_a_line_that_fails_by_an_error_of_ours_is_the_only_one_that_ends(
 
 def test_a_user_has_so_many_lines_and_no_more(running: Running, monkeypatch) -> None:
     monkeypatch.setattr(relay, "MAX_LINES", 2)
-    refused = pytest.raises(can.CanInitializationError, match="has 2 lines open already")
+    refused = pytest.raises(can.CanInitializationError, match="has 2 connections open already")
     with running.open(), running.open(), running.open(user="boss"), refused:
         running.open()
     with running.open():

@@ -1,4 +1,4 @@
-"""Why somebody has no session with a router: said by who was refused, at once and by name."""
+"""Causes of a failed session with a router: reported at once and by name."""
 
 import socket
 import time

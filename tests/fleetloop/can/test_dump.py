@@ -10,35 +10,35 @@ from bridge.frame import EFF, ERR, RTR, Frame
 from configs.errors import InfrastructureError, ScenarioError
 from fleetloop.can import dump as dumping
 from fleetloop.can.client import Heard
-from fleetloop.can.dump import Options, Printer, Stamps, dump
+from fleetloop.can.dump import DumpOptions, Printer, Stamps, dump
 
 ENCODER = Frame(0x009, bytes.fromhex("0000803F00000000"))
 
 
-def lines(options: Options, *heard: Heard) -> list[str]:
+def lines(options: DumpOptions, *heard: Heard) -> list[str]:
     printer = Printer(options, ["r1"])
     return [printer.lines(item) for item in heard]
 
 
 def test_console_lines_are_candump_s() -> None:
-    assert lines(Options(), Heard("r1", ENCODER, 5)) == [
+    assert lines(DumpOptions(), Heard("r1", ENCODER, 5)) == [
         "  r1  009   [8]  00 00 80 3F 00 00 00 00\n"
     ]
-    assert lines(Options(stamps="a"), Heard("r1", ENCODER, 1_436_509_052_249_713_999)) == [
+    assert lines(DumpOptions(stamps="a"), Heard("r1", ENCODER, 1_436_509_052_249_713_999)) == [
         " (1436509052.249713)  r1  009   [8]  00 00 80 3F 00 00 00 00\n"
     ]
 
 
 def test_log_lines_are_candump_s() -> None:
     frame = Frame(0x044, bytes.fromhex("2A366C2BBA"))
-    assert lines(Options(log_format=True), Heard("r1", frame, 1_436_509_052_249_713_000)) == [
+    assert lines(DumpOptions(log_format=True), Heard("r1", frame, 1_436_509_052_249_713_000)) == [
         "(1436509052.249713) r1 044#2A366C2BBA\n"
     ]
 
 
 def test_short_identifiers_move_right_once_a_long_one_was_seen() -> None:
     short, long = Heard("r1", Frame(1, b""), 0), Heard("r1", Frame(EFF | 1, b""), 0)
-    assert lines(Options(), short, long, short) == [
+    assert lines(DumpOptions(), short, long, short) == [
         "  r1  001   [0] \n",
         "  r1  00000001   [0] \n",
         "  r1       001   [0] \n",
@@ -46,12 +46,14 @@ def test_short_identifiers_move_right_once_a_long_one_was_seen() -> None:
 
 
 def test_words_and_error_classes_are_appended() -> None:
-    (decoded,) = lines(Options(decode=True), Heard("r1", ENCODER, 0))
+    (decoded,) = lines(DumpOptions(decode=True), Heard("r1", ENCODER, 0))
     assert decoded == (
         "  r1  009   [8]  00 00 80 3F 00 00 00 00   node  0  Get_Encoder_Estimates"
         "  Pos_Estimate=1 rev  Vel_Estimate=0 rev/s\n"
     )
-    (explained,) = lines(Options(explain_errors=True), Heard("r1", Frame(ERR | 0x40, bytes(8)), 0))
+    (explained,) = lines(
+        DumpOptions(explain_errors=True), Heard("r1", Frame(ERR | 0x40, bytes(8)), 0)
+    )
     assert explained == "  r1  20000040   [8]  00 00 00 00 00 00 00 00   ERRORFRAME\n\tbus-off\n"
 
 
@@ -71,7 +73,7 @@ def test_stamps_are_candump_s(kind: str, nanoseconds: bool, texts: list[str]) ->
 
 
 def test_it_ends_after_so_many_frames_that_pass_the_filter(buses, in_background, capsys) -> None:
-    dumped = in_background(lambda: dump(["r1,029:7FF"], Options(count=2, log_format=True)))
+    dumped = in_background(lambda: dump(["r1,029:7FF"], DumpOptions(count=2, log_format=True)))
     buses.await_clients(1)
     for k in range(3):
         buses.deliver(ENCODER, Frame(0x029 | RTR, bytes(k)), stamp_ns=k * 1000)
@@ -82,13 +84,13 @@ def test_it_ends_after_so_many_frames_that_pass_the_filter(buses, in_background,
 
 
 def test_it_ends_after_a_silence(buses, capsys) -> None:
-    assert dump(["r1"], Options(silence_s=0.02)) == 0
+    assert dump(["r1"], DumpOptions(silence_s=0.02)) == 0
     assert capsys.readouterr().out == ""
 
 
 def test_it_ends_with_the_run_and_says_why(buses, in_background, capsys) -> None:
     statuses: list[int] = []
-    dumped = in_background(lambda: statuses.append(dump(["any"], Options())))
+    dumped = in_background(lambda: statuses.append(dump(["any"], DumpOptions())))
     buses.await_clients(2)
     buses.deliver(ENCODER, bus="r2")
     buses.end()
@@ -112,7 +114,7 @@ def test_it_ends_when_nobody_reads_any_more(buses, in_background, monkeypatch, t
     pipe = Pipe()
     monkeypatch.setattr("sys.stdout", pipe)
     statuses: list[int] = []
-    dumped = in_background(lambda: statuses.append(dump(["r1"], Options())))
+    dumped = in_background(lambda: statuses.append(dump(["r1"], DumpOptions())))
     buses.await_clients(1)
     if traffic:
         buses.deliver(ENCODER)
@@ -128,12 +130,12 @@ def test_an_interrupt_ends_it_with_130(buses, monkeypatch) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(dumping, "_print_all", interrupted)
-    assert dump(["r1"], Options()) == 130
+    assert dump(["r1"], DumpOptions()) == 130
     assert buses.until(lambda: buses.hub.clients() == 0)
 
 
 def test_frames_of_other_clients_are_seen_too(buses, in_background, capsys) -> None:
-    dumped = in_background(lambda: dump(["r1"], Options(count=1)))
+    dumped = in_background(lambda: dump(["r1"], DumpOptions(count=1)))
     buses.await_clients(1)
     with can.Bus(interface="fleetloop", channel="r1") as bus:
         bus.send(can.Message(arbitration_id=0x1234567, data=b"\1", is_extended_id=True))
@@ -143,16 +145,16 @@ def test_frames_of_other_clients_are_seen_too(buses, in_background, capsys) -> N
 
 def test_a_bus_that_is_not_there_is_named_with_those_that_are(buses) -> None:
     with pytest.raises(InfrastructureError, match="no bus 'r9' is up; buses up now: run/r1"):
-        dump(["r9"], Options())
+        dump(["r9"], DumpOptions())
 
 
 @pytest.mark.parametrize(
     ("targets", "options", "complaint"),
     [
-        (["r1"], Options(stamps="x"), "-t x"),
-        (["r1"], Options(log_format=True, decode=True), "-L is for programs"),
-        (["r1", "r1,123:7FF"], Options(), "named twice"),
-        (["r1,oops"], Options(), "filter 'oops'"),
+        (["r1"], DumpOptions(stamps="x"), "-t x"),
+        (["r1"], DumpOptions(log_format=True, decode=True), "-L is for programs"),
+        (["r1", "r1,123:7FF"], DumpOptions(), "named twice"),
+        (["r1,oops"], DumpOptions(), "filter 'oops'"),
     ],
 )
 def test_what_does_not_go_together_is_refused(buses, targets, options, complaint) -> None:
