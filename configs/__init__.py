@@ -1,1 +1,1 @@
-"""What a run is: scenarios, topologies, briefs."""
+"""Scenario and deployment files: types, validation, and the briefs that processes receive."""

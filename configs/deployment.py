@@ -2,15 +2,15 @@
 
     roles      what `fleetloop run` starts here; the other roles are started where they belong, by
                `fleetloop agent` on the robots, and wait for the run
-    network    where the router listens, and as whom those from elsewhere come
+    network    where the router listens, and the identities of roles on other machines
     robot.NAME the robot's CAN bus, verbatim for `can.Bus`, and whether the plant emulates the robot
 
-One file serves all machines of a fleet: secrets are in files that it names. A bus that isn't ours
-has somebody else's clock, so it needs real time.
+One file serves all machines of a fleet: secrets are in files that it names. A bus of another
+interface has a clock of its own, so it needs real time.
 """
 
 import tomllib
-from dataclasses import fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -22,20 +22,14 @@ from configs.checks import Problem
 from configs.complaints import complaints, refusal
 from configs.errors import Complaint, ScenarioError
 from configs.files import expanded
-from configs.parameters import Name, as_tuples
+from configs.parameters import FilePath, Name, Parameters, Pattern, as_tuples, parameter
 from configs.roles import AGENT, ROLES, STARTED, identity_of, processes_of
 from configs.scenario import Scenario
 from configs.tls import TlsFiles
 from configs.users import read_users
 from configs.wording import MISSING
 
-Endpoint = Annotated[str, Field(pattern=patterns.ENDPOINT)]
-
-
-class Section(BaseModel):
-    """One table of the file: unknown keys are errors, values don't change type or later."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+Endpoint = Annotated[str, Pattern(patterns.ENDPOINT)]
 
 
 class BusSection(BaseModel):
@@ -49,45 +43,52 @@ class BusSection(BaseModel):
     )
 
 
-class RobotSection(Section):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotSection(Parameters):
     """Where one robot is."""
 
-    bus: BusSection = BusSection()
-    plant_bus: BusSection | None = Field(
-        None, description="the plant's own interface to that bus; the same if not given"
+    bus: BusSection = parameter(BusSection(), "keyword arguments of can.Bus")
+    plant_bus: BusSection | None = parameter(
+        None, "the plant's own interface to that bus; the same if not given"
     )
-    emulated: bool | None = Field(
+    emulated: bool | None = parameter(
         None,
-        description="the plant emulates its drives and its body; if not given: on our buses only,"
+        "the plant emulates its drives and its body; if not given: on our buses only,"
         " because on another bus real drives may listen",
     )
 
 
-class NetworkSection(Section):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NetworkSection(Parameters):
     """How the machines reach each other."""
 
-    endpoint: Endpoint = Field(description="where roles elsewhere reach the router")
-    listen: Endpoint | None = Field(
-        None, description="where the router listens, for example on all addresses; else endpoint"
+    endpoint: Endpoint = field(
+        metadata={"description": "where roles on other machines reach the router"}
     )
-    run: Annotated[str, Field(pattern=patterns.RUN)] | None = Field(
-        None, description="the run's name in every key; the scenario's if not given"
+    listen: Endpoint | None = parameter(
+        None, "where the router listens, for example on all addresses; else endpoint"
     )
-    users: Path | None = Field(
+    run: Annotated[str, Pattern(patterns.RUN)] | None = parameter(
+        None, "the run's name in every key; the scenario's if not given"
+    )
+    users: FilePath | None = parameter(
         None,
-        strict=False,
-        description="lines identity:password, all of them at the router, its own on a robot",
+        "lines identity:password, all of them at the router, its own on a robot",
     )
-    tls: TlsFiles | None = Field(None, description="certificates instead of passwords")
-    guests: dict[Name, tuple[str, ...]] = Field(
+    tls: TlsFiles | None = parameter(None, "certificates instead of passwords")
+    guests: dict[Name, tuple[str, ...]] = field(
         default_factory=dict,
-        description="who may open which buses with can.Bus(endpoint=...) from another machine;"
-        ' "*" for all',
+        metadata={
+            "description": "the buses that each guest may open with can.Bus(endpoint=...) from"
+            ' another machine; "*" for all'
+        },
     )
 
 
-class Deployment(Section):
+class Deployment(BaseModel):
     """Where the roles, buses and emulated robots of a scenario are."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     schema_: Literal[1] = Field(1, alias="schema", description="version of this format")
     description: str = ""
@@ -123,7 +124,7 @@ class Deployment(Section):
         return self.roles is None or role in self.roles
 
     def elsewhere(self, scenario: Scenario) -> tuple[str, ...]:
-        """The roles that are started by somebody else."""
+        """The roles that `fleetloop run` doesn't start here."""
         return tuple(role for role in processes_of(scenario.names) if not self.runs_here(role))
 
 
@@ -164,10 +165,10 @@ def check_deployment(
 def passwords(network: NetworkSection | None, identities: tuple[str, ...]) -> dict[str, str]:
     """The passwords of these identities from the deployment's file.
 
-    With TLS the certificate proves who somebody is, and the password is just the name again.
+    With TLS the certificate proves the identity, and the password is the name again.
 
     Raises:
-        ScenarioError: the file can't be read, is readable by others, or lacks somebody.
+        ScenarioError: the file can't be read, is readable by others, or lacks an identity.
     """
     if network is None or not identities:
         return {}
@@ -288,4 +289,4 @@ def _beside(deployment: Deployment, folder: Path) -> Deployment:
             for file in fields(network.tls)
         }
         changes["tls"] = replace(network.tls, **files)
-    return deployment.model_copy(update={"network": network.model_copy(update=changes)})
+    return deployment.model_copy(update={"network": replace(network, **changes)})

@@ -1,4 +1,4 @@
-"""What a user can cause: one line, and the exit status that the process ends with.
+"""Errors that a user can cause: one line each, and the exit status of the process.
 
 Any other exception is a bug and keeps its traceback.
 """
@@ -55,8 +55,8 @@ class InfrastructureError(FleetloopError):
 
 
 class PeerSilentError(InfrastructureError):
-    """Another process did not say what was due; the text names it."""
+    """A message of another process that was due did not come; the text names both."""
 
 
 class PeerLostError(InfrastructureError):
-    """Another process went away; it is the cause, this is only how it was noticed."""
+    """Another process ended, which is the cause; this error is how it was noticed."""

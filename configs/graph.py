@@ -1,4 +1,4 @@
-"""The directed graph of a fleet: who hears whom, and who hears the virtual leader.
+"""The directed graph of a fleet: edges between robots, and links to the virtual leader.
 
     edge "j -> i"    information flows from j to i: i hears j, a_ij = 1
     L = diag(Σ_j a_ij) − A        H = diag(h_i), h_i = 1 iff i hears the leader
@@ -23,7 +23,7 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Graph:
-    """Who hears whom, in the order of the robots."""
+    """Edges and leader links, in the order of the robots."""
 
     robots: tuple[str, ...]
     hears: Mapping[str, tuple[str, ...]]  # in-neighbours of each robot, sorted
@@ -62,10 +62,6 @@ class Graph:
         """L, N × N, row sums 0."""
         adjacency = self.adjacency()
         return np.diag(adjacency.sum(axis=1)) - adjacency
-
-    def leader_links(self) -> Matrix:
-        """H, N × N, diagonal."""
-        return np.diag([float(robot in self.leader) for robot in self.robots])
 
     def roots(self) -> tuple[str, ...]:
         """Robots that reach all others."""

@@ -1,4 +1,4 @@
-"""Section [host]: what a controller allows itself and its drives, whatever the law asks.
+"""Section [host]: the limits that a controller keeps, whatever its law asks.
 
 The limits on ages hold in every run. Torque limit, slew limit and plausibility are off unless
 given, so that the paper's law is the paper's; a robot wants all of them.
@@ -40,7 +40,7 @@ class Host(Parameters):
     )
     dry_run: bool = parameter(False, "everything but torque: the drives stay disarmed")
     on_exit: Literal["idle", "estop"] = parameter(
-        "idle", "estop: latched at the drives until somebody clears their errors"
+        "idle", "estop: latched at the drives until their errors are cleared"
     )
     rearm: bool = parameter(False, "a robot that stopped itself arms again once the fault is gone")
     rearm_after_s: SecondsOrZero = parameter(0.5, "all must have been well for this long")

@@ -136,7 +136,7 @@ def _check(
 
 
 def blamed(name: str, problem: Problem, overrides: Sequence[str | Override]) -> Complaint:
-    """A problem with whom it is to be blamed on: the last option that set the key, or the file."""
+    """A problem with its origin: the last option that set the key, or the file."""
     for text in reversed(overrides):
         override = Override.from_set(text) if isinstance(text, str) else text
         if isinstance(override, Override) and override.is_about(problem.key):

@@ -1,6 +1,6 @@
-"""Keys of a scenario that somebody sets from outside its file, for example on the command line.
+"""Keys of a scenario that are set from outside its file, for example on the command line.
 
-Who set a value is blamed for it: what is wrong with it names the option, not the file.
+A complaint about such a value names the option, not the file.
 """
 
 import tomllib

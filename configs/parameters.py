@@ -1,4 +1,4 @@
-"""What every parameter of a file is made of: a field of a frozen dataclass, declared once.
+"""Parameters of a file: fields of frozen dataclasses, each declared once.
 
     @dataclass(frozen=True, slots=True, kw_only=True)
     class Motor(Parameters):

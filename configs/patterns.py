@@ -1,4 +1,4 @@
-"""What texts in scenario and deployment files have to look like, as patterns and in words."""
+"""Patterns of texts in scenario and deployment files, with their remedies."""
 
 NAME = r"^[a-z][a-z0-9_]*$"
 FIRMWARE = r"^0\.6\.[0-9]{1,2}$"

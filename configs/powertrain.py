@@ -1,4 +1,4 @@
-"""Sections [motor], [encoder], [supply]: what the preset "realistic" puts behind the drives.
+"""Sections [motor], [encoder], [supply]: the powertrain of the preset "realistic".
 
 The defaults are those of a small hub motor on an ODrive. Its rated torque is half of the largest:
 at half the current limit the windings settle 75 K above ambient, where derating begins.

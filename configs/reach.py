@@ -1,4 +1,4 @@
-"""How far path variables and speed estimates of a scenario can come: beyond it nobody is believed.
+"""Bounds of path variables and speed estimates in a scenario; values beyond are not believed.
 
 Neighbours' v̂ are held as received, so (38) only ever averages v̂(0) and v_r:
 

@@ -1,7 +1,7 @@
 """The scenario file as a type: everything that the processes of one run have to agree on.
 
-`configs.loading.load` reads and checks a file; nobody checks it again. A scenario says *what* a run
-is; where its processes and buses are is another file's business.
+`configs.loading.load` reads and checks a file; it isn't checked again. A scenario defines *what* a
+run is; a deployment defines where its processes and buses are.
 """
 
 from collections.abc import Sequence

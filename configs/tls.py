@@ -9,6 +9,6 @@ from configs.parameters import FilePath, Parameters
 class TlsFiles(Parameters):
     """Mutual TLS: files in PEM; the certificate's common name is the identity."""
 
-    ca: FilePath = field(metadata={"description": "who signed all certificates"})
+    ca: FilePath = field(metadata={"description": "the authority that signed all certificates"})
     certificate: FilePath = field(metadata={"description": "this machine's"})
     private_key: FilePath = field(metadata={"description": "this machine's"})

@@ -1,4 +1,4 @@
-"""The inertias of a robot as its wheels feel them, as `plant.body` has them."""
+"""The rigid body of a robot from its section, for closed forms: `plant.body` undisturbed."""
 
 from configs.brief import WheelDisturbance
 from configs.sections import Body

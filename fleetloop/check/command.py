@@ -1,4 +1,4 @@
-"""`fleetloop check`: what can be said of a scenario before it runs."""
+"""`fleetloop check`: findings about a scenario before it runs."""
 
 import json
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What a check says: how bad it is, whom it concerns, the numbers, and the key to change."""
+"""Findings of a check: level, title, numbers, robots concerned, and the key to change."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ class Finding:
     title: str
     text: str
     robots: tuple[str, ...] = ()
-    """Whom it concerns; nobody in particular if empty."""
+    """The robots concerned; empty if it is about the whole scenario."""
     key: str = ""
     """Of the file, to change; "" if nothing has to."""
 
@@ -39,7 +39,7 @@ def worst(findings: Iterable[Finding]) -> Level:
 
 
 def titled(finding: Finding) -> str:
-    """Whom it concerns, and what was checked."""
+    """The robots concerned, and the title."""
     return f"{', '.join(finding.robots)}: {finding.title}" if finding.robots else finding.title
 
 

@@ -1,4 +1,4 @@
-"""Who hears whom: the conditions of Theorem 3.1, (46), delay, sharing, and what it comes to.
+"""Findings about graph and coordination: Theorem 3.1, (46), delay, sharing, time to agree.
 
     (46)   p²/q > max Im(ζ)² / Re(ζ) over the eigenvalues ζ ≠ 0 of L; exact for a fixed graph
 

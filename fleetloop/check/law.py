@@ -1,4 +1,4 @@
-"""What checks ask of a law, whatever it is; and the one question whether it is the paper's kind."""
+"""Optional properties of a law that checks use, and whether it is of the paper's kind."""
 
 from math import inf
 

@@ -1,6 +1,6 @@
-"""A rehearsal: the beginning of the run in this process, as far as a second or two of work goes.
+"""A rehearsal: the beginning of the run in this process, for a second or two of processor time.
 
-What closed forms leave out is in it: saturation, starts far off, arming, limits of host and drives.
+It has what closed forms leave out: saturation, starts far off, arming, limits of host and drives.
 It is the run itself, with the run's own controllers, drives and bodies, but nothing is recorded, so
 short scenarios are rehearsed to their end.
 """

@@ -1,4 +1,4 @@
-"""Whether gains suit the rate: the speed loop and the whole channel of every robot.
+"""Findings about gains and rate: the speed loop and the whole channel of every robot.
 
 A torque comes late by the time of its frames on the wire, the firmware's latency, the motor's
 current loop and the drive's velocity estimator. With a known delay, half of the speed loop's limit

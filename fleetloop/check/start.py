@@ -1,4 +1,4 @@
-"""The first second: what the law asks for where robots start, by integrating law and body alone.
+"""Findings about the first second, by integrating law and body alone from the start.
 
     first torque    k_4 k_1 |x_e(0)| / r and the turning part of (34): what no drive has, is cut
     (35) sampled    Euler's rule with the loop is stable while h Σ k_5 F² < k_4 in both rows of Ω

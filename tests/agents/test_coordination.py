@@ -37,7 +37,8 @@ def exact(scenario: Scenario, ticks: int) -> np.ndarray:
     """The same from the linear system of all robots at once, by powers of its exact map."""
     graph = scenario.topology
     n = len(graph.robots)
-    laplacian, links = graph.laplacian(), graph.leader_links()
+    laplacian = graph.laplacian()
+    links = np.diag([float(robot in graph.leader) for robot in graph.robots])
     zero, one = np.zeros((n, n)), np.eye(n)
     generator = np.block(
         [

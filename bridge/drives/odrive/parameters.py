@@ -12,7 +12,6 @@ from bridge.drives.odrive.frames import Command, ControlMode, InputMode
 from configs.brief import DriveModel
 
 FLOAT32_MAX = 3.4028234663852886e38
-MAX_PERIOD_NS = 0xFFFF_FFFF * 1_000_000
 
 
 @dataclass(slots=True)
