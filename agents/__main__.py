@@ -17,15 +17,16 @@ from agents.lockstep import LockstepCounters, LockstepLoop, give
 from agents.realtime import RealtimeCounters, RealtimeLoop
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import open_bus, to_message
-from bridge.launcher import follow_launcher
 from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.client import StoppedError, open_polled
+from bridge.network.launcher import follow_launcher
 from bridge.network.link import Arrival, Link, Publisher
 from bridge.network.messages import Notice, Rows
 from bridge.network.reports import AgentReport
+from bridge.network.telemetry import RowBuffer, row_of
 from bridge.network.zenoh_link import POLLED_DEPTH
-from bridge.process import (
+from bridge.process.lifecycle import (
     Stop,
     cpu_ns,
     go_realtime,
@@ -34,8 +35,7 @@ from bridge.process import (
     serve,
     settle_memory,
 )
-from bridge.profile import Sampler
-from bridge.telemetry import RowBuffer, row_of
+from bridge.process.profile import Sampler
 from configs.brief import AgentBrief
 from configs.errors import FleetloopError, InfrastructureError
 from configs.roles import AGENT

@@ -39,7 +39,7 @@ from agents.neighbours import Neighbours
 from agents.paths import robot_path
 from bridge.frame import Frame
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
-from bridge.telemetry import RowBuffer
+from bridge.network.telemetry import RowBuffer
 from configs.brief import AgentBrief
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path

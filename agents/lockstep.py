@@ -16,15 +16,15 @@ from agents.admission import LEADER, LOCALISATION
 from agents.agent import Agent
 from agents.bus_clock import BusClock
 from agents.guard import Phase
-from bridge.awake import LOOK_S, AwakeClock
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import can_id_of, to_message
-from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.frame import Frame
 from bridge.network.barrier import Hellos
 from bridge.network.link import Arrival, Link, Publisher
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
-from bridge.process import Stop, launcher_stopped
+from bridge.process.awake import LOOK_S, AwakeClock
+from bridge.process.clock import SYSTEM_CLOCK, Clock
+from bridge.process.lifecycle import Stop, launcher_stopped
 from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
 
 LISTEN_SHARE = 0.75

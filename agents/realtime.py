@@ -23,16 +23,16 @@ from agents.agent import Agent
 from agents.bus_health import BusHealth
 from agents.guard import Phase
 from agents.lockstep import did_not_start, give
-from bridge.awake import STALL_S, Lateness
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import can_id_of, to_frame, to_message
-from bridge.clock import SYSTEM_CLOCK, Clock, implausible_start, monotonic_of
 from bridge.frame import ERR, Frame
 from bridge.network.barrier import Hellos
 from bridge.network.link import Link, Publisher, waiting
 from bridge.network.messages import Go, Progress
 from bridge.network.reports import Deadlines
-from bridge.process import Stop
+from bridge.process.awake import STALL_S, Lateness
+from bridge.process.clock import SYSTEM_CLOCK, Clock, implausible_start, monotonic_of
+from bridge.process.lifecycle import Stop
 from configs.roles import LAUNCHER
 
 ARRIVALS_PER_TICK = 64

@@ -43,7 +43,7 @@ def _without_log(stream: TextIO | None) -> TextIO | None:
     """Standard output where Zenoh's log is not: it writes to descriptor 1 if RUST_LOG is set."""
     if not os.environ.get("RUST_LOG") or not isinstance(stream, io.TextIOWrapper):
         return stream
-    from bridge.process import reserve_stdout
+    from bridge.process.lifecycle import reserve_stdout
 
     stream.flush()
     own = io.BufferedWriter(io.FileIO(reserve_stdout(), "w", closefd=False))

@@ -15,7 +15,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn
 from rich.table import Table
 from rich.text import Text
 
-from bridge.clock import SYSTEM_CLOCK
+from bridge.process.clock import SYSTEM_CLOCK
 from fleetloop.streams import forget_output, spelled_for
 
 PLAIN_EVERY_S = 5.0

@@ -15,6 +15,7 @@ import os
 import select
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -22,8 +23,6 @@ from types import TracebackType
 from typing import IO, Any, NamedTuple, Self
 
 import pytest
-
-from bridge.clock import SYSTEM_CLOCK
 
 READY_S = 20.0
 ANSWER_S = 5.0
@@ -151,9 +150,9 @@ class EmulatedPlant:
     def _answer(self, within_s: float) -> dict[str, Any]:
         """Its next line, waiting at most so long."""
         _, stdout, _ = self._pipes()
-        deadline = SYSTEM_CLOCK.monotonic_s() + within_s
+        deadline = time.monotonic() + within_s
         while b"\n" not in self._unread:
-            left_s = deadline - SYSTEM_CLOCK.monotonic_s()
+            left_s = deadline - time.monotonic()
             if left_s <= 0.0 or not _readable(stdout, left_s):
                 raise PlantError(f"the plant said nothing for {within_s:g} s")
             more = os.read(stdout.fileno(), 65536)

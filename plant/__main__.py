@@ -9,18 +9,19 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
 
-from bridge.awake import Stall
 from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
-from bridge.clock import SYSTEM_CLOCK, implausible_start, monotonic_of
-from bridge.launcher import follow_launcher
 from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.client import StoppedError, open_client
+from bridge.network.launcher import follow_launcher
 from bridge.network.link import Arrival, Link, Publisher, waiting
 from bridge.network.messages import Go, Notice, PoseFix, Progress, Rows
 from bridge.network.reports import PlantReport
-from bridge.process import (
+from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer
+from bridge.process.awake import Stall
+from bridge.process.clock import SYSTEM_CLOCK, implausible_start, monotonic_of
+from bridge.process.lifecycle import (
     Stop,
     cpu_ns,
     go_realtime,
@@ -28,8 +29,7 @@ from bridge.process import (
     serve,
     settle_memory,
 )
-from bridge.profile import Sampler
-from bridge.telemetry import PLANT_ROW, FrameBuffer, RowBuffer
+from bridge.process.profile import Sampler
 from configs.brief import PlantBrief, Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError
 from configs.roles import PLANT

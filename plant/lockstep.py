@@ -19,13 +19,13 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
-from bridge.awake import LOOK_S, STALL_S
 from bridge.can_bus.hub import Hub
-from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.network.link import Publisher
 from bridge.network.messages import PoseFix, Progress
-from bridge.process import Stop, launcher_stopped
-from bridge.telemetry import RowBuffer, Tap
+from bridge.network.telemetry import RowBuffer, Tap
+from bridge.process.awake import LOOK_S, STALL_S
+from bridge.process.clock import SYSTEM_CLOCK, Clock
+from bridge.process.lifecycle import Stop, launcher_stopped
 from configs.brief import LEAD_TICKS, PlantBrief
 from configs.errors import InfrastructureError, PeerLostError
 from plant.bus.build import build_buses

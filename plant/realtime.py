@@ -11,14 +11,14 @@ cyclically, as always.
 
 from collections.abc import Callable, Mapping, Sequence
 
-from bridge.awake import Lateness
 from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
-from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.network.link import Publisher
 from bridge.network.messages import PoseFix, Progress
-from bridge.process import Stop
-from bridge.telemetry import RowBuffer, Tap
+from bridge.network.telemetry import RowBuffer, Tap
+from bridge.process.awake import Lateness
+from bridge.process.clock import SYSTEM_CLOCK, Clock
+from bridge.process.lifecycle import Stop
 from configs.brief import PlantBrief
 from plant.bus.build import build_buses, no_begin
 from plant.bus.sockets import SocketPort

@@ -24,9 +24,9 @@ import can
 from bridge.can_bus.drive_port import DrivePort, FrameCounters
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import open_bus, to_frame, to_message
-from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.frame import Frame
-from bridge.waiting import readable
+from bridge.process.clock import SYSTEM_CLOCK, Clock
+from bridge.process.waiting import readable
 from configs.brief import Settings
 from configs.errors import InfrastructureError
 

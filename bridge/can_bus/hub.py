@@ -41,9 +41,9 @@ from bridge.can_bus.packet import (
     split,
 )
 from bridge.can_bus.server import ClientServer
-from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.frame import ERR, Frame
-from bridge.waiting import readable
+from bridge.process.clock import SYSTEM_CLOCK, Clock
+from bridge.process.waiting import readable
 
 UNTAKEN = 100_000
 _NOBODY: Mapping[str, Mapping[str, str]] = {}

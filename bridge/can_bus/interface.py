@@ -53,8 +53,8 @@ from bridge.can_bus.packet import (
 )
 from bridge.can_bus.pythoncan import to_frame, to_message
 from bridge.can_bus.transport import JoinError, Transport, connect
-from bridge.clock import SYSTEM_CLOCK
 from bridge.frame import Frame
+from bridge.process.clock import SYSTEM_CLOCK
 
 FLUSH_S = 10.0
 """How long a batched client waits for a hub that doesn't read."""

@@ -37,10 +37,10 @@ from bridge.can_bus.packet import (
     REFUSED,
     encode_text,
 )
-from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.network import keys
 from bridge.network.link import Publisher
 from bridge.network.zenoh_link import ZenohLink
+from bridge.process.clock import SYSTEM_CLOCK, Clock
 
 READ, WRITE = select.EPOLLIN, select.EPOLLOUT
 ALL_BUSES = "*"

@@ -34,7 +34,7 @@ from bridge.can_bus.packet import (
     decode,
     encode_text,
 )
-from bridge.clock import SYSTEM_CLOCK
+from bridge.process.clock import SYSTEM_CLOCK
 
 MAX_CLIENTS = 64
 MAX_UNIDENTIFIED = 64

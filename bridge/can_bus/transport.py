@@ -14,7 +14,7 @@ from typing import Protocol
 
 from bridge.can_bus import sockets
 from bridge.can_bus.packet import MAX_BYTES, WELCOME, Packet, decode
-from bridge.waiting import readable
+from bridge.process.waiting import readable
 from configs.errors import InfrastructureError, ScenarioError
 
 FINE_S = 0.05

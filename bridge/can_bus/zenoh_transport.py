@@ -27,9 +27,9 @@ from bridge.can_bus.packet import (
     REFUSED,
     encode_text,
 )
-from bridge.clock import SYSTEM_CLOCK
 from bridge.network import keys
 from bridge.network.client import open_client
+from bridge.process.clock import SYSTEM_CLOCK
 from configs.brief import NetworkLink
 from configs.errors import InfrastructureError
 

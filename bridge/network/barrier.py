@@ -8,10 +8,10 @@ process waits for the next hello between two rounds of its own.
 
 from collections.abc import Callable, Iterable
 
-from bridge.awake import LOOK_S, AwakeClock
-from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.network.link import Arrival, Link, Publisher, waiting
-from bridge.process import Stop, launcher_stopped
+from bridge.process.awake import LOOK_S, AwakeClock
+from bridge.process.clock import SYSTEM_CLOCK, Clock
+from bridge.process.lifecycle import Stop, launcher_stopped
 from configs.errors import InfrastructureError
 
 

@@ -6,7 +6,6 @@ reason of a refusal to peers only, so a refused client asks again as a peer (`lo
 
 import zenoh
 
-from bridge.clock import SYSTEM_CLOCK
 from bridge.network.session import (
     ONE_THREAD,
     WAIT_BEFORE_CLOSE,
@@ -18,8 +17,9 @@ from bridge.network.session import (
 )
 from bridge.network.session_errors import Obstacle, obstacle
 from bridge.network.zenoh_link import POLLED_DEPTH, PolledLink, ZenohLink
-from bridge.process import Stop
-from bridge.waiting import readable
+from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.lifecycle import Stop
+from bridge.process.waiting import readable
 from configs.brief import NetworkLink
 from configs.errors import InfrastructureError
 

@@ -120,7 +120,7 @@ class LeaderSpeed(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """A block of rows of consecutive ticks, as `bridge.telemetry` packs them."""
+    """A block of rows of consecutive ticks, as `bridge.network.telemetry` packs them."""
 
     first_tick: int
     length: int  # rows in the block

@@ -19,8 +19,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple, Self
 
-from bridge.awake import MAX_STALLS, Stall
 from bridge.network.packing import finite, ints, pack, printable, unpack
+from bridge.process.awake import MAX_STALLS, Stall
 from configs.roles import AGENT, PLANT
 
 MAX_TEXT = 1 << 15

@@ -15,9 +15,9 @@ from typing import Self
 import zenoh
 from zenoh.handlers import Callback, RingChannel
 
-from bridge.clock import SYSTEM_CLOCK
 from bridge.network.link import ROOM_BYTES, Arrival, Dropped, Inbox, Publisher
 from bridge.network.session import keep
+from bridge.process.clock import SYSTEM_CLOCK
 
 CLOSE_S = 1.0
 POLLED_DEPTH = 1 << 15

@@ -17,9 +17,9 @@ from datetime import datetime
 from typing import TextIO
 
 from bridge.can_bus import sockets
-from bridge.clock import SYSTEM_CLOCK
 from bridge.drives import protocols
 from bridge.frame import EFF, Frame
+from bridge.process.clock import SYSTEM_CLOCK
 from configs.errors import ExitStatus, ScenarioError
 from fleetloop.can import error_frames, filters, text
 from fleetloop.can.client import Heard, Listener, open_bus

@@ -12,9 +12,9 @@ import can
 
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import to_frame, to_message
-from bridge.clock import SYSTEM_CLOCK
 from bridge.drives import protocol
 from bridge.drives.interface import EndpointFile, Versions
+from bridge.process.clock import SYSTEM_CLOCK
 from configs.errors import ExitStatus, InfrastructureError, ScenarioError
 from configs.sections import Drive
 from fleetloop.can.client import open_bus

@@ -20,7 +20,7 @@ import can
 
 from bridge.can_bus.interface import BusClosedError
 from bridge.can_bus.pythoncan import to_frame, to_message
-from bridge.clock import SYSTEM_CLOCK
+from bridge.process.clock import SYSTEM_CLOCK
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.echo import EchoGuard

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from bridge.can_bus import sockets
-from bridge.clock import SYSTEM_CLOCK
+from bridge.process.clock import SYSTEM_CLOCK
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.census import Census, Node
 from fleetloop.can.client import Listener, open_bus

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import can
 
 from bridge.can_bus.pythoncan import to_message
-from bridge.clock import SYSTEM_CLOCK
+from bridge.process.clock import SYSTEM_CLOCK
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can import text
 from fleetloop.can.client import open_bus

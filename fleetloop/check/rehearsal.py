@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bridge.network.messages import Progress
-from bridge.process import Stop
+from bridge.process.lifecycle import Stop
 from configs.brief import NetworkLink
 from configs.errors import FleetloopError
 from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of

@@ -1,7 +1,7 @@
 """What the processes of a run reported at their end, put together for the summary."""
 
-from bridge.awake import AFTERMATH_S
 from bridge.network.reports import AgentReport, PlantReport, Report
+from bridge.process.awake import AFTERMATH_S
 from configs.roles import AGENT, PLANT, short_name
 from fleetloop.launch.outcome import Outcome
 from fleetloop.results.summary import RunStats

@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from agents.__main__ import run
-from bridge.launcher import RUN_ENDED
-from bridge.process import LAUNCHER_GONE, keep_to_itself
+from bridge.network.launcher import RUN_ENDED
+from bridge.process.lifecycle import LAUNCHER_GONE, keep_to_itself
 from configs.deployment import load_deployment
 from configs.errors import ExitStatus, InfrastructureError, ScenarioError
 from configs.loading import load

@@ -12,8 +12,8 @@ import threading
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from bridge.clock import SYSTEM_CLOCK
-from bridge.process import Status, pack_brief
+from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.lifecycle import Status, pack_brief
 from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
 from fleetloop.launch.fork_server import ForkServer
 

@@ -11,7 +11,7 @@ from bridge.network import keys
 from bridge.network.link import Link, waiting
 from bridge.network.reports import LauncherReport
 from bridge.network.router import RouterLink
-from bridge.process import Stop
+from bridge.process.lifecycle import Stop
 from configs.errors import FleetloopError
 from configs.roles import LAUNCHER
 from fleetloop.launch.child import GAVE_UP, Child, Failure, end

@@ -11,11 +11,11 @@ from typing import NamedTuple, Protocol
 from agents.agent import Agent
 from agents.bus_clock import BusClock
 from bridge.can_bus.packet import Key, Submitted, Transmitted
-from bridge.clock import SYSTEM_CLOCK, Clock
 from bridge.frame import Frame
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix, Progress
-from bridge.process import Stop, settled_memory
-from bridge.telemetry import PLANT_ROW, FrameBuffer, RowBuffer, row_of
+from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer, row_of
+from bridge.process.clock import SYSTEM_CLOCK, Clock
+from bridge.process.lifecycle import Stop, settled_memory
 from configs.brief import AgentBrief, LeaderBrief, PlantBrief
 from fleetloop.record.writer import Source
 from plant.bus.build import build_buses

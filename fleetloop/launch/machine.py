@@ -1,8 +1,8 @@
-"""What the machine did to a run: stalls, seen by the launcher, who has nothing to do but to wait.
+"""Stalls of the machine during a run, as the launcher sees them: its only work is to wait.
 
-A stall is a wait that lasted `bridge.awake.STALL_S` longer than asked for: the machine stood still
-or was starved of processor time, or the launcher was stopped (Ctrl-Z) and continued (`fg`). What
-others owed in that time isn't held against them.
+A stall is a wait that lasted `bridge.process.awake.STALL_S` longer than asked for: the machine
+stood still or was starved of processor time, or the launcher was stopped (Ctrl-Z) and continued
+(`fg`). What other processes owed in that time isn't held against them.
 """
 
 import os
@@ -11,9 +11,9 @@ from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any, Self
 
-from bridge.awake import AwakeClock
-from bridge.clock import SYSTEM_CLOCK, Clock
-from bridge.process import processor_wait_ns
+from bridge.process.awake import AwakeClock
+from bridge.process.clock import SYSTEM_CLOCK, Clock
+from bridge.process.lifecycle import processor_wait_ns
 
 WATCH_EVERY_S = 0.05
 """The launcher's longest wait between two looks."""

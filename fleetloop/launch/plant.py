@@ -22,10 +22,10 @@ from typing import Any
 from bridge.can_bus import sockets
 from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
-from bridge.clock import SYSTEM_CLOCK
 from bridge.network.messages import Progress
-from bridge.process import Stop, go_realtime, keep_to_itself, name_process, settled_memory
-from bridge.telemetry import PLANT_ROW, RowBuffer
+from bridge.network.telemetry import PLANT_ROW, RowBuffer
+from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.lifecycle import Stop, go_realtime, keep_to_itself, name_process, settled_memory
 from configs.brief import NetworkLink, PlantBrief, Settings
 from configs.deployment import Deployment, load_deployment
 from configs.errors import ExitStatus, ScenarioError

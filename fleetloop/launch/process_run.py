@@ -18,12 +18,12 @@ from pathlib import Path
 
 from bridge.can_bus import sockets
 from bridge.can_bus.relay import Relay
-from bridge.clock import SYSTEM_CLOCK, Clock, wall_of
 from bridge.network import keys
 from bridge.network.barrier import Hellos
 from bridge.network.messages import Go, LeaderSpeed, Progress
 from bridge.network.router import RouterLink, open_router
-from bridge.process import Stop, cpu_ns
+from bridge.process.clock import SYSTEM_CLOCK, Clock, wall_of
+from bridge.process.lifecycle import Stop, cpu_ns
 from configs.brief import LEASE_S, LOCAL_LEASE_S, NetworkLink
 from configs.deployment import Deployment
 from configs.errors import InfrastructureError

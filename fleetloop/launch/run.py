@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from bridge.clock import SYSTEM_CLOCK
 from bridge.network.messages import Progress
-from bridge.process import Stop, keep_to_itself
+from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.lifecycle import Stop, keep_to_itself
 from configs.brief import NetworkLink
 from configs.deployment import Deployment, load_deployment
 from configs.errors import ExitStatus, InfrastructureError, ScenarioError

@@ -8,7 +8,7 @@ from functools import wraps
 from types import FrameType
 from typing import ParamSpec, TypeVar
 
-from bridge.process import Stop
+from bridge.process.lifecycle import Stop
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")

@@ -11,7 +11,7 @@ from queue import Queue
 from types import TracebackType
 from typing import Self
 
-from bridge.clock import SYSTEM_CLOCK
+from bridge.process.clock import SYSTEM_CLOCK
 from fleetloop.record.run_record import RunRecord
 from fleetloop.record.writer import Source
 

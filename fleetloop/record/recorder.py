@@ -9,7 +9,6 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from bridge.can_bus import sockets
-from bridge.clock import SYSTEM_CLOCK
 from bridge.frame import MAX_DATA
 from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
@@ -18,8 +17,9 @@ from bridge.network.link import Arrival, Dropped
 from bridge.network.messages import Progress, Rows
 from bridge.network.refused_messages import Refusals
 from bridge.network.reports import Report
-from bridge.process import Stop, cpu_ns, serve
-from bridge.telemetry import BLOCK_FRAMES, BLOCK_TICKS, FRAME_ROW, PLANT_ROW, row_of
+from bridge.network.telemetry import BLOCK_FRAMES, BLOCK_TICKS, FRAME_ROW, PLANT_ROW, row_of
+from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.lifecycle import Stop, cpu_ns, serve
 from configs.brief import RecorderBrief
 from configs.roles import RECORDER
 from fleetloop.record.can_log import frames_of

@@ -86,7 +86,7 @@ class RunRecord:
         self._rows.end(robot, source)
 
     def traffic(self, bus: str, frames: bytes) -> None:
-        """Add frames that crossed a bus, in the records of `bridge.telemetry.FRAME_ROW`."""
+        """Add frames that crossed a bus, in the records of `bridge.network.telemetry.FRAME_ROW`."""
         self._logs[bus].write(frames)
 
     def check_place(self) -> None:

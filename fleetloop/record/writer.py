@@ -91,7 +91,7 @@ class RecordWriter:
         return min(ends, default=max(held.first_tick for held in self._sources.values()))
 
     def add(self, robot: str, source: Source, first_tick: int, rows: bytes) -> None:
-        """Add rows of consecutive ticks, float64 as `bridge.telemetry` packs them.
+        """Add rows of consecutive ticks, float64 as `bridge.network.telemetry` packs them.
 
         Raises:
             InfrastructureError: ticks are missing or come twice, or the disk is full.

@@ -10,7 +10,7 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
-from bridge.profile import PARTS
+from bridge.process.profile import PARTS
 from fleetloop.results.summary import ERRORS, Summary
 from fleetloop.settling import FINAL_S
 from fleetloop.terminal import ResultConsole, say

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Container, Mapping, Sequence
 from random import Random
 
-from bridge.telemetry import Tap, no_tap
+from bridge.network.telemetry import Tap, no_tap
 from configs.brief import PlantBrief
 from plant.bus.ideal import IdealBus
 from plant.bus.port import Begin, Bus, Port

@@ -12,7 +12,7 @@ real time   a set-point for both wheels is answered at once by their encoder fra
 from collections.abc import Sequence
 
 from bridge.frame import Frame
-from bridge.telemetry import FROM_DRIVE, Tap
+from bridge.network.telemetry import FROM_DRIVE, Tap
 from configs.brief import Schedule
 from plant.bus.port import ALL, Begin, Port, Steps
 from plant.robot import EmulatedRobot

@@ -25,7 +25,7 @@ from random import Random
 from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.drives.interface import DriveNode
 from bridge.frame import Frame
-from bridge.telemetry import FROM_DRIVE, Tap
+from bridge.network.telemetry import FROM_DRIVE, Tap
 from bridge.wire.confinement import NodeState
 from bridge.wire.error_frames import of_error, of_state
 from bridge.wire.node import Delivered, ErrorFrame, Node, StateChanged

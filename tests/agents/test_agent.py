@@ -9,7 +9,7 @@ from agents.guard import Phase
 from bridge.drives.odrive.frames import Command, identifier
 from bridge.frame import Frame
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
-from bridge.telemetry import RowBuffer, row_of
+from bridge.network.telemetry import RowBuffer, row_of
 from configs.errors import InfrastructureError
 from configs.resolve import agent_brief
 

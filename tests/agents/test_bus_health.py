@@ -17,7 +17,7 @@ from bridge.can_bus.pythoncan import to_frame, to_message
 from bridge.frame import ERR, Frame
 from bridge.network.barrier import Hellos
 from bridge.network.messages import PoseFix
-from bridge.process import Stop
+from bridge.process.lifecycle import Stop
 from configs.errors import InfrastructureError, PeerLostError
 
 S = 1_000_000_000

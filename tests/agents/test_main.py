@@ -12,7 +12,7 @@ from agents.lockstep import LockstepCounters
 from bridge.can_bus.pythoncan import to_frame
 from bridge.drives.odrive.frames import Command
 from bridge.network.barrier import Hellos
-from bridge.process import Stop
+from bridge.process.lifecycle import Stop
 from configs.errors import InfrastructureError, PeerSilentError
 
 

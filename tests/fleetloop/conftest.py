@@ -35,5 +35,5 @@ def uneven_run(finished_run: Path, tmp_path_factory: pytest.TempPathFactory) -> 
 
 
 def signals_of(rows: np.ndarray) -> bytes:
-    """Rows of a record as `bridge.telemetry` packs them: without the tick."""
+    """Rows of a record as `bridge.network.telemetry` packs them: without the tick."""
     return np.stack([rows[name] for name in rows.dtype.names[1:]], axis=1).tobytes()

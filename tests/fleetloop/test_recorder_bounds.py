@@ -8,7 +8,7 @@ from support.robot_bench import NOWHERE, SCENARIO
 
 from bridge.network.link import Arrival, Dropped
 from bridge.network.messages import Rows
-from bridge.telemetry import BLOCK_TICKS, FRAME_ROW
+from bridge.network.telemetry import BLOCK_TICKS, FRAME_ROW
 from configs.brief import RecorderBrief
 from configs.loading import to_toml
 from fleetloop.record.recorder import AHEAD_TICKS, _Recorder

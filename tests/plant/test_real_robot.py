@@ -3,7 +3,7 @@
 from math import isnan
 
 from bridge.network.messages import PoseFix
-from bridge.telemetry import PLANT_ROW
+from bridge.network.telemetry import PLANT_ROW
 from configs.sections import Pose
 from plant.real_robot import RealRobot
 

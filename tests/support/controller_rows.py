@@ -1,7 +1,7 @@
 """The row of a controller with the paper's law."""
 
 from agents.laws.adaptive_dsc import AdaptiveDsc
-from bridge.telemetry import row_of
+from bridge.network.telemetry import row_of
 from configs.signals import controller_signals
 
 SIGNALS = controller_signals(AdaptiveDsc.SIGNALS)

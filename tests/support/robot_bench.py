@@ -8,7 +8,7 @@ from bridge.drives.odrive.frames import AxisState, Command, identifier
 from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import Frame
 from bridge.network.messages import PathState, PoseFix
-from bridge.telemetry import RowBuffer, row_of
+from bridge.network.telemetry import RowBuffer, row_of
 from configs.brief import AgentBrief, NetworkLink
 from configs.loading import load
 from configs.resolve import agent_brief, plant_brief

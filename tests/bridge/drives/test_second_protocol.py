@@ -6,7 +6,7 @@ from support.second_drive.tools import PlainSection
 import configs.drives
 from bridge.drives import protocol, protocols
 from bridge.frame import Frame
-from bridge.process import Stop
+from bridge.process.lifecycle import Stop
 from configs.brief import NetworkLink
 from configs.errors import ScenarioError
 from configs.loading import load

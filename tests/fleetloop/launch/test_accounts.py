@@ -1,7 +1,7 @@
 """What processes reported, put together."""
 
-from bridge.awake import Stall
 from bridge.network.reports import AgentReport, PlantReport
+from bridge.process.awake import Stall
 from fleetloop.launch.accounts import stats_of
 from fleetloop.launch.outcome import Outcome
 

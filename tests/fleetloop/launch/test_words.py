@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.awake import Stall
 from bridge.network.link import Dropped
 from bridge.network.messages import Progress
 from bridge.network.reports import (
@@ -18,6 +17,7 @@ from bridge.network.reports import (
     Report,
     decode_report,
 )
+from bridge.process.awake import Stall
 from configs.loading import load
 from configs.resolve import schedule
 from fleetloop.launch.accounts import stats_of

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from support.controller_rows import ROW, SIGNALS
 
-from bridge.telemetry import PLANT_ROW
+from bridge.network.telemetry import PLANT_ROW
 from configs.errors import InfrastructureError
 from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.run_record import RunRecord

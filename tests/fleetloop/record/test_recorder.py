@@ -8,7 +8,7 @@ from support.controller_rows import ROW, SIGNALS
 
 from bridge.network.link import Arrival
 from bridge.network.messages import Rows
-from bridge.telemetry import PLANT_ROW
+from bridge.network.telemetry import PLANT_ROW
 from configs.brief import NetworkLink, RecorderBrief
 from fleetloop.record.reader import Record
 from fleetloop.record.recorder import _Recorder

@@ -4,7 +4,7 @@ from support.manual_port import ManualPort
 
 from bridge.drives.odrive.frames import Command, identifier
 from bridge.frame import RTR, Frame
-from bridge.telemetry import no_tap
+from bridge.network.telemetry import no_tap
 from configs.brief import NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief

@@ -9,7 +9,7 @@ from bridge.can_bus.packet import Submitted
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisState, Command, identifier
 from bridge.frame import Frame
-from bridge.telemetry import no_tap
+from bridge.network.telemetry import no_tap
 from bridge.wire.node import NodeState
 from bridge.wire.queues import Endless
 from configs.brief import NetworkLink, PlantBrief

@@ -2,7 +2,7 @@
 
 from support.controller_rows import SIGNALS
 
-from bridge.telemetry import BLOCK_TICKS, PLANT_ROW, RowBuffer
+from bridge.network.telemetry import BLOCK_TICKS, PLANT_ROW, RowBuffer
 from configs.signals import PLANT_SIGNALS
 
 

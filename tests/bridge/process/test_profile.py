@@ -2,7 +2,7 @@
 
 import time
 
-from bridge.profile import PARTS, Sampler
+from bridge.process.profile import PARTS, Sampler
 from configs.brief import WheelDisturbance
 from configs.sections import Body
 from plant.body import RigidBody, State

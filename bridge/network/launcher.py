@@ -9,7 +9,7 @@ from functools import partial
 from bridge.network import keys
 from bridge.network.reports import LauncherReport
 from bridge.network.zenoh_link import ZenohLink
-from bridge.process import LAUNCHER_GONE, Stop
+from bridge.process.lifecycle import LAUNCHER_GONE, Stop
 from configs.roles import LAUNCHER
 
 RUN_ENDED = "the run was ended"

@@ -2,7 +2,7 @@
 
 import time
 
-from bridge.clock import monotonic_of, wall_of
+from bridge.process.clock import monotonic_of, wall_of
 
 
 def test_an_instant_comes_back_as_it_went() -> None:

@@ -3,7 +3,7 @@
 import pytest
 from support.clocks import ManualClock
 
-from bridge.awake import AFTERMATH_S, LATE_S, LOOK_S, STALL_S, AwakeClock, Lateness
+from bridge.process.awake import AFTERMATH_S, LATE_S, LOOK_S, STALL_S, AwakeClock, Lateness
 
 
 class Machine:

@@ -9,7 +9,7 @@ import signal
 from types import FrameType, TracebackType
 from typing import Self
 
-from bridge.clock import process_cpu_ns, thread_cpu_ns
+from bridge.process.clock import process_cpu_ns, thread_cpu_ns
 
 SAMPLE_S = 0.002
 PARTS = ("bus", "drives", "law", "plant", "Zenoh", "record", "other")
@@ -17,7 +17,7 @@ _PLACES = (
     ("/bridge/can_bus/", "bus"),
     ("/site-packages/can/", "bus"),
     ("/bridge/drives/", "drives"),
-    ("/bridge/telemetry.py", "record"),
+    ("/bridge/network/telemetry.py", "record"),
     ("/bridge/network/messages.py", "Zenoh"),
     ("/bridge/network/link.py", "Zenoh"),
     ("/bridge/network/zenoh_link.py", "Zenoh"),

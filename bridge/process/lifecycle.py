@@ -30,8 +30,8 @@ from typing import BinaryIO, TypeVar
 
 import setproctitle
 
-from bridge.clock import process_cpu_ns
-from bridge.waiting import readable
+from bridge.process.clock import process_cpu_ns
+from bridge.process.waiting import readable
 from configs.errors import ExitStatus, FleetloopError, PeerLostError
 
 GRACE_S = 3.0

@@ -6,7 +6,7 @@ import sys
 
 SCRIPT = """
 import os, resource
-from bridge.waiting import readable
+from bridge.process.waiting import readable
 resource.setrlimit(resource.RLIMIT_NOFILE, (2048, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
 read, write = os.pipe()
 high = os.dup2(read, 1500)

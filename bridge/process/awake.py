@@ -10,7 +10,7 @@ all messages.
 from collections.abc import Callable
 from typing import NamedTuple
 
-from bridge.clock import SYSTEM_CLOCK, Clock
+from bridge.process.clock import SYSTEM_CLOCK, Clock
 
 LOOK_S = 0.1
 STALL_S = 0.25
