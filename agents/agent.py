@@ -258,7 +258,7 @@ class Agent:
         self._go_on(t_ns * 1e-9 + self._h, after)
         x_d, y_d, theta_d, _, _ = reference
         used = (t_ns * 1e-9, *motion, s, s_dot, mu, v_hat, n, x_d, y_d, theta_d)
-        sent = (*self._drives.sent, self.late_s, self.round_trip_s)
+        sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
         self._rows.add(tick, (*used, *signals, *sent))
         return frames
 

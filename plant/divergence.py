@@ -22,12 +22,12 @@ class Divergence(NamedTuple):
     t_s: float  # scenario time
     v: float  # [m/s]
     omega: float  # [rad/s]
-    right: float  # torque at the wheel [N·m]
-    left: float
+    right_wheel_N_m: float  # torque
+    left_wheel_N_m: float
 
     def __str__(self) -> str:
         """For people."""
         return (
             f"its motion diverged: v = {self.v:.3g} m/s, ω = {self.omega:.3g} rad/s under wheel"
-            f" torques of {self.right:.3g} and {self.left:.3g} N·m"
+            f" torques of {self.right_wheel_N_m:.3g} and {self.left_wheel_N_m:.3g} N·m"
         )

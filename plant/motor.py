@@ -57,16 +57,6 @@ class MotorFault(Enum):
 _RISE_K = 100.0
 
 
-class IdealMotor:
-    """Makes what it is asked for, at once."""
-
-    __slots__ = ()
-
-    def step(self, demand_shaft_N_m: float, speed_shaft_rad_s: float, dt_s: float) -> float:  # noqa: ARG002
-        """Torque at the shaft [N·m] for the drive's demand."""
-        return demand_shaft_N_m
-
-
 class Motor:
     """One motor on the bus of its robot.
 

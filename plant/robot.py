@@ -33,14 +33,14 @@ class EmulatedRobot:
     __slots__ = (
         "_answered_ns",
         "_body",
-        "_demand_left",
-        "_demand_right",
+        "_demand_left_wheel_N_m",
+        "_demand_right_wheel_N_m",
         "_gear_left",
         "_gear_right",
         "_left",
         "_right",
-        "_torque_left",
-        "_torque_right",
+        "_torque_left_wheel_N_m",
+        "_torque_right_wheel_N_m",
         "brief",
         "divergence",
         "drives",
@@ -63,8 +63,8 @@ class EmulatedRobot:
         self._gear_right = mounting.right_sign * mounting.gear_ratio
         self._gear_left = mounting.left_sign * mounting.gear_ratio
         self._answered_ns = 0
-        self._demand_right = self._demand_left = 0.0
-        self._torque_right = self._torque_left = 0.0
+        self._demand_right_wheel_N_m = self._demand_left_wheel_N_m = 0.0
+        self._torque_right_wheel_N_m = self._torque_left_wheel_N_m = 0.0
         pose = brief.pose
         self.state = State(
             pose.x_m, pose.y_m, pose.theta_rad, brief.v_m_s, brief.omega_rad_s, 0.0, 0.0
@@ -109,8 +109,8 @@ class EmulatedRobot:
         state = self.state
         right = self._right.torque_demand_shaft(period_s) * self._gear_right
         left = self._left.torque_demand_shaft(period_s) * self._gear_left
-        self._torque_right = self._demand_right = right
-        self._torque_left = self._demand_left = left
+        self._torque_right_wheel_N_m = self._demand_right_wheel_N_m = right
+        self._torque_left_wheel_N_m = self._demand_left_wheel_N_m = left
         if self.divergence is not None:
             return
         step = period_s / substeps
@@ -154,10 +154,10 @@ class EmulatedRobot:
             omega,
             self._right.input_torque_shaft * self._gear_right,
             self._left.input_torque_shaft * self._gear_left,
-            self._demand_right,
-            self._demand_left,
-            self._torque_right,
-            self._torque_left,
+            self._demand_right_wheel_N_m,
+            self._demand_left_wheel_N_m,
+            self._torque_right_wheel_N_m,
+            self._torque_left_wheel_N_m,
         )
 
 
@@ -198,8 +198,11 @@ class RealisticRobot(EmulatedRobot):
             right.feed(*train.right_encoder.step(state.right_wheel_rad * gear_r, step))
             left.feed(*train.left_encoder.step(state.left_wheel_rad * gear_l, step))
         self.state = state
-        self._demand_right, self._demand_left = demands[0] * gear_r, demands[1] * gear_l
-        self._torque_right, self._torque_left = torques
+        self._demand_right_wheel_N_m, self._demand_left_wheel_N_m = (
+            demands[0] * gear_r,
+            demands[1] * gear_l,
+        )
+        self._torque_right_wheel_N_m, self._torque_left_wheel_N_m = torques
         self._unmeasured_s += period_s
         if self._unmeasured_s >= MEASURE_EVERY_S:
             self._unmeasured_s = 0.0

@@ -1,8 +1,8 @@
 """A drive client that only listens, for a robot whose wheels must not turn: a dry run.
 
 It hears and judges the drives like the client that it wraps, is `armed` once nothing is wrong with
-them, and sends no frame, so another controller may drive the robot meanwhile. `sent` is what the
-wrapped client would have sent.
+them, and sends no frame, so another controller may drive the robot meanwhile. `sent_wheel_N_m` is
+what the wrapped client would have sent.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,7 +22,7 @@ class DryRun:
     def __init__(self, client: "DriveClient") -> None:
         self._client = client
         self.armed = False
-        self.sent = (0.0, 0.0)
+        self.sent_wheel_N_m = (0.0, 0.0)
         self.hear: Callable[[int, bytes | bytearray, int], None] = client.hear
         self.heard_since: Callable[[int], bool] = client.heard_since
         self.motion: Callable[[], tuple[float, float, float, float] | None] = client.motion
@@ -47,18 +47,18 @@ class DryRun:
     def torque(self, right_wheel_N_m: float, left_wheel_N_m: float) -> Sequence[Frame]:
         """What would have been sent."""
         self._client.torque(right_wheel_N_m, left_wheel_N_m)
-        self.sent = self._client.sent
+        self.sent_wheel_N_m = self._client.sent_wheel_N_m
         return _NOTHING
 
     def rest(self, now_ns: int) -> Sequence[Frame]:  # noqa: ARG002
         """Nothing to send."""
-        self.sent = (0.0, 0.0)
+        self.sent_wheel_N_m = (0.0, 0.0)
         return _NOTHING
 
     def disarm(self) -> Sequence[Frame]:
         """Nothing to send."""
         self.armed = False
-        self.sent = (0.0, 0.0)
+        self.sent_wheel_N_m = (0.0, 0.0)
         return _NOTHING
 
     def estop(self) -> Sequence[Frame]:

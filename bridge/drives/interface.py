@@ -31,7 +31,7 @@ class DriveClient(Protocol):
     """The controller's end of the two drives of a robot."""
 
     armed: bool
-    sent: tuple[float, float]
+    sent_wheel_N_m: tuple[float, float]
     """(right, left) torque last sent, at the wheels [N·m], as the bus carries it."""
 
     @property
@@ -63,7 +63,7 @@ class DriveClient(Protocol):
         """Why the wheels can't be driven now, None if they can."""
 
     def torque(self, right_wheel_N_m: float, left_wheel_N_m: float) -> Sequence[Frame]:
-        """Set-points for both wheels [N·m]; `sent` then says what the bus carries of them."""
+        """Set-points for both wheels; `sent_wheel_N_m` is then what the bus carries."""
 
     def rest(self, now_ns: int) -> Sequence[Frame]:
         """Torque 0 for both wheels, and whatever keeps them disarmed; call once per period."""

@@ -334,7 +334,9 @@ def test_the_law_and_the_limiter_begin_anew_after_arming_again() -> None:
     *_, last = bench.until(Phase.DRIVING)
     assert set_points(last) == [ZERO, ZERO]
     bench.tick()
-    assert all(abs(torque) <= 0.002 * 1.000001 for torque in bench.agent.guard.drives.sent)
+    assert all(
+        abs(torque) <= 0.002 * 1.000001 for torque in bench.agent.guard.drives.sent_wheel_N_m
+    )
 
 
 # --- limits, dry run, end -------------------------------------------------------------------------

@@ -60,7 +60,7 @@ def test_an_absurd_torque_on_an_ideal_drive_ends_the_motion_of_its_robot(torque:
     tell(robot, 0, Command.SET_INPUT_TORQUE, f.ONE_FLOAT.pack(torque))
     frames = go_on(robot, 201)
     assert robot.divergence is not None
-    assert robot.divergence.right == pytest.approx(torque)
+    assert robot.divergence.right_wheel_N_m == pytest.approx(torque)
     assert (robot.state.v, robot.state.omega) == (0.0, 0.0)
     held = robot.state
     for node in (0, 1):

@@ -14,7 +14,7 @@ from configs.brief import WheelDisturbance
 from configs.sections import Body
 from plant.body import RigidBody, State
 from plant.integrate import rk4
-from plant.motor import IdealMotor, Motor, MotorFault
+from plant.motor import Motor, MotorFault
 from plant.supply import SupplyFault
 
 FREE = {"viscous_friction_shaft_N_m_s": 0.0, "coulomb_friction_shaft_N_m": 0.0}
@@ -31,10 +31,6 @@ def settled(made: Motor, demand: float, speed: float = 0.0) -> float:
 
 
 # --- current loop ---------------------------------------------------------------------------------
-
-
-def test_the_ideal_motor_makes_what_it_is_asked_for() -> None:
-    assert IdealMotor().step(691.0, 3.0, 0.001) == 691.0
 
 
 @pytest.mark.parametrize("step_s", STEPS_S)

@@ -74,7 +74,7 @@ class OdriveClient:
         self._well_until_ns = NEVER
         """Both drives are in closed loop without trouble; their heartbeats count until then."""
         self.armed = False
-        self.sent = (0.0, 0.0)
+        self.sent_wheel_N_m = (0.0, 0.0)
         """(right, left) torque last sent, at the wheels [N·m], as float32 carries it."""
 
     def hear(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
@@ -230,7 +230,7 @@ class OdriveClient:
             )
         right, left = _UNPACK_TWO(both)
         of_right, of_left = self._to_wheel
-        self.sent = (right * of_right, left * of_left)
+        self.sent_wheel_N_m = (right * of_right, left * of_left)
         right_id, left_id = self._torque_ids
         return _new(Frame, (right_id, both[:4])), _new(Frame, (left_id, both[4:]))
 

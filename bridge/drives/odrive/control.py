@@ -162,7 +162,9 @@ class Controller:
         if trajectory is None:
             return
         self._trajectory_s += dt_s
-        self.position_setpoint, self.velocity_setpoint, accel = trajectory.at(self._trajectory_s)
+        self.position_setpoint, self.velocity_setpoint, accel = trajectory.point_at(
+            self._trajectory_s
+        )
         self.torque_setpoint = accel * p.inertia
         if self._trajectory_s >= trajectory.duration_s:
             self._trajectory = None

@@ -44,7 +44,7 @@ class Trapezoid(NamedTuple):
         """T."""
         return self.accel_s + self.cruise_s + self.decel_s
 
-    def at(self, t_s: float) -> Point:
+    def point_at(self, t_s: float) -> Point:
         """The point at a time from the start; at rest in the goal from T on."""
         if t_s < self.accel_s:
             velocity = self.start_velocity + self.accel * t_s

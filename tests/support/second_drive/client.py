@@ -26,7 +26,7 @@ class PlainClient:
         self._motion: dict[int, tuple[float, float]] = {}
         self._stamps = dict.fromkeys(self._nodes, -1)
         self.armed = False
-        self.sent = (0.0, 0.0)
+        self.sent_wheel_N_m = (0.0, 0.0)
 
     def hear(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         for node, gear in zip(self._nodes, self._gears, strict=True):
@@ -69,7 +69,7 @@ class PlainClient:
         right, left = (
             step * self._unit * gear for step, gear in zip(steps, self._gears, strict=True)
         )
-        self.sent = right, left
+        self.sent_wheel_N_m = right, left
         return [
             Frame(TORQUE + node, SET_POINT.pack(step))
             for node, step in zip(self._nodes, steps, strict=True)

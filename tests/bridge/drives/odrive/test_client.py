@@ -84,8 +84,10 @@ def test_arming_takes_no_longer_than_two_heartbeats(robot: Robot) -> None:
 def test_torques_reach_their_own_wheels_and_are_known_as_sent(robot: Robot) -> None:
     robot.arm()
     robot.tick(*robot.client.torque(0.1, -0.2))
-    assert robot.client.sent == (pytest.approx(0.1), pytest.approx(-0.2))
-    assert tuple(axis.torque_demand_shaft(0.0) for axis in robot.axes) == robot.client.sent
+    assert robot.client.sent_wheel_N_m == (pytest.approx(0.1), pytest.approx(-0.2))
+    assert (
+        tuple(axis.torque_demand_shaft(0.0) for axis in robot.axes) == robot.client.sent_wheel_N_m
+    )
 
 
 def test_readings_are_radians(robot: Robot) -> None:
@@ -129,7 +131,7 @@ def test_disarming_leaves_both_idle_with_zero_torque_stored(robot: Robot) -> Non
 def test_a_torque_beyond_float32_saturates() -> None:
     client = OdriveClient(LINK)
     client.torque(1e300, -inf)
-    assert client.sent[0] == pytest.approx(3.4e38)
+    assert client.sent_wheel_N_m[0] == pytest.approx(3.4e38)
 
 
 def test_frames_of_wrong_length_are_no_readings(robot: Robot) -> None:
@@ -329,7 +331,7 @@ def test_mounting_turns_wheel_values_into_shaft_values_and_back(signs, ratio, ri
     frames = robot.client.torque(right, left)
     shafts = [f.decode_float(frame.data) for frame in frames]
     assert shafts == pytest.approx([right * signs[0] / ratio, left * signs[1] / ratio], rel=1e-6)
-    assert robot.client.sent == pytest.approx((right, left), rel=1e-6)
+    assert robot.client.sent_wheel_N_m == pytest.approx((right, left), rel=1e-6)
 
 
 def test_default_mounting_changes_no_bit() -> None:
@@ -337,7 +339,7 @@ def test_default_mounting_changes_no_bit() -> None:
     for torque in (0.1, -0.3, 1e-30, 123.456):
         frames = client.torque(torque, torque)
         assert frames[0].data == frames[1].data == f.ONE_FLOAT.pack(torque)
-        assert client.sent == (f.decode_float(frames[0].data),) * 2
+        assert client.sent_wheel_N_m == (f.decode_float(frames[0].data),) * 2
 
 
 @given(st.integers(0, 2**32 - 1), st.binary(max_size=8))

@@ -186,9 +186,9 @@ def test_a_trapezoid_keeps_its_limits_and_ends_at_rest_in_its_goal(ends, limits)
     move = plan(start, velocity, goal, limits)
     assert move is not None
     step = move.duration_s / 200
-    points = [move.at(n * step) for n in range(201)]
+    points = [move.point_at(n * step) for n in range(201)]
     assert points[0][:2] == pytest.approx((start, velocity), abs=1e-6)
-    assert move.at(move.duration_s) == (goal, 0.0, 0.0)
+    assert move.point_at(move.duration_s) == (goal, 0.0, 0.0)
     fastest = max(limits[0], abs(velocity))
     for one, two in pairwise(points):
         assert abs(two.velocity) <= fastest + 1e-6
