@@ -44,7 +44,7 @@ class SubmissionQueue(Generic[_Item]):
         return len(self.now) + len(self._late)
 
     def put(self, items: Iterable[_Item], *, at_once: bool) -> None:
-        """Add what a client said."""
+        """Add frames of a client."""
         if at_once or (len(self.now) < TURN and not self._late):
             self.now += items
         else:
@@ -108,8 +108,8 @@ class Bus:
         self.departed: list[Key] = []
         self.stamp_ns = -1  # not powered up yet
         self.clients: list[Connection] = []
-        self.unidentified: list[Connection] = []  # connected, and have not said hello
-        self.held: list[Connection] = []  # not read until what was said is taken
+        self.unidentified: list[Connection] = []  # connected, without a HELLO
+        self.held: list[Connection] = []  # not read until received frames are taken
         self.received: SubmissionQueue[Frame] = SubmissionQueue()
         self.owing = 0
         self.counters = BusCounters()
@@ -152,7 +152,7 @@ class Connection:
         self.released = 0  # frames that left its transmit queue
         self.pending: list[Stamped] = []  # what a synchronous client hears with its next question
         self.joined = self.synchronous = self.batched = self.own = self.owes = False
-        self.held = False  # it isn't read until what its bus said was taken
+        self.held = False  # not read until the frames of its bus are taken
         self.backlog: deque[bytes] = deque()
         self.missing = 0  # frames that were lost behind the backlog
 
@@ -167,7 +167,7 @@ class Connection:
             self._keep(packet)
             return False
         except OSError:
-            # It has gone; what it said before is still to be read, and then its end.
+            # It has gone; its packets are still to be read, and then the end.
             self.bus.counters.dropped += frames_in(packet)
         return True
 
@@ -202,8 +202,8 @@ class Connection:
         self.backlog.clear()
         with contextlib.suppress(OSError):
             # A full socket takes two packets more once it may hold more: the kernel doubles this.
-            room = self.sock.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
-            self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, room)
+            size = self.sock.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
+            self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, size)
             if self.missing:
                 self.send_now(encode_lost(self.missing))
             self.send_now(packet)

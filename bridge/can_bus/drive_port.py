@@ -41,8 +41,5 @@ class DrivePort(Protocol):
     def troubles(self) -> dict[str, str]:
         """Buses that failed at times, and how."""
 
-    def fileno(self) -> int:
-        """A descriptor that is readable when there is something to handle."""
-
     def close(self, reason: str) -> None:
         """Leave all buses. Idempotent."""

@@ -18,6 +18,7 @@ to be opened again. Neither ends the plant. Interfaces without a file descriptor
 import contextlib
 import select
 from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 import can
 
@@ -165,7 +166,7 @@ class ExternalBuses:
         return self._all[name].counters
 
     def troubles(self) -> dict[str, str]:
-        """Buses that failed at times: how often, how long, what it said, what was lost."""
+        """Buses with outages: their number, duration, last error and lost frames."""
         now_s = self._clock.monotonic_s()
         found = {}
         for name, attachment in self._all.items():
@@ -279,14 +280,21 @@ class ExternalBuses:
                 attachment.reason = str(error)
 
 
+class WaitablePort(DrivePort, Protocol):
+    """A drive port with a descriptor to wait for."""
+
+    def fileno(self) -> int:
+        """A descriptor that is readable when there is something to handle."""
+
+
 class CombinedPort:
     """Two ends as one; each bus is on one of them."""
 
-    def __init__(self, ours: DrivePort, others: ExternalBuses, names: Sequence[str]) -> None:
+    def __init__(self, ours: WaitablePort, others: ExternalBuses, names: Sequence[str]) -> None:
         self._ours = ours
         self._others = others
         self._of_others = frozenset(names)
-        self._both: tuple[DrivePort, ...] = (ours, others)
+        self._both: tuple[WaitablePort, ...] = (ours, others)
 
     def _end_of(self, name: str) -> DrivePort:
         return self._others if name in self._of_others else self._ours
@@ -320,10 +328,6 @@ class CombinedPort:
     def troubles(self) -> dict[str, str]:
         """Buses that failed at times, and how."""
         return self._ours.troubles() | self._others.troubles()
-
-    def fileno(self) -> int:
-        """The first end's descriptor."""
-        return self._ours.fileno()
 
     def close(self, reason: str) -> None:
         """Leave all buses. Idempotent."""

@@ -145,10 +145,10 @@ class Hub:
     def submitted(self, name: str) -> list[Submitted]:
         """What the clients of a bus with bit timing sent since the last call, in order."""
         bus = self._buses[name]
-        said = bus.submitted.take()
+        submitted = bus.submitted.take()
         if bus.held:
             self._release(bus)
-        return said
+        return submitted
 
     def departed(self, name: str) -> list[Key]:
         """Keys of clients that left a bus with bit timing since the last call."""
@@ -231,7 +231,7 @@ class Hub:
         return self._buses[name].counters
 
     def troubles(self) -> dict[str, str]:
-        """Buses on which clients said what can't be: none of ours fails."""
+        """Buses with invalid frames or packets of clients; an emulated bus never fails."""
         return {
             name: f"clients sent {count} × what is no frame of classic CAN: it was dropped"
             for name, bus in self._buses.items()

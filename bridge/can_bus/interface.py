@@ -65,7 +65,7 @@ _IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ign
 
 
 class BusClosedError(can.CanOperationError):
-    """The bus said goodbye, at the end of its run; the text has its reason."""
+    """The bus was closed, at the end of its run; the text has the reason."""
 
 
 class FleetloopBus(can.BusABC):
@@ -119,10 +119,12 @@ class FleetloopBus(can.BusABC):
         self._inbox: deque[can.Message] = deque()
         self._outbox: list[Frame] = []
         self._stamp_ns = -1
-        self._owes = False
+        self._reply_due = False
         self._closed_because: str | None = None
         self._queue = 0  # frames that may wait at this node; 0: frames take no time
-        self._said = self._gone = 0  # frames sent, and how many of them have left the queue
+        self._submitted = self._released = (
+            0  # frames sent, and how many of them have left the queue
+        )
         self._transport = self._connect(own, timeout_s, remote)
         self._send_now, self._next = self._transport.send, self._transport.receive
         self.channel_info = f"fleetloop bus {self.channel}"
@@ -167,7 +169,7 @@ class FleetloopBus(can.BusABC):
             else:
                 wait_s = max(0.0, deadline - SYSTEM_CLOCK.monotonic_s())
             # A question without a frame says that a tick has passed.
-            if not self._receive(wait_s) or (self._owes and not inbox):
+            if not self._receive(wait_s) or (self._reply_due and not inbox):
                 return None
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
@@ -177,18 +179,18 @@ class FleetloopBus(can.BusABC):
 
         Args:
             msg: what to send.
-            timeout: how long to wait for room, in the queue as well; None: not at all for the
+            timeout: how long to wait for credit and for the socket; None: not at all for the
                 queue, as on SocketCAN, and up to `PATIENCE_S` for a process that is busy.
 
         Raises:
-            can.CanOperationError: no classic frame, the bus is gone, or no room in time.
+            can.CanOperationError: no classic frame, the bus is gone, or no credit in time.
         """
         try:
             frame = to_frame(msg)
         except ValueError as error:
             raise can.CanOperationError(f"bus {self.channel!r}: not sent: {error}") from error
         if self._queue:
-            self._await_room(timeout)
+            self._await_credit(timeout)
         if self._batched:
             if self._is_shutdown:
                 raise self._gone_with(None)
@@ -207,7 +209,7 @@ class FleetloopBus(can.BusABC):
     @property
     def asked(self) -> bool:
         """Of a synchronous client: whether the bus waits for its answer, to a tick or to frames."""
-        return self._owes
+        return self._reply_due
 
     def fileno(self) -> int:
         """The descriptor that becomes readable with the next frame."""
@@ -238,8 +240,8 @@ class FleetloopBus(can.BusABC):
 
     def _receive(self, wait_s: float | None) -> bool:
         """Take one packet; False if none came in time."""
-        if self._owes and not (wait_s is not None and wait_s <= 0.0):
-            self._owes = False
+        if self._reply_due and not (wait_s is not None and wait_s <= 0.0):
+            self._reply_due = False
             self._flush(DONE)
         elif self._outbox:
             self._flush(0)
@@ -257,9 +259,9 @@ class FleetloopBus(can.BusABC):
     def _take(self, data: bytes) -> None:
         packet = decode(data)
         if packet is not None and packet[0] == FRAMES:
-            _, flags, _, stamp_ns, frames, _, self._gone, before_ns, _ = packet
+            _, flags, _, stamp_ns, frames, _, self._released, before_ns, _ = packet
             self._stamp_ns = stamp_ns
-            self._owes = self._synchronous and not flags & MORE
+            self._reply_due = self._synchronous and not flags & MORE
             timestamp, channel, is_rx = stamp_ns / 1e9, self.channel, not flags & OWN
             put = self._inbox.append
             if before_ns:
@@ -306,10 +308,10 @@ class FleetloopBus(can.BusABC):
     def _losses(self) -> str:
         return f"; {self.lost} frames for it were lost: not read in time" if self.lost else ""
 
-    def _await_room(self, timeout: float | None) -> None:
+    def _await_credit(self, timeout: float | None) -> None:
         """Take a place in the transmit queue, waiting at most `timeout`; None: not at all."""
         deadline = SYSTEM_CLOCK.monotonic_s() + (timeout or 0.0)
-        while (self._said - self._gone) & 0xFFFF_FFFF >= self._queue:
+        while (self._submitted - self._released) & 0xFFFF_FFFF >= self._queue:
             left_s = max(deadline - SYSTEM_CLOCK.monotonic_s(), 0.0)
             # Credit returns with packets from the hub, also for a client that only sends. A
             # synchronous client holds the bus's time: waiting would be for ever.
@@ -318,7 +320,7 @@ class FleetloopBus(can.BusABC):
                     f"bus {self.channel!r}: transmit queue full, {self._queue} frames wait",
                     errno.ENOBUFS,
                 )
-        self._said += 1
+        self._submitted += 1
 
     def _flush(self, flags: int) -> None:
         frames, self._outbox = self._outbox, []

@@ -50,7 +50,7 @@ _JOIN_S = 1.0
 _TURN = 64
 """Packets of one guest before the others have their turn."""
 _EVENTS = 256
-"""Events before what the hub said has its turn."""
+"""Events handled before packets of the hub have their turn."""
 MAX_LINES = 32
 """Lines that one user may have open at a time: each costs two descriptors."""
 MAX_HELD_BYTES = 16 * 1024 * 1024
@@ -62,13 +62,13 @@ _log = logging.getLogger(__name__)
 
 
 class _Event(NamedTuple):
-    place: str  # of a guest's line; "": the relay ends
+    place: str  # of a guest's connection; "": the relay ends
     packet: bytes | None = None
     alive: bool | None = None  # its token came or went
 
 
 class Guest:
-    """A guest that has said hello. Nothing here waits."""
+    """A guest after its HELLO. No call blocks."""
 
     __slots__ = (
         "awaits",
@@ -88,8 +88,8 @@ class Guest:
         self.down = down
         self.sender = Sender()  # of the way down
         self.receiver = Receiver()  # of the way up
-        self.waiting: deque[bytes] = deque()  # the hub has no room for these yet
-        self.leaving = self.told = False  # it said goodbye; it was told of the end
+        self.waiting: deque[bytes] = deque()  # not accepted by the hub yet
+        self.leaving = self.told = False  # it sent a BYE; it got a BYE
         self.awaits = READ
 
     def push(self) -> bool:
@@ -107,9 +107,9 @@ class Guest:
         return True
 
     def pull(self, most: int | None) -> bool:
-        """Hand on at most so many packets of the hub, as far as there is room; False at the end.
+        """Forward at most so many packets of the hub, within the credit; False at the end.
 
-        None: all that is there, room or not: the hub's last words are as many as a socket holds.
+        None: all packets, credit or not: at the end of a bus they are as many as a socket holds.
         """
         while most is None or (most > 0 and self.sender.has_credit()):
             try:
@@ -117,7 +117,7 @@ class Guest:
             except BlockingIOError:
                 return True
             except ConnectionResetError:
-                continue  # the hub left something unread; what it said is still there
+                continue  # the hub left packets unread; its own are still there
             except OSError:
                 return False
             if not packet:
@@ -162,7 +162,7 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
         self._alive: set[str] = set()
         self._guests: dict[str, Guest] = {}
         self._by_fd: dict[int, Guest] = {}
-        self._unheard: set[str] = set()  # told of the end, and have not said that they know
+        self._unheard: set[str] = set()  # got a BYE, and have not confirmed it
         self._closing = False
         self._over_at: float | None = None
         self._lock = threading.Lock()  # of the descriptor below
@@ -200,15 +200,15 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
         self._put(_Event(key.removesuffix("/alive"), alive=alive))
 
     def _put(self, event: _Event) -> None:
-        line = keys.guest_of(event.place) if event.place else ("", "")
-        if line is None:
-            return  # the key of no line
+        guest = keys.guest_of(event.place) if event.place else ("", "")
+        if guest is None:
+            return  # not the key of a guest
         with self._lock:
             if event.packet is not None:
                 cost = len(event.packet) + _EVENT_BYTES
-                if self._held[line[0]] + cost > MAX_HELD_BYTES:
+                if self._held[guest[0]] + cost > MAX_HELD_BYTES:
                     return
-                self._held[line[0]] += cost
+                self._held[guest[0]] += cost
             self._events.put(event)
             if self._wake >= 0:
                 os.eventfd_write(self._wake, 1)
@@ -253,7 +253,7 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
 
     @contextlib.contextmanager
     def _only(self, place: str) -> Iterator[None]:
-        """What fails on the way of one guest ends its line and no other."""
+        """A failure of one guest ends its connection and no other."""
         try:
             yield
         except Exception as error:
@@ -276,12 +276,12 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
                 self._unheard.discard(place)
             return
         if kind == HELLO or guest.leaving:
-            return  # a hello that was said again
+            return  # a repeated HELLO
         if kind == BYE:
             guest.leaving = True
         elif not guest.sender.grant(packet):
             if len(packet) > MAX_BYTES or not guest.receiver.arrive(packet):
-                self._end(guest, "you sent more than there was room for")
+                self._end(guest, "you sent more than your credit allows")
                 return
             guest.waiting.append(packet)
         self._move(guest)
@@ -330,7 +330,7 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
             self._guests[place] = self._by_fd[sock.fileno()] = Guest(place, sock, down)
 
     def _leave(self, place: str) -> None:
-        """A guest is no more: what it said before still reaches the hub, what it hears is lost."""
+        """A guest has gone: its packets still reach the hub, packets to it are lost."""
         self._unheard.discard(place)
         if (guest := self._guests.get(place)) is not None:
             guest.leaving = True
@@ -344,7 +344,7 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
                 self._end(guest, "the run has ended")
 
     def _end(self, guest: Guest, reason: str) -> None:
-        """Leave the hub in a guest's name; it is told why, if the hub hasn't said so."""
+        """Leave the hub for a guest, which gets the reason, unless the hub sent it."""
         if not guest.told:
             guest.down.put(encode_text(BYE, reason))
         if not guest.leaving:

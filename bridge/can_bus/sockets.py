@@ -205,7 +205,7 @@ def _answers(path: Path) -> bool:
         try:
             probe.connect(str(path))
         except BlockingIOError:
-            return True  # so many wait to be let in that there is no room for another
+            return True  # its queue of pending connections is full
         except OSError:
             return False
     return True

@@ -26,10 +26,10 @@ class Transport(Protocol):
     """One client's connection to a hub."""
 
     def send(self, packet: bytes) -> None:
-        """Send at once. Raises `BlockingIOError` without room, `OSError` when it is broken."""
+        """Send at once. Raises `BlockingIOError` without space, `OSError` when it is broken."""
 
     def await_writable(self, timeout_s: float) -> bool:
-        """Wait until there is room to send; whether there is."""
+        """Wait until a packet can be sent; whether it can."""
 
     def receive(self, wait_s: float | None) -> bytes | None:
         """The next packet; None if none came within `wait_s` (None: for ever); empty at the end."""
@@ -46,7 +46,7 @@ class JoinError(OSError):
 
 
 class UnixTransport:
-    """A line over a Unix socket that keeps packets."""
+    """A transport over a Unix socket that keeps packet boundaries."""
 
     __slots__ = ("_bound_s", "_recv", "_send", "_socket")
 
@@ -63,7 +63,7 @@ class UnixTransport:
             # The kernel's own bound: a socket that doesn't block is refused where others wait too.
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _timeval(timeout_s))
             self._socket.connect(str(path))
-            with contextlib.suppress(BrokenPipeError):  # it said why: that is still to be read
+            with contextlib.suppress(BrokenPipeError):  # the reason is still to be read
                 self._send(hello)
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _timeval(None))
         except BlockingIOError as error:
@@ -78,7 +78,7 @@ class UnixTransport:
         self._send(packet, socket.MSG_DONTWAIT)
 
     def await_writable(self, timeout_s: float) -> bool:
-        """Wait until there is room to send."""
+        """Wait until a packet can be sent."""
         poller = select.poll()
         try:
             poller.register(self._socket, select.POLLOUT)
@@ -99,10 +99,10 @@ class UnixTransport:
         except BlockingIOError:
             return None
         except ConnectionResetError:
-            # The hub closed with something of ours unread; what it said is still to be read.
+            # The hub closed with packets of ours unread; its own are still to be read.
             return self._recv(MAX_BYTES, socket.MSG_DONTWAIT)
         except ValueError as error:  # a descriptor of −1
-            raise OSError("the line is closed") from error
+            raise OSError("the connection is closed") from error
 
     def fileno(self) -> int:
         """The socket's descriptor."""

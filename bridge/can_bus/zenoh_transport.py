@@ -8,7 +8,7 @@ in both directions (`flow_control`). What the guest doesn't read waits here, up 
 packets, and then at the hub, which drops and counts what is too much. Leaving waits, at most
 `CLOSE_S`, until the hub has all that was sent. The guest holds a liveliness token for as long as it
 lives and watches the relay's: when that goes, or the network to it (noticed within Zenoh's lease),
-the line is broken and says so, for good.
+the connection is broken for good, with the reason.
 """
 
 import atexit
@@ -40,7 +40,7 @@ _ENDS = frozenset({BYE, REFUSED})
 
 
 class ZenohTransport:
-    """One guest's line to a bus behind a router."""
+    """One guest's connection to a bus behind a router."""
 
     def __init__(self, network: NetworkLink, channel: str, hello: bytes, timeout_s: float) -> None:
         """Connect, and say hello until the relay answers.
@@ -138,20 +138,20 @@ class ZenohTransport:
     def _has_packets(self) -> bool:
         return not self._packets.empty()
 
-    # --- a line ----------------------------------------------------------------------------------
+    # --- transport -------------------------------------------------------------------------------
 
     def send(self, packet: bytes) -> None:
         """Send at once."""
         with self._lock:
             if self._broken or self._readable < 0:
-                raise OSError(self._broken or "the line is closed")
+                raise OSError(self._broken or "the connection is closed")
             if not self._sender.has_credit():
                 raise BlockingIOError
             self._sender.spend(packet)
         self._say(packet)
 
     def await_writable(self, timeout_s: float) -> bool:
-        """Wait until there is room to send, or the line is broken."""
+        """Wait for credit, or for the end of the connection."""
         with self._news:
             return self._news.wait_for(
                 lambda: self._sender.has_credit() or bool(self._broken) or self._readable < 0,
@@ -171,12 +171,12 @@ class ZenohTransport:
         with self._lock:
             if self._readable < 0 or not packet:
                 self._packets.put(b"")  # the end stays the end
-                raise OSError(self._broken or "the line is closed")
+                raise OSError(self._broken or "the connection is closed")
             with contextlib.suppress(BlockingIOError):
                 os.eventfd_read(self._readable)
             credit = self._receiver.consume(self._held.popleft()) if self._held else None
         if credit is not None:
-            with contextlib.suppress(OSError):  # the line's end is still to be read
+            with contextlib.suppress(OSError):  # the end is still to be read
                 self._say(credit)
         return packet
 
@@ -184,7 +184,7 @@ class ZenohTransport:
         try:
             self._up.put(packet)
         except zenoh.ZError as error:
-            raise OSError("the line is closed") from error
+            raise OSError("the connection is closed") from error
 
     def fileno(self) -> int:
         """Readable when a packet waits."""

@@ -312,7 +312,7 @@ def test_a_guest_that_sends_more_than_it_may_is_shown_the_door(
                     guest.send(frame(n))
                 except can.CanOperationError:
                     break
-            assert "more than there was room for" in error_within(guest, 10.0)
+            assert "more than your credit allows" in error_within(guest, 10.0)
             monkeypatch.undo()
         running.deliver(Frame(2, b""), bus="r2")
         assert other.recv(5.0).arbitration_id == 2
