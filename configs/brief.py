@@ -7,8 +7,8 @@ more (nanoseconds, defaults that other sections decide) is extended by a subclas
 No library is imported here, so a controller process starts in a fraction of a second.
 
 An `AgentBrief` holds no plant parameter: the controller knows r and b of its robot (Assumption 2.3)
-and learns the rest. Angles are
-radians, wheel order is (right, left), times are integer nanoseconds.
+and learns the rest. Angles are radians, wheels in the order (right, left), times integer
+nanoseconds.
 """
 
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ from configs.tls import TlsFiles
 Settings = tuple[tuple[str, str | int | float | bool], ...]
 """Keyword arguments as sorted pairs, so that a brief stays hashable and immutable."""
 OURS = "fleetloop"
-"""The python-can interface whose buses the plant's process holds itself."""
+"""The python-can interface of the buses that the plant's process holds."""
 LEAD_TICKS = 16
 """In lockstep a bus may be this many ticks ahead of the slowest."""
 
@@ -167,10 +167,10 @@ class Schedule:
     share_every: int  # path states are due at ticks k ≥ 0 with k % share_every == 0
     localise_every: int  # poses are taken at ticks k ≥ 0 with k % localise_every == 0
     pose_delay_ticks: int  # and reach the robots this many ticks later
-    tick_deadline_s: float  # how long anybody waits for anybody within one tick [wall s]
-    start_deadline_s: float  # how long everybody has to become ready [wall s]
-    hello_every_s: float = 0.02  # how often everybody says hello until then [wall s]
-    realtime: bool = False  # everybody keeps the wall clock; else the plant owns time
+    tick_deadline_s: float  # longest wait for another process within one tick [wall s]
+    start_deadline_s: float  # longest wait for all processes to be ready [wall s]
+    hello_every_s: float = 0.02  # period of each process's hello until then [wall s]
+    realtime: bool = False  # all processes keep the wall clock; else the plant owns time
     profile: bool = False  # every process samples where its processor time goes
 
     @property
@@ -180,7 +180,7 @@ class Schedule:
 
     @property
     def longest_start_s(self) -> float:
-        """No run begins later than this after everybody was told so [s]."""
+        """The longest time from the go to tick 0 [s]."""
         return self.start_deadline_s + self.countdown_ticks * self.period_s
 
     def shares(self, tick: int) -> bool:
@@ -244,7 +244,7 @@ go on (Ctrl-Z and `fg`)."""
 
 @dataclass(frozen=True, slots=True)
 class NetworkLink:
-    """How one process reaches the router, and as whom."""
+    """Address of the router, and the identity of one process at it."""
 
     run: str  # the run's name in every key: fleetloop/<run>/...
     endpoint: str  # e.g. tcp/127.0.0.1:40001
@@ -264,7 +264,7 @@ class Outside:
 
 @dataclass(frozen=True, slots=True)
 class AgentBrief:
-    """Everything that one robot's controller process is told at its start."""
+    """Everything that the controller process of one robot receives at its start."""
 
     robot: str
     law: Choice  # with its gains
@@ -377,7 +377,7 @@ class RobotBrief:
 
 @dataclass(frozen=True, slots=True)
 class PlantBrief:
-    """Everything that the plant process is told at its start."""
+    """Everything that the plant process receives at its start."""
 
     robots: tuple[RobotBrief, ...]
     schedule: Schedule
@@ -391,7 +391,9 @@ class PlantBrief:
     attached: tuple[tuple[str, Settings], ...] = ()  # bus, keyword arguments of can.Bus: not ours
     real_robots: tuple[tuple[str, Pose], ...] = ()  # robots that aren't emulated; where they start
     detached: bool = False  # as an agent's
-    controllers: tuple[tuple[str, str], ...] = ()  # robot, secret: whom lockstep's buses wait for
+    controllers: tuple[
+        tuple[str, str], ...
+    ] = ()  # robot, secret: the clients that lockstep waits for
 
 
 @dataclass(frozen=True, slots=True)
@@ -406,7 +408,7 @@ class LeaderBrief:
 
 @dataclass(frozen=True, slots=True)
 class RecorderBrief:
-    """Everything that the recorder is told at its start."""
+    """Everything that the recorder receives at its start."""
 
     path: str  # of the record
     robots: tuple[str, ...]
@@ -419,5 +421,5 @@ class RecorderBrief:
     hello_every_s: float
     network: NetworkLink
     runtime_folder: str  # holds the buses' sockets; goes when the launcher was killed
-    ticks: int  # of the run: nobody has rows of later ones
+    ticks: int  # of the run: no rows are of later ones
     last_frame_ns: int  # bus time after which no frame ends

@@ -1,4 +1,4 @@
-"""What relates the sections of a scenario to each other; all problems at once, none raised."""
+"""Relations between the sections of a scenario; all problems at once, none raised."""
 
 import difflib
 import itertools
@@ -70,7 +70,7 @@ def _names(scenario: Scenario) -> Iterator[Problem]:
 
 
 def _laws(scenario: Scenario) -> Iterator[Problem]:
-    """What robots say differently of the law, each against the law that it has then."""
+    """The robots' own keys of [control], each checked against its own law."""
     for robot in scenario.robot:
         try:
             scenario.control_of(robot)

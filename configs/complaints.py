@@ -61,7 +61,7 @@ class Salvage(NamedTuple):
     lost: tuple[str, ...]  # keys that were dropped: what a check says of them isn't to be believed
 
     def believes(self, problem: Problem) -> bool:
-        """Whether a problem is the file's, not one of what was put in for lost keys."""
+        """Whether a problem is of the file itself, not of a stand-in for a lost key."""
         text = f"{problem.key} {problem.remedy}"
         return not any(key in text or key.startswith(f"{problem.key}.") for key in self.lost)
 

@@ -1,4 +1,4 @@
-"""Scenario → briefs: what each process of a run is told at its start."""
+"""Scenario → briefs: what each process of a run receives at its start."""
 
 from math import inf
 
@@ -44,14 +44,14 @@ allow 100 ms."""
 POSE_AGE_LIMIT_S = 0.5
 START_DEADLINE_S, START_DEADLINE_PER_ROBOT_S = 20.0, 0.5
 HELLO_EVERY_S, HELLO_EVERY_PER_ROBOT_S = 0.02, 0.001
-"""All say hello at once: a large fleet says it less often."""
+"""All processes send hellos at once, so those of a large fleet are less frequent."""
 UNLIMITED = 1e6
 """A limit that nothing reaches: [A], [rev/s]."""
 SERIAL_NUMBER = 0x3858_0000_0000
 
 
 def schedule(scenario: Scenario, speed: float = 0.0, *, profile: bool = False) -> Schedule:
-    """The ticks of a run; held to a slow `speed`, everybody waits longer for the next tick."""
+    """The ticks of a run; held to a slow `speed`, all processes wait longer for the next."""
     clock = scenario.clock
     h = clock.control_period_s
     delay_s = scenario.localisation.delay_s
@@ -80,7 +80,7 @@ def agent_brief(
     speed: float = 0.0,
     profile: bool = False,
 ) -> AgentBrief:
-    """What the controller of robot `name` is told."""
+    """The brief of the controller of robot `name`."""
     robot = next(robot for robot in scenario.robot if robot.name == name)
     body = scenario.body_of(robot)
     graph = scenario.topology
@@ -183,7 +183,7 @@ def plant_brief(
     speed: float = 0.0,
     profile: bool = False,
 ) -> PlantBrief:
-    """What the plant is told."""
+    """The brief of the plant."""
     ticks = schedule(scenario, speed, profile=profile)
     return PlantBrief(
         robots=robot_briefs(scenario),
@@ -216,7 +216,7 @@ def wire_model(scenario: Scenario) -> WireModel | None:
 
 
 def leader_brief(scenario: Scenario) -> LeaderBrief:
-    """What the virtual leader says, from the start and from each of its steps on."""
+    """The speed of the virtual leader, from the start and from each of its steps on."""
     leader = scenario.leader
     later = tuple((round(step.t_s * 1e9), step.speed_m_s) for step in leader.steps)
     return LeaderBrief(((0, leader.speed_m_s), *later))

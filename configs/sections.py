@@ -33,10 +33,10 @@ from configs.plugins import LAWS, Choice, Kind
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Clock(Parameters):
-    """Who waits for whom, and how often what happens."""
+    """Time of a run: lockstep or real time, periods and deadlines."""
 
     mode: Literal["lockstep", "realtime"] = parameter(
-        "lockstep", "the plant owns time, or everybody keeps the wall clock's"
+        "lockstep", "the plant owns time, or all processes keep the wall clock"
     )
     control_period_s: Seconds = parameter(0.001, "one tick: sense, decide, act")
     share_period_s: Seconds = parameter(0.02, "path variables go to the out-neighbours")
@@ -48,7 +48,7 @@ class Clock(Parameters):
     tick_deadline_s: Seconds = parameter(2.0, "longest wait within a tick, wall clock")
     start_deadline_s: Seconds | None = parameter(
         None,
-        "longest wait for everybody to be ready; if not given 20 s, or 0.5 s for each"
+        "longest wait for all processes to be ready; if not given 20 s, or 0.5 s for each"
         " robot if that is more",
     )
     on_late: Literal["abort"] = parameter("abort", "what happens when somebody is late")
@@ -230,7 +230,7 @@ else:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robot(Parameters):
-    """One robot; what isn't said is its type's."""
+    """One robot; what isn't given is its type's."""
 
     name: Name
     type: Name = "etsro"
@@ -250,7 +250,7 @@ class Robot(Parameters):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GraphSection(Parameters):
-    """Who hears whom: "r1 -> r2" means r2 hears r1 (a_21 = 1)."""
+    """The directed graph: "r1 -> r2" means that r2 hears r1 (a_21 = 1)."""
 
     edges: tuple[str, ...] | None = None
     generator: Literal["chain", "ring", "tree", "star", "complete", "random"] | None = parameter(
