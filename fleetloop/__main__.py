@@ -1,4 +1,4 @@
-"""`fleetloop`: what has to be right before anything heavy is imported, then the command line.
+"""`fleetloop`: signals, import path and streams before any heavy import, then the command line.
 
 Until a verb takes signals itself, nothing is open that would have to be closed: a signal ends the
 process at once and silently, wherever an import may be.

@@ -1,22 +1,31 @@
 """The command line: `fleetloop VERB ...`. Arguments only; each verb's work is in its own module.
 
 Exit status: 0 held, 1 an expectation failed or was not reached, two runs differ or a record is cut,
-2 usage or scenario, 3 infrastructure (named), 130 interrupted.
+2 usage or scenario, 3 infrastructure (named), 130 interrupted (`configs.errors.ExitStatus`).
 """
 
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from configs.errors import ExitStatus, FleetloopError, ScenarioError
+from configs.errors import ExitStatus, FleetloopError
 from fleetloop import numbers
 from fleetloop.can.app import app as can_app
-
-if TYPE_CHECKING:
-    from configs.overrides import Overrides
+from fleetloop.options import (
+    ClockOption,
+    DeploymentOption,
+    PartialOption,
+    RunArg,
+    ScenarioArg,
+    SeedOption,
+    SetOption,
+    listed,
+    overrides_of,
+    refuse_lockstep,
+)
 
 app = typer.Typer(
     name="fleetloop",
@@ -30,58 +39,6 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 app.add_typer(can_app, name="can")
-
-
-def _shipped(incomplete: str) -> list[str]:
-    """Names of shipped scenarios that begin so, for the shell; files it completes itself."""
-    from configs.loading import shipped
-
-    return [name for name in shipped() if name.startswith(incomplete)]
-
-
-ScenarioArg = Annotated[
-    str,
-    typer.Argument(
-        metavar="SCENARIO",
-        help="A scenario file, or the name of a shipped one (fleetloop check lists them).",
-        autocompletion=_shipped,
-    ),
-]
-ClockOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="lockstep|realtime",
-        help="Instead of the file's clock.mode: fast and the same bit for bit, or by the wall"
-        " clock.",
-    ),
-]
-SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Seed, instead of the file's.")]
-RunArg = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its record.mcap.")]
-PartialOption = Annotated[
-    bool,
-    typer.Option(
-        "--partial",
-        help="Take what there is of a record that is cut or damaged, up to there, with exit status"
-        " 0. Else such a record is refused: 1 if it is cut, 2 if it is damaged.",
-    ),
-]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Override a key of the scenario, e.g. --set coordination.p=3"
-        " --set robot.r2.pose.x_m=-6.5 . May be repeated.",
-    ),
-]
-DeploymentOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--deployment",
-        metavar="FILE",
-        help="Where everything is: CAN interfaces, router, roles on other machines. Else all here.",
-    ),
-]
 
 
 @app.command()
@@ -149,7 +106,7 @@ def run(
     options = RunOptions(
         in_process=in_process,
         speed=speed,
-        overrides=_changes(overrides, clock=clock, seed=seed, duration=duration),
+        overrides=overrides_of(overrides, clock=clock, seed=seed, duration=duration),
         out=out,
         as_json=as_json,
         figures=figures,
@@ -176,8 +133,8 @@ def agent(
     """Run one robot's controller on its own, as on the robot: its CAN bus, a router elsewhere."""
     from fleetloop.launch.agent import run_agent
 
-    _refuse_lockstep(clock)
-    changes = _changes(overrides, clock=clock, seed=seed)
+    refuse_lockstep(clock)
+    changes = overrides_of(overrides, clock=clock, seed=seed)
     raise typer.Exit(run_agent(scenario, robot, deployment, changes))
 
 
@@ -218,12 +175,12 @@ def plant(
     """Emulate drives and physics alone, in real time, for your own CAN host code."""
     from fleetloop.launch.plant import PlantOptions, run_plant
 
-    _refuse_lockstep(clock)
+    refuse_lockstep(clock)
     options = PlantOptions(
-        robots=_listed("--robots", robots),
+        robots=listed("--robots", robots),
         duration_s=duration,
         deployment=deployment,
-        overrides=_changes(overrides, clock=clock, seed=seed),
+        overrides=overrides_of(overrides, clock=clock, seed=seed),
         as_json=as_json,
         serve_stdin=stdin,
         join=join,
@@ -257,7 +214,7 @@ def check(
     elif scenario is None:
         list_scenarios(as_json=as_json)
     else:
-        changes = _changes(overrides, clock=clock, seed=seed)
+        changes = overrides_of(overrides, clock=clock, seed=seed)
         raise typer.Exit(check_scenario(scenario, changes, deployment=deployment, as_json=as_json))
 
 
@@ -315,8 +272,8 @@ def export(
     from fleetloop.terminal import say
 
     chosen = Selection(
-        signals=_listed("--signals", signals),
-        robots=_listed("--robots", robots),
+        signals=listed("--signals", signals),
+        robots=listed("--robots", robots),
         from_s=from_s,
         to_s=to_s,
     )
@@ -347,45 +304,6 @@ def init(
     from fleetloop.init import write_starter
 
     write_starter(file)
-
-
-def _listed(option: str, text: str | None) -> tuple[str, ...]:
-    """Names with commas between; none if the option wasn't given."""
-    names = tuple(filter(None, map(str.strip, (text or "").split(","))))
-    if text is not None and not names:
-        raise ScenarioError(f"{option} {text!r}: names nothing; leave it out for all")
-    return names
-
-
-def _changes(
-    overrides: list[str] | None,
-    *,
-    clock: str | None = None,
-    seed: int | None = None,
-    duration: float | None = None,
-) -> "Overrides":
-    """What options say differently from the file; each is to blame for what it says."""
-    from configs.overrides import Override
-
-    said = (
-        ("--clock", "clock.mode", clock),
-        ("--duration", "until_s", duration),
-        ("--seed", "seed", seed),
-    )
-    named = [
-        Override(f"{flag} {value:g}" if isinstance(value, float) else f"{flag} {value}", key, value)
-        for flag, key, value in said
-        if value is not None
-    ]
-    return (*(overrides or ()), *named)
-
-
-def _refuse_lockstep(clock: str | None) -> None:
-    """For what runs on its own, beside somebody else's clock."""
-    if clock not in (None, "realtime"):
-        raise ScenarioError(
-            f"--clock {clock}: what runs on its own keeps the wall clock; it must be realtime"
-        )
 
 
 def _print_version(wanted: bool) -> None:

@@ -1,4 +1,4 @@
-"""Values of options: within bounds, told in the words of this program."""
+"""Values of options: bounds, and messages in this program's wording."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""The standard streams as a process may find them: closed, not in UTF-8, read by nobody any more.
+"""The standard streams in any state: closed, not in UTF-8, or without a reader.
 
 A run outlives its terminal: what can't be said on standard error is lost, and nothing else. Results
 that can't be written are an error, unless somebody only wanted the first lines (`| head`).

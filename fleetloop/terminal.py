@@ -1,4 +1,4 @@
-"""What the operator reads: results on standard output, progress and notes on standard error.
+"""Output to the operator: results on standard output, progress and notes on standard error.
 
 On a terminal a progress bar with the real-time factor moves; elsewhere a plain line comes every few
 seconds, so that a CI log shows life and nothing else.

@@ -1,4 +1,4 @@
-"""How a role without a launcher beside it follows the one of its run: over the network.
+"""A role on another machine follows the launcher of its run over the network.
 
 The launcher's last word says why the run was ended before its time. Its token goes with it, or with
 the way to it.

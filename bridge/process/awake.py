@@ -1,4 +1,4 @@
-"""Time in which a process could see what came: deadlines that a stalled machine doesn't eat.
+"""Awake time: a clock for deadlines that stands still while the process doesn't run.
 
 Who waits looks at the clock at least every `LOOK_S`. When two looks are much further apart than
 that, the process did not run meanwhile: it was stopped (Ctrl-Z, SIGSTOP), starved of processor

@@ -1,4 +1,4 @@
-"""How a role lives as a process: brief, ready, run, stop, exit status; the same for all roles.
+"""The life of a role as a process: brief, run, stop, exit status; the same for all roles.
 
 A role's process is started by a launcher that holds three lines to it:
 

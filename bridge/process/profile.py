@@ -1,4 +1,4 @@
-"""Where a process's processor time goes: samples of its main thread, by what the code is for.
+"""A profile of a process's processor time: samples of its main thread, by part of the code.
 
 A timer that counts processor time interrupts the main thread every `SAMPLE_S`; the innermost frame
 that belongs to one of the parts says what it was doing. What other threads use is Zenoh's: it

@@ -1,4 +1,4 @@
-"""Waiting for descriptors to the microsecond, whatever their numbers are."""
+"""Waits for descriptors, to the microsecond where their numbers allow it."""
 
 import math
 import select

@@ -1,4 +1,4 @@
-"""Rate, load and nodes of a bus, from listening to it for a while.
+"""Rate, load and nodes of a bus, counted over a time.
 
     frame rate = frames / T     load = Σ bits / (T · bit rate)     T: bus time that passed [s]
 

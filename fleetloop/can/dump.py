@@ -1,4 +1,4 @@
-"""`fleetloop can dump`: what goes over buses, as candump prints it.
+"""`fleetloop can dump`: the traffic of buses, as candump prints it.
 
     console     (0000000012.345678)  r1  009   [8]  00 00 80 3F 00 00 00 00
     log (-L)   (0000000012.345678) r1 009#0000803F00000000

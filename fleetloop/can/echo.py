@@ -1,4 +1,4 @@
-"""Tells what a gateway's far bus hands back from what others say there.
+"""Distinguishes frames that a gateway's far bus hands back from frames of other nodes there.
 
 Echoes of an interface that hands back what is sent are told by `bridge.can_bus.echo`, and dropped.
 

@@ -1,4 +1,4 @@
-"""What an error frame says, in candump's words (`candump -e`; classes of Linux `can/error.h`).
+"""The content of an error frame as candump prints it (`candump -e`; Linux `can/error.h`).
 
 identifier   bit mask of error classes
 data         [0] bit of the lost arbitration, [1] controller, [2] kind of protocol violation,

@@ -1,4 +1,4 @@
-"""Which frames of a bus to show: `BUS[,filter]*` in candump's syntax and with the kernel's rules.
+"""Filters of the frames of a bus: `BUS[,filter]*` in candump's syntax and with the kernel's rules.
 
     ID:MASK   frames with  received & MASK == ID & MASK
     ID~MASK   the others

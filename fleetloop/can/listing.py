@@ -1,4 +1,4 @@
-"""`fleetloop can list`: which buses are up, who is on them, how busy they are.
+"""`fleetloop can list`: the buses that are up, their clients and drives, their load.
 
 It joins every bus for a short while and listens; that changes nothing for the run. How many clients
 a bus has is the kernel's word: connections to the bus's socket (`/proc/net/unix`).

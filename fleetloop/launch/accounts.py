@@ -1,4 +1,4 @@
-"""What the processes of a run reported at their end, put together for the summary."""
+"""The statistics of a run over processes, from the reports of its processes."""
 
 from bridge.network.reports import AgentReport, PlantReport, Report
 from bridge.process.awake import AFTERMATH_S

@@ -1,4 +1,4 @@
-"""The processes that a run starts: forked, watched for their end, and ended within a bound.
+"""The processes that a run starts: forked, observed, and ended within a bound.
 
 Only processes started here are ever signalled, by their own id. They run in their own session, so a
 Ctrl-C at the terminal reaches the launcher alone; their standard input is their lifeline.

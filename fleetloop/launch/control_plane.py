@@ -1,7 +1,8 @@
-"""The launcher's end of the control plane: tokens, progress, notices and reports of the processes.
+"""The launcher's end of the control plane: tokens, progress, notices and reports.
 
 Every message changes the account of the run (`Outcome`), the signs of life (`Vitals`) and the
-picture of the roles on other machines (`RemoteRoles`); what is malformed is counted by `Words`.
+picture of the roles on other machines (`RemoteRoles`); `MessageReader`
+counts what is malformed.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -13,10 +14,10 @@ from configs.brief import Schedule
 from configs.roles import PLANT
 from fleetloop.launch.child import Child
 from fleetloop.launch.machine import WATCH_EVERY_S
+from fleetloop.launch.message_reader import MessageReader
 from fleetloop.launch.outcome import Outcome
 from fleetloop.launch.remote_roles import RemoteRoles
 from fleetloop.launch.vitals import Vitals
-from fleetloop.launch.words import Words
 
 MAX_NOTICES = 100
 """Of each process; more would bury the others'."""
@@ -42,7 +43,7 @@ class ControlPlane:
         on_notice: Callable[[str, str], None],
     ) -> None:
         self.outcome = Outcome()
-        self.words = Words(schedule)
+        self.words = MessageReader(schedule)
         self.vitals = Vitals()
         self.remote = remote
         self.children: list[Child] = []

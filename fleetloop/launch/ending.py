@@ -1,4 +1,4 @@
-"""The end of a run over processes: all end within a bound, the record is whole, the cause is named.
+"""The end of a run over processes: within a bound, with a whole record and a named cause.
 
 The plant stops within a tick, the controllers follow it, the recorder takes what is still on its
 way; a process that doesn't end in time is killed. Roles on other machines are told why the run

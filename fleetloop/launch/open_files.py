@@ -1,4 +1,4 @@
-"""How many files a run needs open at once, and whether this user may have that many.
+"""The number of files that a run needs open at once, against this user's limit.
 
 The launcher has two pipes and a network connection for each role; the plant has two sockets for
 each bus, and one for every further client.

@@ -1,4 +1,4 @@
-"""Scenario and deployment → what each role is told of its place: buses, network, credentials."""
+"""Scenario and deployment → the place of each role: its buses, its network, its credentials."""
 
 from collections.abc import Mapping
 from dataclasses import replace

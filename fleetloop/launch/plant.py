@@ -1,4 +1,4 @@
-"""`fleetloop plant`: emulated drives and physics alone, in real time, for anybody's host code.
+"""`fleetloop plant`: emulated drives and physics alone, in real time, for the user's own host code.
 
 No controllers, no network, no countdown: the bodies are free from the start, and whoever opens a
 bus may arm its drives and drive. It ends with a signal, after `--duration`, or with its standard

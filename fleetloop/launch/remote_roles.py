@@ -1,4 +1,4 @@
-"""The roles of a run that somebody else started, as the launcher sees them: over the network.
+"""The roles of a run on other machines, as the launcher sees them over the network.
 
 waiting    no token yet                     counts against the start deadline
 there      token seen                       ends with its report, or is lost with its token

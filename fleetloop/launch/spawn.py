@@ -1,4 +1,4 @@
-"""Bring the roles of a run on this machine to life: sockets first, then a process each.
+"""Starts the roles of a run on this machine: sockets first, then a process each.
 
 Each is told, by its brief, exactly what it may know; its buses' listening sockets go to the plant.
 """

@@ -1,4 +1,4 @@
-"""Signs of life of a run's processes, as the launcher hears them: who froze, who came back.
+"""Signs of life of a run's processes, as the launcher receives them.
 
 beats     in real time every process says how far it is, several times a second
 frozen    silent for `FROZEN_S`: said once, at once, whatever the run's deadlines make of it

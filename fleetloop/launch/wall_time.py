@@ -1,4 +1,4 @@
-"""How long a run will take, roughly: said beforehand when it is long enough to be a mistake."""
+"""The expected wall time of a run, and a warning before one that takes days."""
 
 from configs.scenario import Scenario
 

@@ -1,4 +1,4 @@
-"""A file that only grows by whole pieces: what was put is all there, or nothing of it is.
+"""A file that grows by whole pieces: each is in it as a whole or not at all.
 
 A piece is appended for good, or put at the end as the tail: readable at once, and replaced by what
 is appended or put next. So what is written doesn't depend on when it was flushed.

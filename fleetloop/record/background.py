@@ -1,4 +1,4 @@
-"""A record written beside the work that fills it: compressing and writing take no time from a tick.
+"""A record written by a thread of its own: compression and disk take no time from a tick.
 
 Blocks wait in a bounded queue; who is faster than the disk waits with them. What fails in the
 background is raised by the next `add`, or by `close`.

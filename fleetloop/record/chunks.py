@@ -1,4 +1,4 @@
-"""Chunks of a record: messages of one channel with their index, made whole and checked whole.
+"""Chunks of a record: messages of one channel with their index and check sum.
 
     Chunk         times of its first and last message, CRC-32, size, zstd-compressed messages
     MessageIndex  channel; of every message its time and where it is in the chunk

@@ -1,4 +1,4 @@
-"""The beginning of a record: whose rows it holds, how they are laid out, and of which scenario.
+"""The head of a record: its robots, its layout and its scenario.
 
     magic, Header, Schema (3), Channel (3 per robot), Attachment scenario.toml, Metadata fleetloop
 

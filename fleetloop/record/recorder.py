@@ -1,4 +1,4 @@
-"""The recorder's process: hears every robot's rows and writes `record.mcap`.
+"""The recorder's process: receives every robot's rows and writes `record.mcap`.
 
 It stands apart from the lockstep path, so that neither writing nor a slow disk costs a tick, and it
 outlives the launcher for as long as it takes to complete the file. Started by `fleetloop run`.

@@ -1,4 +1,4 @@
-"""Everything that a run records: signals in `record.mcap`, each bus in `can/`."""
+"""The recordings of a run: signals in `record.mcap`, each bus in `can/`."""
 
 import contextlib
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Walk a record from its beginning and check every byte of it, up to its end or to where it is cut.
+"""Reads a record from its beginning and checks every byte, up to its end or its cut.
 
     head       its own check sum                                    `fleetloop.record.head`
     chunks     a check sum each, ticks one after the other          `fleetloop.record.chunks`

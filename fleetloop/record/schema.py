@@ -1,4 +1,4 @@
-"""What a record holds: channels, message layouts, and their schemas.
+"""The channels of a record, their message layouts and schemas.
 
     channel                    schema                          one message
     robot/<name>/plant         fleetloop_msgs/msg/Plant        a tick: the truth

@@ -1,1 +1,1 @@
-"""What a run came to: summary, tables, figures, page, export, comparison."""
+"""The results of a run: summary, tables, figures, page, export, comparison."""

@@ -1,4 +1,4 @@
-"""`fleetloop diff`: are two runs the same, bit for bit?"""
+"""`fleetloop diff`: compares two runs bit for bit."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a scenario expects, and whether it was so: only what was seen to its end has held.
+"""Expectations of a scenario against a record: one holds only if its whole window was recorded.
 
 held         the window was reached to its end by every robot that it is about, within the bounds
 FAILED       a bound was broken, or a value isn't finite; whatever the rest of the window held

@@ -1,4 +1,4 @@
-"""Where a run leaves its files: `runs/<time>-<scenario>/` or the folder that the user names."""
+"""The folder of a run's files: `runs/<time>-<scenario>/` or the folder that the user names."""
 
 import contextlib
 import os

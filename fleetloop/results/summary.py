@@ -1,4 +1,4 @@
-"""What a run came to: settle times, errors, spread, cost, and whether its expectations held."""
+"""The summary of a run: settle times, errors, spread, cost, and whether its expectations held."""
 
 import json
 import platform

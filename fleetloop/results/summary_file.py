@@ -1,4 +1,4 @@
-"""`summary.json` read back: what of it the page shows has to be there and to be what it should.
+"""`summary.json` read back and validated, as far as the page shows it.
 
 Keys that aren't named here may be there, too. What `fleetloop.results.summary` makes fits; a number
 that was none, as after a law that diverged, is null.

@@ -1,4 +1,4 @@
-"""The results of a run as the operator sees them, in the terminal and on the page."""
+"""The results of a run as tables, in the terminal and on the page."""
 
 import sys
 from collections.abc import Iterator

@@ -21,8 +21,8 @@ from bridge.process.awake import Stall
 from configs.loading import load
 from configs.resolve import schedule
 from fleetloop.launch.accounts import stats_of
+from fleetloop.launch.message_reader import MessageReader
 from fleetloop.launch.outcome import Outcome
-from fleetloop.launch.words import Words
 
 SCENARIO = load("two_robots")
 SCHEDULE = schedule(SCENARIO)
@@ -66,13 +66,13 @@ def said(process: str, changes: dict[int, object]) -> bytes:
     ],
 )
 def test_a_report_that_is_none_is_refused_and_its_sender_named(process, changes) -> None:
-    words = Words(SCHEDULE)
+    words = MessageReader(SCHEDULE)
     assert words.report(process, said(process, changes)) is None
     assert words.refusals.lines() == [f"refused 1 report of {process}: not well formed"]
 
 
 def test_no_process_can_send_the_report_of_another_role() -> None:
-    words = Words(SCHEDULE)
+    words = MessageReader(SCHEDULE)
     assert isinstance(words.report("plant", said("plant", {})), PlantReport)
     assert isinstance(words.report("agent/r1", said("agent/r1", {})), AgentReport)
     assert words.report("agent/r1", said("plant", {})) is None
@@ -80,7 +80,7 @@ def test_no_process_can_send_the_report_of_another_role() -> None:
 
 def test_what_a_terminal_would_obey_is_replaced_in_names_and_texts() -> None:
     texts = {3: ["1st\n\x1b]0;owned\x07\x9b31m\u202e2nd\x7f"], 7: {"b\x1b[2Jus": 1}}
-    report = Words(SCHEDULE).report("agent/r1", said("agent/r1", texts))
+    report = MessageReader(SCHEDULE).report("agent/r1", said("agent/r1", texts))
     assert report is not None
     assert report.notices == ("1st\n\ufffd]0;owned\ufffd\ufffd31m\ufffd2nd\ufffd",)
     assert report.durations_ns == {"b\ufffd[2Jus": 1}
@@ -142,7 +142,7 @@ def test_whatever_roles_report_arrives_and_there_are_statistics(reports) -> None
 
 @given(st.sampled_from(["plant", "recorder", "agent/r1"]), st.binary(max_size=64))
 def test_no_bytes_on_a_report_key_raise(process: str, payload: bytes) -> None:
-    Words(SCHEDULE).report(process, payload)
+    MessageReader(SCHEDULE).report(process, payload)
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def test_no_bytes_on_a_report_key_raise(process: str, payload: bytes) -> None:
     ],
 )
 def test_progress_beyond_the_run_is_refused(progress: Progress) -> None:
-    words = Words(SCHEDULE)
+    words = MessageReader(SCHEDULE)
     assert words.progress("plant", progress.encode()) is None
     (line,) = words.refusals.lines()
     assert line.startswith("refused 1 progress message of plant: ti")
@@ -166,11 +166,11 @@ def test_progress_within_the_run_is_heard() -> None:
     for tick in (-SCHEDULE.countdown_ticks, 0, SCHEDULE.ticks):
         for t_ns in (0, tick * SCHEDULE.period_ns):  # the recorder says no time
             progress = Progress(tick, t_ns, 5)
-            assert Words(SCHEDULE).progress("plant", progress.encode()) == progress
+            assert MessageReader(SCHEDULE).progress("plant", progress.encode()) == progress
 
 
 def test_what_found_no_room_is_counted_by_its_sender() -> None:
-    words = Words(SCHEDULE)
+    words = MessageReader(SCHEDULE)
     words.note_dropped([Dropped("progress", "fleetloop/run/@progress/agent/r1", 40_000)])
     assert words.refusals.lines() == [
         "refused 40000 progress messages of agent/r1: more than anybody could read"

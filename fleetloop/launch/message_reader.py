@@ -1,4 +1,4 @@
-"""What the launcher hears of a run's processes, as far as it can be: the rest is counted and named.
+"""Reads what the processes of a run send to the launcher; what can't be is counted and named.
 
 A process may say whatever it likes on its own keys, and another client with its credentials too.
 """
@@ -13,7 +13,7 @@ from bridge.network.reports import Report, decode_report
 from configs.brief import Schedule
 
 
-class Words:
+class MessageReader:
     """Reads the messages of one run."""
 
     def __init__(self, schedule: Schedule) -> None:

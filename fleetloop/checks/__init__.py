@@ -1,1 +1,0 @@
-"""What can be said of a scenario before it runs: pure checks, one subject a module."""

@@ -1,0 +1,102 @@
+"""Arguments and options that several verbs share, and what they mean for a scenario."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from configs.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from configs.overrides import Overrides
+
+
+def _shipped(incomplete: str) -> list[str]:
+    """Names of shipped scenarios that begin so, for the shell; files it completes itself."""
+    from configs.loading import shipped
+
+    return [name for name in shipped() if name.startswith(incomplete)]
+
+
+ScenarioArg = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="A scenario file, or the name of a shipped one (fleetloop check lists them).",
+        autocompletion=_shipped,
+    ),
+]
+ClockOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="lockstep|realtime",
+        help="Instead of the file's clock.mode: fast and the same bit for bit, or by the wall"
+        " clock.",
+    ),
+]
+SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Seed, instead of the file's.")]
+RunArg = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its record.mcap.")]
+PartialOption = Annotated[
+    bool,
+    typer.Option(
+        "--partial",
+        help="Take what there is of a record that is cut or damaged, up to there, with exit status"
+        " 0. Else such a record is refused: 1 if it is cut, 2 if it is damaged.",
+    ),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Override a key of the scenario, e.g. --set coordination.p=3"
+        " --set robot.r2.pose.x_m=-6.5 . May be repeated.",
+    ),
+]
+DeploymentOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--deployment",
+        metavar="FILE",
+        help="Where everything is: CAN interfaces, router, roles on other machines. Else all here.",
+    ),
+]
+
+
+def listed(option: str, text: str | None) -> tuple[str, ...]:
+    """Names with commas between; none if the option wasn't given."""
+    names = tuple(filter(None, map(str.strip, (text or "").split(","))))
+    if text is not None and not names:
+        raise ScenarioError(f"{option} {text!r}: names nothing; leave it out for all")
+    return names
+
+
+def overrides_of(
+    overrides: list[str] | None,
+    *,
+    clock: str | None = None,
+    seed: int | None = None,
+    duration: float | None = None,
+) -> "Overrides":
+    """What options say differently from the file; each is to blame for what it says."""
+    from configs.overrides import Override
+
+    said = (
+        ("--clock", "clock.mode", clock),
+        ("--duration", "until_s", duration),
+        ("--seed", "seed", seed),
+    )
+    named = [
+        Override(f"{flag} {value:g}" if isinstance(value, float) else f"{flag} {value}", key, value)
+        for flag, key, value in said
+        if value is not None
+    ]
+    return (*(overrides or ()), *named)
+
+
+def refuse_lockstep(clock: str | None) -> None:
+    """For what runs on its own, beside somebody else's clock."""
+    if clock not in (None, "realtime"):
+        raise ScenarioError(
+            f"--clock {clock}: what runs on its own keeps the wall clock; it must be realtime"
+        )
