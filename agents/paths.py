@@ -7,14 +7,14 @@
 
 Γ_0 is the path of the formation's centre, l_i the robot's offset in axes that turn with it, and
 primes are derivatives by s. A shape gives a point and its first three derivatives (a `Jet`): an
-offset that turns with the path needs θ_d0''. A new shape is one function s ↦ two jets and one line
-in `_centre_path`.
+offset that turns with the path needs θ_d0''. A shape of one's own is
+a dataclass of parameters with a method `jet(s)` that gives x and y, an offset's ahead and left.
 """
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from math import atan2, cos, sin, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from agents.laws.interface import Reference, RobotPath
 from configs.brief import (
@@ -29,6 +29,7 @@ from configs.brief import (
     VaryingOffset,
     WorldOffset,
 )
+from configs.plugins import Choice
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
@@ -65,6 +66,8 @@ def robot_path(path: ReferencePath, offset: FormationOffset) -> RobotPath:
             return _turning(centre, lambda _: rest)
         case VaryingOffset():
             return _turning(centre, _varying(offset))
+        case Choice():
+            return _turning(centre, _own(offset))
 
 
 def _reference(x: Jet, y: Jet) -> Reference:
@@ -169,6 +172,20 @@ def _centre_path(path: ReferencePath) -> _Curve:
             return _figure_eight(path)
         case SplinePath():
             return _spline(path)
+        case Choice():
+            return _own(path)
+
+
+def _own(choice: Choice) -> _Curve:
+    """A path or an offset of the user's own: `jet(s)` of its class."""
+    shape: Any = choice.parameters
+    jet = shape.jet
+
+    def at(s: float) -> PlanarJet:
+        x, y = jet(s)
+        return PlanarJet(Jet(*x), Jet(*y))
+
+    return at
 
 
 def _line(path: LinePath) -> _Curve:

@@ -98,7 +98,7 @@ class SplinePath:
     closed: bool
 
 
-ReferencePath = LinePath | CosinePath | CirclePath | FigureEightPath | SplinePath
+ReferencePath = LinePath | CosinePath | CirclePath | FigureEightPath | SplinePath | Choice
 
 
 # --- formation offsets: R(θ_d0(s)) l_i(s) of equation (1) -----------------------------------------
@@ -135,7 +135,7 @@ class VaryingOffset:
     left_coefficients: tuple[tuple[float, ...], ...]
 
 
-FormationOffset = WorldOffset | StructureOffset | VaryingOffset
+FormationOffset = WorldOffset | StructureOffset | VaryingOffset | Choice
 
 
 # --- the controller -------------------------------------------------------------------------------

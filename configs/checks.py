@@ -13,7 +13,7 @@ from configs.errors import ScenarioError
 from configs.graph import parse_edge
 from configs.plugins import Recorded
 from configs.scenario import ETSRO, Scenario
-from configs.sections import Drive, Expect
+from configs.sections import Drive, Expect, Spline, Varying
 from configs.signals import PLANT_SIGNALS, SPREAD, controller_signals
 from configs.wording import MISSING, remedy_of
 
@@ -49,11 +49,11 @@ def _names(scenario: Scenario) -> Iterator[Problem]:
         if robot.type not in known:
             remedy = f"no such robot type; known: {', '.join(sorted(known))}"
             yield Problem(f"robot.{robot.name}.type", robot.type, remedy)
-        if robot.offset.kind == "varying":
+        if isinstance(robot.offset, Varying):
             places = [knot.s_m for knot in robot.offset.knots]
             if any(b <= a for a, b in itertools.pairwise(places)):
                 yield Problem(f"robot.{robot.name}.offset.knots", places, "s_m must increase")
-    if scenario.path.kind == "spline":
+    if isinstance(scenario.path, Spline):
         points = scenario.path.points_m
         if any(a == b for a, b in itertools.pairwise(points)):
             yield Problem("path.points_m", points, "two neighbouring points are the same")

@@ -16,7 +16,16 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from configs.parameters import Parameters
-from configs.plugins import Choice, Kind, Plugin, PluginError, Recorded, find, load
+from configs.plugins import (
+    Choice,
+    Kind,
+    Plugin,
+    PluginError,
+    Recorded,
+    entry_points,
+    find,
+    load,
+)
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, ValidationError
@@ -97,6 +106,48 @@ class Chooser(NamedTuple):
         if not self.default:
             made["required"] = [self.key]
         return made
+
+
+@dataclass(frozen=True, slots=True)
+class AlsoOwn:
+    """Annotation of a union of tables told apart by a key: a class of one's own is one more."""
+
+    chooser: Chooser
+
+    def _is_own(self, value: Any) -> bool:
+        name = value.get(self.chooser.key) if isinstance(value, Mapping) else None
+        return isinstance(name, str) and (":" in name or name in entry_points(self.chooser.kind))
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: "GetCoreSchemaHandler") -> Any:
+        """Tables of the union as before, others choices."""
+        from pydantic_core import core_schema
+
+        def made(value: Any, inner: Any, info: "core_schema.ValidationInfo") -> Any:
+            if isinstance(value, Choice):
+                return value
+            context = info.context or {}
+            if self._is_own(value):
+                folder, recorded = context.get("folder", ""), context.get("recorded", False)
+                return self.chooser.choose(value, folder, recorded=recorded)
+            return inner(value)
+
+        def written(value: Any, inner: Any) -> Any:
+            own = isinstance(value, Choice)
+            return table_of(value, self.chooser.key) if own else inner(value)
+
+        return core_schema.with_info_wrap_validator_function(
+            made,
+            handler(source),
+            serialization=core_schema.wrap_serializer_function_ser_schema(written),
+        )
+
+    def __get_pydantic_json_schema__(
+        self, schema: Any, handler: "GetJsonSchemaHandler"
+    ) -> dict[str, Any]:
+        """Of a class of one's own all keys."""
+        name = {"type": "string", "pattern": ":", "description": '"module:Class" of your own'}
+        own = {"type": "object", "properties": {self.chooser.key: name}}
+        return {"anyOf": [handler(schema["schema"]), own | {"required": [self.chooser.key]}]}
 
 
 def parameters_of(plugin: Plugin) -> type[Parameters]:

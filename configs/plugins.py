@@ -244,6 +244,11 @@ class Choice:
         """As in the file."""
         return self.plugin.name
 
+    @property
+    def kind(self) -> str:
+        """The name, as shapes have theirs."""
+        return self.plugin.name
+
     def load(self) -> Any:
         """The class."""
         return load(self.plugin)

@@ -33,6 +33,7 @@ from configs.brief import (
 )
 from configs.drives import options_of
 from configs.parameters import extended
+from configs.plugins import Choice
 from configs.reach import Reach, reach_of
 from configs.scenario import Scenario
 from configs.signals import Signal, controller_signals
@@ -225,6 +226,8 @@ def leader_brief(scenario: Scenario) -> LeaderBrief:
 def reference_path(path: sections.PathShape) -> ReferencePath:
     """The centre's path as the controllers evaluate it."""
     match path:
+        case Choice():
+            return path
         case sections.Line():
             return LinePath(*path.start_m, path.heading_rad)
         case sections.Cosine():
@@ -244,6 +247,8 @@ def reference_path(path: sections.PathShape) -> ReferencePath:
 def formation_offset(offset: sections.Offset) -> FormationOffset:
     """A robot's place in the formation as its controller evaluates it."""
     match offset:
+        case Choice():
+            return offset
         case sections.World():
             return WorldOffset(offset.x_m, offset.y_m)
         case sections.Structure():

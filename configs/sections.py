@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from annotated_types import Ge, Gt, Le, Len
 
 from configs import patterns
-from configs.choices import Changes, Chooser
+from configs.choices import AlsoOwn, Changes, Chooser
 from configs.parameters import (
     MOST_S,
     Finite,
@@ -103,7 +103,14 @@ class Spline(Parameters):
     closed: bool = False
 
 
-PathShape = Annotated[Line | Cosine | Circle | FigureEight | Spline, Tagged("kind")]
+if TYPE_CHECKING:
+    PathShape = Line | Cosine | Circle | FigureEight | Spline | Choice
+else:
+    PathShape = Annotated[
+        Line | Cosine | Circle | FigureEight | Spline,
+        Tagged("kind"),
+        AlsoOwn(Chooser(Kind.PATH, "kind", {})),
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,7 +148,14 @@ class Varying(Parameters):
     knots: Annotated[tuple[Knot, ...], Len(2, 200)]
 
 
-Offset = Annotated[World | Structure | Varying, Tagged("kind")]
+if TYPE_CHECKING:
+    Offset = World | Structure | Varying | Choice
+else:
+    Offset = Annotated[
+        World | Structure | Varying,
+        Tagged("kind"),
+        AlsoOwn(Chooser(Kind.OFFSET, "kind", {})),
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,16 +13,19 @@ from math import cos, hypot, inf, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.laws.interface import RobotPath
+from agents.laws.build import failure
+from agents.laws.interface import Reference, RobotPath
 from agents.paths import robot_path
 from configs.brief import WorldOffset
 from configs.checks import Problem
 from configs.complaints import refusal
+from configs.errors import ScenarioError
 from configs.loading import blamed
 from configs.overrides import Overrides
+from configs.plugins import Choice
 from configs.resolve import formation_offset, reference_path
 from configs.scenario import Scenario
-from configs.sections import Robot
+from configs.sections import Robot, Spline
 from fleetloop.check.coordination import Forecast
 
 Series = NDArray[np.float64]
@@ -62,7 +65,25 @@ def courses(scenario: Scenario, ahead: Forecast) -> list[Course]:
 
 def path_of(scenario: Scenario, robot: Robot) -> RobotPath:
     """The path Γ_i of a robot."""
-    return robot_path(reference_path(scenario.path), formation_offset(robot.offset))
+    path = robot_path(reference_path(scenario.path), formation_offset(robot.offset))
+    own = [one for one in (scenario.path, robot.offset) if isinstance(one, Choice)]
+    return _named(path, robot.name, own) if own else path
+
+
+def _named(path: RobotPath, robot: str, own: Sequence[Choice]) -> RobotPath:
+    """A path whose errors name whose code it is."""
+
+    def at(s: float) -> Reference:
+        try:
+            return path(s)
+        except ZeroDivisionError:  # it stands still there
+            raise
+        except Exception as error:
+            names = " and ".join(one.name for one in own)
+            why = failure(error)[1]
+            raise ScenarioError(f"{robot}'s path, of {names}, at s = {s:.4g} m: {why}") from error
+
+    return at
 
 
 def refuse_irregular(
@@ -125,14 +146,18 @@ def _irregular(scenario: Scenario, robot: Robot, at: float) -> Problem:
     speed, _ = _speed_and_heading(centre, at)
     if speed < STANDS_STILL:
         remedy = f"the path stands still at s = {at:.4g} m; {law}"
-        if scenario.path.kind == "spline":
+        if isinstance(scenario.path, Spline):
             value: object = scenario.path.points_m
             return Problem("path.points_m", value, f"{remedy}: don't turn back on a point")
+        if isinstance(scenario.path, Choice):
+            return Problem("path.kind", scenario.path.name, remedy)
         return Problem("path", asdict(scenario.path), remedy)
     turn = abs(centre(at).omega_bar)
     remedy = f"{robot.name}'s path stands still at s = {at:.4g} m; {law}"
     if turn > 0.0:
         remedy += f": keep the offset off the path's centre of curvature, {speed / turn:.4g} m away"
+    if isinstance(robot.offset, Choice):
+        return Problem(f"robot.{robot.name}.offset.kind", robot.offset.name, remedy)
     offset = asdict(robot.offset)
     kind = offset.pop("kind")
     if kind == "structure":

@@ -23,6 +23,7 @@ FROM_AFAR = 'endpoint="tls/lab:7447"'
 FIXTURE = "(fleetloop_plant):"
 SERIAL = 'can.Bus(interface="slcan"'
 POSES = "motion_capture()"  # in test_real_robot.py
+OWN = "# my_law.py", "# my_shapes.py"  # in test_own_laws.py
 
 
 def shown(mark: str) -> list[Snippet]:
@@ -33,7 +34,7 @@ def shown(mark: str) -> list[Snippet]:
 
 def test_every_program_that_is_shown_is_tried_here() -> None:
     for snippet in snippets("python"):
-        marks = (LISTENS, FROM_AFAR, FIXTURE, SERIAL, POSES)
+        marks = (LISTENS, FROM_AFAR, FIXTURE, SERIAL, POSES, *OWN)
         assert sum(mark in snippet.text for mark in marks) == 1, snippet.where
 
 

@@ -1,0 +1,141 @@
+"""A law, a path shape and an offset in files of the user's own: those of docs/own-laws.md.
+
+Nothing is installed: the files are beside the scenario, and processes import them from there.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.processes import completed
+from support.snippets import snippets
+
+from fleetloop.record.reader import Record
+
+pytestmark = pytest.mark.system
+FILES = ("my_law.py", "my_shapes.py", "own.toml")
+QUICK = ("--duration", "1", "--allow-unchecked")
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """The folder of the page's files."""
+    for name in FILES:
+        (text,) = (s.text for s in snippets("python", "toml") if s.text.startswith(f"# {name}\n"))
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def fleetloop(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "fleetloop", *words],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+
+
+def replaced(folder: Path, name: str, old: str, new: str) -> None:
+    text = (folder / name).read_text()
+    assert old in text
+    (folder / name).write_text(text.replace(old, new, 1))
+
+
+def test_the_page_holds_what_it_expects(own: Path) -> None:
+    done = fleetloop(own, "run", "own.toml", "--in-process", "--out", "a")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "held         distance_m of r1, r2" in done.stdout
+
+
+def test_processes_import_the_files_and_leave_the_same_record(own: Path) -> None:
+    scenario = str(own / "own.toml")
+    assert completed(own / "a", scenario, "--in-process", *QUICK)[0] == 0
+    assert completed(own / "b", scenario, *QUICK)[0] == 0
+    done = fleetloop(own, "diff", "a", "b")
+    assert (done.returncode, done.stdout.partition(":")[0]) == (0, "identical"), done.stdout
+
+
+def test_a_record_is_read_without_the_files(own: Path) -> None:
+    assert completed(own / "a", str(own / "own.toml"), "--in-process", *QUICK)[0] == 0
+    for name in FILES:
+        (own / name).unlink()
+    assert fleetloop(own, "report", "a").returncode == 0
+    assert fleetloop(own, "diff", "a", "a").returncode == 0
+    done = fleetloop(own, "export", "a", "a.npz", "--signals", "distance_m,x_e_m,y_e_m,kappa_hat")
+    assert done.returncode == 0, done.stderr
+    table = np.load(own / "a.npz")
+    r1, r3 = (table["robot"] == robot for robot in ("r1", "r3"))
+    off = np.hypot(table["x_e_m"][r1], table["y_e_m"][r1])
+    assert np.allclose(table["distance_m"][r1], off, rtol=0.0, atol=1e-12)
+    assert np.isnan(table["distance_m"][r3]).all()
+    assert np.isnan(table["kappa_hat"][r1]).all()
+    assert np.isfinite(table["kappa_hat"][r3]).all()
+    assert "distance_m" in (Record.open(own / "a/record.mcap").controller["r1"].dtype.names or ())
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "said"),
+    [
+        ("own.toml", "k_x_1_s", "k_z_1_s", "control.k_z_1_s = 2.5: unknown key; did you mean k_"),
+        ("own.toml", "k_x_1_s = 2.5", "k_x_1_s = -1", "k_x_1_s = -1: must be greater than 0"),
+        ("own.toml", "b_m = 2.5", "b_m = 'x'", 'own.toml: path.b_m = "x": must be a number'),
+        ("own.toml", "left_m = 0.8", "lef = 1.0", "robot.r2.offset.left_m = (missing): must be"),
+        ("own.toml", "my_law:Unicycle", "my_law:Bicycle", "my_law.py has no Bicycle; it has"),
+        ("own.toml", "my_law:Unicycle", "no_law:Unicycle", "no no_law.py in"),
+        ("own.toml", "my_law:Unicycle", "unicycl", 'control.law = "unicycl": no such law'),
+        ("own.toml", "my_shapes:Ellipse", "my_shapes:cos", "my_shapes.py: cos is no path shape"),
+        ("own.toml", 'signal = "distance_m"', 'signal = "distanc_m"', "did you mean distance_m?"),
+        (
+            "own.toml",
+            '"adaptive_dsc_robust"',
+            '"fixed_dsc", k5 = 1',
+            "robot.r3.control.k5 = 1: un",
+        ),
+        ("my_law.py", "import cos, hypot", "import coz, hypot", "my_law.py, line 4: ImportError"),
+        ("my_law.py", "class State", "class class", ": invalid syntax"),
+        ("my_law.py", "class Unicycle(Law)", "class Unicycle", "it has no hold"),
+        ("my_law.py", '"distance_m"', '"x_m"', "SIGNALS: x_m is recorded of every robot already"),
+        ("my_law.py", "k_v_N_m_s: Positive", "law: Positive", "law is the key that names the law"),
+    ],
+)
+def test_what_is_wrong_is_said_before_the_run(
+    own: Path, name: str, old: str, new: str, said: str
+) -> None:
+    if new == "class Unicycle":  # what it would have from Law
+        replaced(own, name, "    def hold", "    def held")
+    replaced(own, name, old, new)
+    done = fleetloop(own, "run", "own.toml", "--in-process", *QUICK)
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("new", "said"),
+    [
+        (
+            "(hypot(dx, dy),) if along.s < 0.01 else None[0]",
+            ": TypeError: 'NoneType'",
+        ),
+        ("(hypot(dx, dy),) if along.s < 0.01 else ()", "step returned 0 signals, SIGNALS has 1"),
+        ("(hypot(dx, dy),)) if along.s < 0.01 else (1, 2", "step must return (tau_right"),
+        ("(hypot(dx, dy) / (along.s < 0.01),)", "diverged at s = 0.01"),
+    ],
+)
+def test_a_law_that_fails_stops_its_own_robots_and_no_other(own: Path, new: str, said: str) -> None:
+    replaced(own, "my_law.py", "(hypot(dx, dy),)", new)
+    done = fleetloop(own, "run", "own.toml", "--force", "--out", "a", *QUICK)
+    assert "STOPPED r1" in done.stdout
+    assert said in " ".join(done.stdout.split())
+    assert "STOPPED r3" not in done.stdout
+    record = Record.open(own / "a/record.mcap")
+    assert len(record.controller["r1"]) == len(record.controller["r3"]) == 1000
+
+
+def test_a_law_that_asks_for_no_number_stops_its_robot(own: Path) -> None:
+    replaced(own, "my_law.py", "LawOutput(push + turn", "LawOutput(float('nan')")
+    done = fleetloop(own, "run", "own.toml", "--force", "--in-process", *QUICK)
+    assert "torque that is not finite" in done.stdout
