@@ -2,7 +2,7 @@
 
 import difflib
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import ceil, floor, inf
 from typing import NamedTuple
 
@@ -81,18 +81,25 @@ def _laws(scenario: Scenario) -> Iterator[Problem]:
                 yield Problem(key, value, remedy_of(item))
 
 
-def _expectable(scenario: Scenario) -> list[str]:
-    """Signals that an expectation may be about; nothing if a law isn't here, of a record."""
-    known = {SPREAD, *(signal.name for signal in PLANT_SIGNALS)}
+def _expectable(scenario: Scenario, robots: Sequence[str]) -> list[str]:
+    """Signals that all of these robots have, or some robot if none is named.
+
+    Nothing if a law isn't here, of a record.
+    """
+    every = {SPREAD, *(signal.name for signal in PLANT_SIGNALS)}
+    tables = []
     for robot in scenario.robot:
+        if robots and robot.name not in robots:
+            continue
         try:
             control = scenario.control_of(robot)
         except ValidationError:  # said already
             continue
         if isinstance(control.parameters, Recorded):
             return []
-        known |= {signal.name for signal in controller_signals(control.load().SIGNALS)}
-    return sorted(known)
+        tables.append({s.name for s in controller_signals(control.load().SIGNALS)})
+    of_all = set.intersection if robots else set.union
+    return sorted(every | of_all(*tables)) if tables else []
 
 
 def _periods(scenario: Scenario) -> Iterator[Problem]:
@@ -259,8 +266,8 @@ def _host(scenario: Scenario) -> Iterator[Problem]:
 
 
 def _expects(scenario: Scenario) -> Iterator[Problem]:
-    known = _expectable(scenario)
     for n, expect in enumerate(scenario.expect):
+        known = _expectable(scenario, expect.robots or ())
         where = f"expect.{n}"
         if known and expect.signal not in known:
             close = difflib.get_close_matches(expect.signal, known, 1, cutoff=0.5)

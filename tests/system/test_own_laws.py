@@ -94,6 +94,7 @@ def test_a_record_is_read_without_the_files(own: Path) -> None:
             '"fixed_dsc", k5 = 1',
             "robot.r3.control.k5 = 1: un",
         ),
+        ("own.toml", '"r1", "r2"]', '"r1", "r3"]', 'signal = "distance_m": no such signal'),
         ("my_law.py", "import cos, hypot", "import coz, hypot", "my_law.py, line 4: ImportError"),
         ("my_law.py", "class State", "class class", ": invalid syntax"),
         ("my_law.py", "class Unicycle(Law)", "class Unicycle", "it has no hold"),
