@@ -17,7 +17,7 @@ from math import atan2, cos, sin, sqrt
 from typing import Any, NamedTuple
 
 from agents.laws.interface import Reference, RobotPath
-from configs.brief import (
+from configs.curves import (
     CirclePath,
     CosinePath,
     FigureEightPath,

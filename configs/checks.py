@@ -11,9 +11,13 @@ from pydantic import ValidationError
 from configs.drives import options_of
 from configs.errors import ScenarioError
 from configs.graph import parse_edge
+from configs.paths import Spline, Varying
 from configs.plugins import Recorded
 from configs.scenario import ETSRO, Scenario
-from configs.sections import Drive, Expect, Spline, Varying
+from configs.sections import (
+    Drive,
+    Expect,
+)
 from configs.signals import PLANT_SIGNALS, SPREAD, controller_signals
 from configs.wording import MISSING, remedy_of
 

@@ -6,38 +6,27 @@ from configs import sections
 from configs.brief import (
     OURS,
     AgentBrief,
-    CirclePath,
-    CosinePath,
     DriveLink,
     DriveModel,
-    FigureEightPath,
-    FormationOffset,
     HostLimits,
     LeaderBrief,
-    LinePath,
     MotorModel,
     NetworkLink,
     PlantBrief,
     PowertrainModel,
-    ReferencePath,
     RobotBrief,
     Schedule,
     Settings,
-    SplinePath,
-    StructureOffset,
-    VaryingOffset,
     WheelDisturbance,
     Wheels,
     WireModel,
-    WorldOffset,
 )
+from configs.curves import formation_offset, reference_path
 from configs.drives import options_of
 from configs.parameters import extended
-from configs.plugins import Choice
 from configs.reach import Reach, reach_of
 from configs.scenario import Scenario
 from configs.signals import Signal, controller_signals
-from configs.splines import Ends, chord_lengths, quintic_spline
 
 ENCODER_AGE_LIMIT_S = 0.05
 """Machines that are no real-time machines stand still for 10 ms now and then; drives' watchdogs
@@ -221,43 +210,6 @@ def leader_brief(scenario: Scenario) -> LeaderBrief:
     leader = scenario.leader
     later = tuple((round(step.t_s * 1e9), step.speed_m_s) for step in leader.steps)
     return LeaderBrief(((0, leader.speed_m_s), *later))
-
-
-def reference_path(path: sections.PathShape) -> ReferencePath:
-    """The centre's path as the controllers evaluate it."""
-    match path:
-        case Choice():
-            return path
-        case sections.Line():
-            return LinePath(*path.start_m, path.heading_rad)
-        case sections.Cosine():
-            return CosinePath(*path.start_m, path.amplitude_m, path.wavenumber_rad_m)
-        case sections.Circle():
-            return CirclePath(*path.centre_m, path.radius_m, path.start_angle_rad, path.clockwise)
-        case sections.FigureEight():
-            return FigureEightPath(*path.centre_m, path.half_length_m, path.half_width_m)
-        case sections.Spline():
-            points = [*path.points_m, path.points_m[0]] if path.closed else list(path.points_m)
-            knots = chord_lengths(points)
-            ends: Ends = "periodic" if path.closed else "natural"
-            x, y = (quintic_spline(knots, [point[n] for point in points], ends) for n in (0, 1))
-            return SplinePath(knots, x, y, path.closed)
-
-
-def formation_offset(offset: sections.Offset) -> FormationOffset:
-    """A robot's place in the formation as its controller evaluates it."""
-    match offset:
-        case Choice():
-            return offset
-        case sections.World():
-            return WorldOffset(offset.x_m, offset.y_m)
-        case sections.Structure():
-            return StructureOffset(offset.ahead_m, offset.left_m)
-        case sections.Varying():
-            knots = tuple(knot.s_m for knot in offset.knots)
-            ahead = quintic_spline(knots, [knot.ahead_m for knot in offset.knots], "clamped")
-            left = quintic_spline(knots, [knot.left_m for knot in offset.knots], "clamped")
-            return VaryingOffset(knots, ahead, left)
 
 
 def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief:

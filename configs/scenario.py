@@ -14,6 +14,7 @@ from configs.choices import chosen_anew
 from configs.graph import Graph, generated, parse_edge, random_rooted
 from configs.host import Host
 from configs.parameters import Name, Seconds, Seed, changed
+from configs.paths import Cosine, PathShape
 from configs.plugins import Choice
 from configs.powertrain import Encoder, Motor, Supply
 from configs.sections import (
@@ -23,7 +24,6 @@ from configs.sections import (
     Clock,
     Control,
     Coordination,
-    Cosine,
     Disturbance,
     Drive,
     Expect,
@@ -32,7 +32,6 @@ from configs.sections import (
     Localisation,
     Mounting,
     Network,
-    PathShape,
     Robot,
 )
 

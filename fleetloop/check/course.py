@@ -16,16 +16,18 @@ from numpy.typing import NDArray
 from agents.laws.build import failure
 from agents.laws.interface import Reference, RobotPath
 from agents.paths import robot_path
-from configs.brief import WorldOffset
 from configs.checks import Problem
 from configs.complaints import refusal
+from configs.curves import WorldOffset, formation_offset, reference_path
 from configs.errors import ScenarioError
 from configs.loading import blamed
 from configs.overrides import Overrides
+from configs.paths import Spline
 from configs.plugins import Choice
-from configs.resolve import formation_offset, reference_path
 from configs.scenario import Scenario
-from configs.sections import Robot, Spline
+from configs.sections import (
+    Robot,
+)
 from fleetloop.check.coordination import Forecast
 
 Series = NDArray[np.float64]

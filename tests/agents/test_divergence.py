@@ -13,7 +13,8 @@ from support.robot_bench import SCENARIO, ZERO, Bench, set_points
 from agents.guard import Phase
 from agents.laws.dsc_terms import Projection
 from bridge.network.messages import PathState
-from configs.brief import NetworkLink, SplinePath, WorldOffset
+from configs.brief import NetworkLink
+from configs.curves import SplinePath, WorldOffset
 from configs.plugins import LAWS
 from configs.resolve import agent_brief
 from configs.sections import LAW

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.paths import RobotPath, robot_path
-from configs import brief as b
+from configs import curves as b
+from configs.curves import formation_offset, reference_path
 from configs.loading import load
-from configs.resolve import formation_offset, reference_path
 
 AT_REST = b.WorldOffset(0.0, 0.0)
 GATE = load("spline_gate")

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from configs import brief
+from configs import brief, curves
 from configs.parameters import Parameters
 from configs.scenario import Scenario
 
@@ -59,8 +59,9 @@ SECTIONS = {
 KEYS = {field.name for section in SECTIONS for field in dataclasses.fields(section)}
 BRIEFS = [
     kind
-    for _, kind in inspect.getmembers(brief, dataclasses.is_dataclass)
-    if kind.__module__ == brief.__name__
+    for module in (brief, curves)
+    for _, kind in inspect.getmembers(module, dataclasses.is_dataclass)
+    if kind.__module__ == module.__name__
 ]
 
 

@@ -7,9 +7,10 @@ import pytest
 from agents.laws.adaptive_dsc import AdaptiveDsc, DscState
 from agents.laws.interface import PathVariable, Reference, RobotMotion
 from agents.paths import robot_path
-from configs.brief import NetworkLink, WorldOffset
+from configs.brief import NetworkLink
+from configs.curves import WorldOffset, reference_path
 from configs.loading import load
-from configs.resolve import agent_brief, plant_brief, reference_path
+from configs.resolve import agent_brief, plant_brief
 from plant.body import RigidBody, State
 from plant.integrate import rk4
 

@@ -12,9 +12,10 @@ from agents.laws.dsc_terms import path_errors
 from agents.laws.fixed_dsc import PAPER_THETA, FixedDsc
 from agents.laws.interface import PathVariable, RobotMotion, Wheels
 from agents.paths import robot_path
-from configs.brief import NetworkLink, WorldOffset
+from configs.brief import NetworkLink
+from configs.curves import WorldOffset, reference_path
 from configs.loading import load
-from configs.resolve import plant_brief, reference_path
+from configs.resolve import plant_brief
 from fleetloop.check.loop import true_theta
 from plant.body import RigidBody, State
 from plant.integrate import rk4

@@ -1,0 +1,120 @@
+"""Sections [path] and [robot.offset]: the shapes that are shipped, and shapes of the user's own.
+
+A section is what the file says; `configs.curves` has what controllers evaluate.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from annotated_types import Len
+
+from configs.choices import AlsoOwn, Chooser
+from configs.parameters import Finite, Parameters, Point, Positive, Tagged
+from configs.plugins import Choice, Kind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line(Parameters):
+    """A straight line."""
+
+    kind: Literal["line"]
+    start_m: Point = (0.0, 0.0)
+    heading_rad: Finite = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cosine(Parameters):
+    """x = start + s, y = start + amplitude cos(wavenumber s)."""
+
+    kind: Literal["cosine"]
+    start_m: Point = (0.0, 0.0)
+    amplitude_m: Finite = 1.0
+    wavenumber_rad_m: Positive = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Circle(Parameters):
+    """A circle, s in metres of arc."""
+
+    kind: Literal["circle"]
+    centre_m: Point = (0.0, 0.0)
+    radius_m: Positive
+    start_angle_rad: Finite = 0.0
+    clockwise: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FigureEight(Parameters):
+    """The lemniscate of Gerono."""
+
+    kind: Literal["figure_eight"]
+    centre_m: Point = (0.0, 0.0)
+    half_length_m: Positive
+    half_width_m: Positive
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spline(Parameters):
+    """A quintic spline through points; s is the length of the polygon through them."""
+
+    kind: Literal["spline"]
+    points_m: Annotated[tuple[Point, ...], Len(2, 200)]
+    closed: bool = False
+
+
+if TYPE_CHECKING:
+    PathShape = Line | Cosine | Circle | FigureEight | Spline | Choice
+else:
+    PathShape = Annotated[
+        Line | Cosine | Circle | FigureEight | Spline,
+        Tagged("kind"),
+        AlsoOwn(Chooser(Kind.PATH, "kind", {})),
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World(Parameters):
+    """Offset fixed in world axes."""
+
+    kind: Literal["world"]
+    x_m: Finite = 0.0
+    y_m: Finite = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Structure(Parameters):
+    """Offset fixed in the axes of the formation, which turn with the path."""
+
+    kind: Literal["structure"]
+    ahead_m: Finite = 0.0
+    left_m: Finite = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Knot(Parameters):
+    """Offset at one place of the path."""
+
+    s_m: Finite
+    ahead_m: Finite
+    left_m: Finite
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Varying(Parameters):
+    """Offset that changes along the path, smoothly through these knots and constant outside."""
+
+    kind: Literal["varying"]
+    knots: Annotated[tuple[Knot, ...], Len(2, 200)]
+
+
+if TYPE_CHECKING:
+    Offset = World | Structure | Varying | Choice
+else:
+    Offset = Annotated[
+        World | Structure | Varying,
+        Tagged("kind"),
+        AlsoOwn(Chooser(Kind.OFFSET, "kind", {})),
+    ]
+
+AT_CENTRE = World(kind="world")
+"""The offset of a robot that has none."""
