@@ -24,7 +24,7 @@ from configs.errors import ExitStatus, ScenarioError
 from fleetloop.can import error_frames, filters, text
 from fleetloop.can.client import Heard, Listener, open_bus
 from fleetloop.can.filters import Filter
-from fleetloop.launch.signals import interruptible
+from fleetloop.signals import interruptible
 from fleetloop.streams import forget_output
 from fleetloop.terminal import note
 

@@ -25,7 +25,7 @@ from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.echo import EchoGuard
 from fleetloop.can.far_bus import FarBus
-from fleetloop.launch.signals import interruptible
+from fleetloop.signals import interruptible
 from fleetloop.terminal import note, say
 
 SEND_S = 0.01

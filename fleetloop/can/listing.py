@@ -15,7 +15,7 @@ from bridge.process.clock import SYSTEM_CLOCK
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.census import Census, Node
 from fleetloop.can.client import Listener, open_bus
-from fleetloop.launch.signals import interruptible
+from fleetloop.signals import interruptible
 from fleetloop.terminal import note, say
 
 _CONNECTED = "03"

@@ -13,7 +13,7 @@ from bridge.process.clock import SYSTEM_CLOCK
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can import text
 from fleetloop.can.client import open_bus
-from fleetloop.launch.signals import interruptible
+from fleetloop.signals import interruptible
 
 FULL_S = 2.0
 """How long a full bus may take to have room again."""

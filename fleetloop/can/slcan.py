@@ -22,7 +22,7 @@ from bridge.can_bus.pythoncan import to_frame, to_message
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.slcan_adapter import Adapter
-from fleetloop.launch.signals import interruptible
+from fleetloop.signals import interruptible
 from fleetloop.terminal import note, say
 
 KEPT_BYTES = 64 * 1024

@@ -18,7 +18,7 @@ from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, si
 from configs.scenario import Scenario
 from configs.signals import Signal
 from fleetloop.check.finding import Finding
-from fleetloop.launch.in_process import InProcessRun
+from fleetloop.in_process import InProcessRun
 from fleetloop.record.writer import Source
 from fleetloop.settling import LOST_M, SETTLE_BAND
 

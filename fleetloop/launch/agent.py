@@ -18,7 +18,7 @@ from configs.overrides import Overrides
 from configs.resolve import agent_brief
 from configs.roles import AGENT
 from fleetloop.launch import placement
-from fleetloop.launch.signals import stop_on_signals
+from fleetloop.signals import stop_on_signals
 from fleetloop.terminal import note
 
 

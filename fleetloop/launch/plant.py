@@ -36,7 +36,7 @@ from configs.roles import PLANT
 from configs.scenario import Scenario
 from configs.signals import PLANT_SIGNALS
 from fleetloop.launch import open_files, placement
-from fleetloop.launch.signals import stop_on_signals
+from fleetloop.signals import stop_on_signals
 from fleetloop.terminal import note, say
 from plant.__main__ import PLANT_PRIORITY, join
 from plant.__main__ import run as plant_of_a_run

@@ -18,11 +18,10 @@ from configs.roles import short_name
 from configs.scenario import Scenario
 from fleetloop.check.examine import examine
 from fleetloop.check.finding import likewise, titled, worst
+from fleetloop.in_process import InProcessRun
 from fleetloop.launch import placement, wall_time
 from fleetloop.launch.accounts import stats_of
-from fleetloop.launch.in_process import InProcessRun
 from fleetloop.launch.process_run import ProcessRun
-from fleetloop.launch.signals import stop_on_signals
 from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.reader import Record
 from fleetloop.record.run_record import RunRecord
@@ -31,6 +30,7 @@ from fleetloop.results import run_folder
 from fleetloop.results.expectations import out_of_reach
 from fleetloop.results.summary import RunStats, Summary, summarise, to_json
 from fleetloop.results.tables import print_report, print_results
+from fleetloop.signals import stop_on_signals
 from fleetloop.terminal import RunProgress, note, say_json
 
 EXIT_STATUS = {

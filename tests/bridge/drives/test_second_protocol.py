@@ -14,7 +14,7 @@ from configs.resolve import agent_brief, leader_brief, plant_brief, robot_briefs
 from configs.signals import PLANT_SIGNALS
 from fleetloop.can.census import Census, Node
 from fleetloop.check.bus_load import bus_messages
-from fleetloop.launch.in_process import InProcessRun
+from fleetloop.in_process import InProcessRun
 
 OWN = "support.second_drive:ROW"
 NETWORK = NetworkLink("t", "", "", "")
