@@ -17,18 +17,8 @@ from math import atan2, cos, sin, sqrt
 from typing import Any, NamedTuple
 
 from agents.laws.interface import Reference, RobotPath
-from configs.curves import (
-    CirclePath,
-    CosinePath,
-    FigureEightPath,
-    FormationOffset,
-    LinePath,
-    ReferencePath,
-    SplinePath,
-    StructureOffset,
-    VaryingOffset,
-    WorldOffset,
-)
+from configs.curves import FormationOffset, ReferencePath, SplinePath, VaryingOffset
+from configs.paths import Circle, Cosine, FigureEight, Line, Structure, World
 from configs.plugins import Choice
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
@@ -55,14 +45,15 @@ _Curve = Callable[[float], PlanarJet]
 
 def robot_path(path: ReferencePath, offset: FormationOffset) -> RobotPath:
     """The path Γ_i of one robot as a function of its path variable."""
-    if isinstance(path, CosinePath) and isinstance(offset, WorldOffset):
+    if isinstance(path, Cosine) and isinstance(offset, World):
         return _shifted_cosine(path, offset)
     centre = _centre_path(path)
     match offset:
-        case WorldOffset(x_m, y_m):
-            return _shifted(centre, x_m, y_m)
-        case StructureOffset(ahead_m, left_m):
-            rest = PlanarJet(Jet(ahead_m, 0.0, 0.0, 0.0), Jet(left_m, 0.0, 0.0, 0.0))
+        case World():
+            return _shifted(centre, offset.x_m, offset.y_m)
+        case Structure():
+            ahead = Jet(offset.ahead_m, 0.0, 0.0, 0.0)
+            rest = PlanarJet(ahead, Jet(offset.left_m, 0.0, 0.0, 0.0))
             return _turning(centre, lambda _: rest)
         case VaryingOffset():
             return _turning(centre, _varying(offset))
@@ -79,9 +70,9 @@ def _reference(x: Jet, y: Jet) -> Reference:
 # --- offsets --------------------------------------------------------------------------------------
 
 
-def _shifted_cosine(path: CosinePath, offset: WorldOffset) -> RobotPath:
+def _shifted_cosine(path: Cosine, offset: World) -> RobotPath:
     """The paper's case, written out: it is evaluated at every tick."""
-    x_0, y_0 = path.start_x_m + offset.x_m, path.start_y_m + offset.y_m
+    x_0, y_0 = path.start_m[0] + offset.x_m, path.start_m[1] + offset.y_m
     a, k = path.amplitude_m, path.wavenumber_rad_m
     ak, akk = a * k, a * k * k
 
@@ -162,13 +153,13 @@ def _varying(offset: VaryingOffset) -> _Curve:
 
 def _centre_path(path: ReferencePath) -> _Curve:
     match path:
-        case LinePath():
+        case Line():
             return _line(path)
-        case CosinePath():
+        case Cosine():
             return _cosine(path)
-        case CirclePath():
+        case Circle():
             return _circle(path)
-        case FigureEightPath():
+        case FigureEight():
             return _figure_eight(path)
         case SplinePath():
             return _spline(path)
@@ -188,47 +179,47 @@ def _own(choice: Choice) -> _Curve:
     return at
 
 
-def _line(path: LinePath) -> _Curve:
+def _line(path: Line) -> _Curve:
     c, n = cos(path.heading_rad), sin(path.heading_rad)
 
+    x_0, y_0 = path.start_m
+
+    def at(s: float) -> PlanarJet:
+        return PlanarJet(Jet(x_0 + s * c, c, 0.0, 0.0), Jet(y_0 + s * n, n, 0.0, 0.0))
+
+    return at
+
+
+def _cosine(path: Cosine) -> _Curve:
     def at(s: float) -> PlanarJet:
         return PlanarJet(
-            Jet(path.start_x_m + s * c, c, 0.0, 0.0), Jet(path.start_y_m + s * n, n, 0.0, 0.0)
+            Jet(path.start_m[0] + s, 1.0, 0.0, 0.0),
+            _add(path.start_m[1], _wave(path.amplitude_m, path.wavenumber_rad_m, s, 1)),
         )
 
     return at
 
 
-def _cosine(path: CosinePath) -> _Curve:
-    def at(s: float) -> PlanarJet:
-        return PlanarJet(
-            Jet(path.start_x_m + s, 1.0, 0.0, 0.0),
-            _add(path.start_y_m, _wave(path.amplitude_m, path.wavenumber_rad_m, s, 1)),
-        )
-
-    return at
-
-
-def _circle(path: CirclePath) -> _Curve:
+def _circle(path: Circle) -> _Curve:
     rate = (-1.0 if path.clockwise else 1.0) / path.radius_m
 
     def at(s: float) -> PlanarJet:
         turned = s + path.start_angle_rad / rate
         return PlanarJet(
-            _add(path.centre_x_m, _wave(path.radius_m, rate, turned, 1)),
-            _add(path.centre_y_m, _wave(path.radius_m, rate, turned, 0)),
+            _add(path.centre_m[0], _wave(path.radius_m, rate, turned, 1)),
+            _add(path.centre_m[1], _wave(path.radius_m, rate, turned, 0)),
         )
 
     return at
 
 
-def _figure_eight(path: FigureEightPath) -> _Curve:
+def _figure_eight(path: FigureEight) -> _Curve:
     rate = 1.0 / path.half_length_m
 
     def at(s: float) -> PlanarJet:
         return PlanarJet(
-            _add(path.centre_x_m, _wave(path.half_length_m, rate, s, 0)),
-            _add(path.centre_y_m, _wave(path.half_width_m, 2.0 * rate, s, 0)),
+            _add(path.centre_m[0], _wave(path.half_length_m, rate, s, 0)),
+            _add(path.centre_m[1], _wave(path.half_width_m, 2.0 * rate, s, 0)),
         )
 
     return at

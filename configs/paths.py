@@ -1,6 +1,7 @@
 """Sections [path] and [robot.offset]: the shapes that are shipped, and shapes of the user's own.
 
-A section is what the file says; `configs.curves` has what controllers evaluate.
+Γ_0(s) and l_i(s) of equation (1). Splines become coefficients for the controllers in
+`configs.curves`; all others reach them as they stand here.
 """
 
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from configs.plugins import Choice, Kind
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line(Parameters):
-    """A straight line."""
+    """A straight line: Γ_0(s) = start + s (cos heading, sin heading)."""
 
     kind: Literal["line"]
     start_m: Point = (0.0, 0.0)
@@ -24,7 +25,7 @@ class Line(Parameters):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cosine(Parameters):
-    """x = start + s, y = start + amplitude cos(wavenumber s)."""
+    """A cosine along world x: Γ_0(s) = start + (s, amplitude cos(wavenumber s))."""
 
     kind: Literal["cosine"]
     start_m: Point = (0.0, 0.0)
@@ -34,7 +35,10 @@ class Cosine(Parameters):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Circle(Parameters):
-    """A circle, s in metres of arc."""
+    """A circle, s in metres of arc: Γ_0(s) = centre + radius (cos φ, sin φ).
+
+    φ = start_angle ± s / radius; + is counter-clockwise.
+    """
 
     kind: Literal["circle"]
     centre_m: Point = (0.0, 0.0)
@@ -45,7 +49,10 @@ class Circle(Parameters):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FigureEight(Parameters):
-    """The lemniscate of Gerono."""
+    """The lemniscate of Gerono: Γ_0(s) = centre + (half_length sin φ, half_width sin 2φ).
+
+    φ = s / half_length.
+    """
 
     kind: Literal["figure_eight"]
     centre_m: Point = (0.0, 0.0)
@@ -74,7 +81,7 @@ else:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class World(Parameters):
-    """Offset fixed in world axes."""
+    """Offset fixed in world axes: R(θ_d0) l_i = (x, y), as in the paper's section 4."""
 
     kind: Literal["world"]
     x_m: Finite = 0.0
@@ -83,7 +90,10 @@ class World(Parameters):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Structure(Parameters):
-    """Offset fixed in the axes of the formation, which turn with the path."""
+    """Offset fixed in the axes of the formation, which turn with the path: l_i = (ahead, left).
+
+    `ahead` is along the tangent of the path.
+    """
 
     kind: Literal["structure"]
     ahead_m: Finite = 0.0

@@ -18,11 +18,11 @@ from agents.laws.interface import Reference, RobotPath
 from agents.paths import robot_path
 from configs.checks import Problem
 from configs.complaints import refusal
-from configs.curves import WorldOffset, formation_offset, reference_path
+from configs.curves import formation_offset, reference_path
 from configs.errors import ScenarioError
 from configs.loading import blamed
 from configs.overrides import Overrides
-from configs.paths import Spline
+from configs.paths import AT_CENTRE, Spline
 from configs.plugins import Choice
 from configs.scenario import Scenario
 from configs.sections import (
@@ -144,7 +144,7 @@ def slowest_place(path: RobotPath, places: Sequence[float]) -> tuple[float, floa
 def _irregular(scenario: Scenario, robot: Robot, at: float) -> Problem:
     """What to change: the offset, unless the centre's own path stands still there."""
     law = "the law wants v̄_d > 0 everywhere (Assumption 2.4)"
-    centre = robot_path(reference_path(scenario.path), WorldOffset(0.0, 0.0))
+    centre = robot_path(reference_path(scenario.path), AT_CENTRE)
     speed, _ = _speed_and_heading(centre, at)
     if speed < STANDS_STILL:
         remedy = f"the path stands still at s = {at:.4g} m; {law}"

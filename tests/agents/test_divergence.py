@@ -14,7 +14,8 @@ from agents.guard import Phase
 from agents.laws.dsc_terms import Projection
 from bridge.network.messages import PathState
 from configs.brief import NetworkLink
-from configs.curves import SplinePath, WorldOffset
+from configs.curves import SplinePath
+from configs.paths import AT_CENTRE
 from configs.plugins import LAWS
 from configs.resolve import agent_brief
 from configs.sections import LAW
@@ -32,7 +33,7 @@ def rows_of(bench: Bench) -> list[dict[str, float]]:
 
 def test_a_path_that_stands_still_stops_the_robot_and_names_the_place() -> None:
     path = SplinePath((0.0, 1.0), STANDSTILL, STANDSTILL, closed=False)
-    bench = Bench("r2", path=path, offset=WorldOffset(0.0, 0.0))
+    bench = Bench("r2", path=path, offset=AT_CENTRE)
     bench.run(bench.schedule.countdown_ticks)
     for _ in range(50):
         assert set_points(bench.tick()) in ([ZERO, ZERO], [])

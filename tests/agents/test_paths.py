@@ -1,5 +1,6 @@
 """Reference paths against closed forms and finite differences."""
 
+from dataclasses import replace
 from math import cos, hypot, pi, sin
 
 import pytest
@@ -7,24 +8,24 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.paths import RobotPath, robot_path
-from configs import curves as b
+from configs import paths
 from configs.curves import formation_offset, reference_path
 from configs.loading import load
 
-AT_REST = b.WorldOffset(0.0, 0.0)
 GATE = load("spline_gate")
 
+CIRCLE = paths.Circle(kind="circle", centre_m=(1.0, -1.0), radius_m=3.0, start_angle_rad=0.4)
 PATHS = {
-    "line": b.LinePath(1.0, 2.0, 0.7),
-    "cosine": b.CosinePath(-3.5, 0.0, 1.0, 1.0),
-    "circle": b.CirclePath(1.0, -1.0, 3.0, 0.4, clockwise=False),
-    "clockwise": b.CirclePath(1.0, -1.0, 3.0, 0.4, clockwise=True),
-    "eight": b.FigureEightPath(0.0, 0.0, 3.0, 1.5),
+    "line": paths.Line(kind="line", start_m=(1.0, 2.0), heading_rad=0.7),
+    "cosine": paths.Cosine(kind="cosine", start_m=(-3.5, 0.0)),
+    "circle": CIRCLE,
+    "clockwise": replace(CIRCLE, clockwise=True),
+    "eight": paths.FigureEight(kind="figure_eight", half_length_m=3.0, half_width_m=1.5),
     "spline": reference_path(GATE.path),
 }
 OFFSETS = {
-    "world": b.WorldOffset(0.3, -2.0),
-    "structure": b.StructureOffset(0.5, -0.4),
+    "world": paths.World(kind="world", x_m=0.3, y_m=-2.0),
+    "structure": paths.Structure(kind="structure", ahead_m=0.5, left_m=-0.4),
     "varying": formation_offset(GATE.robot[0].offset),
 }
 
@@ -56,21 +57,21 @@ def test_heading_and_rates_are_the_derivatives_of_the_position(
 
 
 def test_the_papers_path_is_a_cosine_shifted_by_the_offset() -> None:
-    at = robot_path(PATHS["cosine"], b.WorldOffset(0.0, 2.0))(1.25)
+    at = robot_path(PATHS["cosine"], paths.World(kind="world", y_m=2.0))(1.25)
     assert (at.x, at.y) == pytest.approx((1.25 - 3.5, cos(1.25) + 2.0))
 
 
 def test_a_circle_is_run_at_one_metre_of_arc_per_unit_of_s() -> None:
-    at = robot_path(PATHS["circle"], AT_REST)
+    at = robot_path(PATHS["circle"], paths.AT_CENTRE)
     assert at(0.7).v_bar == pytest.approx(1.0)
     assert at(0.7).omega_bar == pytest.approx(1 / 3)
-    assert robot_path(PATHS["clockwise"], AT_REST)(0.7).omega_bar == pytest.approx(-1 / 3)
+    assert robot_path(PATHS["clockwise"], paths.AT_CENTRE)(0.7).omega_bar == pytest.approx(-1 / 3)
     lap = at(6 * pi)
     assert (lap.x, lap.y) == pytest.approx((at(0.0).x, at(0.0).y))
 
 
 def test_on_a_circle_a_robot_to_the_left_runs_a_smaller_one() -> None:
-    at = robot_path(PATHS["circle"], b.StructureOffset(0.0, 1.0))
+    at = robot_path(PATHS["circle"], paths.Structure(kind="structure", left_m=1.0))
     for s in (0.0, 2.0, 9.0):
         here = at(s)
         assert hypot(here.x - 1.0, here.y + 1.0) == pytest.approx(2.0)
@@ -78,7 +79,7 @@ def test_on_a_circle_a_robot_to_the_left_runs_a_smaller_one() -> None:
 
 
 def test_a_world_offset_moves_the_path_and_nothing_else() -> None:
-    plain, moved = (robot_path(PATHS["eight"], o) for o in (AT_REST, OFFSETS["world"]))
+    plain, moved = (robot_path(PATHS["eight"], o) for o in (paths.AT_CENTRE, OFFSETS["world"]))
     for s in (0.0, 1.0, 5.0):
         assert moved(s).x - plain(s).x == pytest.approx(0.3)
         assert moved(s).y - plain(s).y == pytest.approx(-2.0)
@@ -86,7 +87,7 @@ def test_a_world_offset_moves_the_path_and_nothing_else() -> None:
 
 
 def test_a_varying_offset_has_its_knots_values_and_is_constant_outside() -> None:
-    line = b.LinePath(0.0, 0.0, 0.0)  # on it, the axes of the structure are the world's
+    line = paths.Line(kind="line")  # on it, the axes of the structure are the world's
     at = robot_path(line, OFFSETS["varying"])
     for knot in GATE.robot[0].offset.knots:
         here = at(knot.s_m)
@@ -96,12 +97,12 @@ def test_a_varying_offset_has_its_knots_values_and_is_constant_outside() -> None
 
 
 def test_a_closed_spline_comes_back_and_an_open_one_goes_on_straight() -> None:
-    closed = robot_path(PATHS["spline"], AT_REST)
+    closed = robot_path(PATHS["spline"], paths.AT_CENTRE)
     length = PATHS["spline"].knots_m[-1]
     assert closed(1.0 + length)[:2] == pytest.approx(closed(1.0)[:2])
     text = ("path={kind='spline', points_m=[[0,0],[5,0],[10,1]]}",)
     path = reference_path(load("two_robots", text).path)
-    straight = robot_path(path, AT_REST)
+    straight = robot_path(path, paths.AT_CENTRE)
     end = path.knots_m[-1]
     a, c, e = straight(end), straight(end + 1.0), straight(end + 2.0)
     assert (e.x - c.x, e.y - c.y) == pytest.approx((c.x - a.x, c.y - a.y))

@@ -31,14 +31,7 @@ RESOLVED = {
     "RobotBrief": {"bus", "right_node", "left_node", "v_m_s", "omega_rad_s"},
     "Wheels": {"radius_m", "half_track_m"},
     "Schedule": {"tick_deadline_s", "start_deadline_s"},
-    # Curves, their points apart and their splines as coefficients.
-    "LinePath": {"heading_rad"},
-    "CosinePath": {"amplitude_m", "wavenumber_rad_m"},
-    "CirclePath": {"radius_m", "start_angle_rad", "clockwise"},
-    "FigureEightPath": {"half_length_m", "half_width_m"},
     "SplinePath": {"closed"},
-    "WorldOffset": {"x_m", "y_m"},
-    "StructureOffset": {"ahead_m", "left_m"},
 }
 """Values that have the name of a key of the file and are settled for one robot or process: of the
 robot's own table or the fleet's, of a preset, of the section that another inherits from."""

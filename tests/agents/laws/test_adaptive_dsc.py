@@ -8,8 +8,9 @@ from agents.laws.adaptive_dsc import AdaptiveDsc, DscState
 from agents.laws.interface import PathVariable, Reference, RobotMotion
 from agents.paths import robot_path
 from configs.brief import NetworkLink
-from configs.curves import WorldOffset, reference_path
+from configs.curves import reference_path
 from configs.loading import load
+from configs.paths import World
 from configs.resolve import agent_brief, plant_brief
 from plant.body import RigidBody, State
 from plant.integrate import rk4
@@ -18,14 +19,14 @@ NOWHERE = NetworkLink("test", "", "", "")
 PAPER = load("paper")
 BRIEF = agent_brief(PAPER, "r1", network=NOWHERE, bus=())
 H = 0.001
-NO_PATH = robot_path(reference_path(PAPER.path), WorldOffset(0.0, 2.0))
+NO_PATH = robot_path(reference_path(PAPER.path), World(kind="world", y_m=2.0))
 NAMES = [signal.name for signal in AdaptiveDsc.SIGNALS]
 
 
 def drive(law, state: State, seconds: float, speed: float = 0.6):
     """Follow the paper's path at a constant ṡ; the last output."""
     robot = RigidBody(plant_brief(PAPER, network=NOWHERE).robots[0].body, NO_DISTURBANCE)
-    path = robot_path(reference_path(PAPER.path), WorldOffset(0.0, 2.0))
+    path = robot_path(reference_path(PAPER.path), World(kind="world", y_m=2.0))
     memory = output = None
     for k in range(int(seconds / H)):
         sense = RobotMotion(state.x, state.y, state.theta, state.v, state.omega)

@@ -9,8 +9,9 @@ from agents.laws.adaptive_dsc_robust import AdaptiveDscRobust
 from agents.laws.interface import PathVariable, RobotMotion
 from agents.paths import robot_path
 from configs.brief import NetworkLink
-from configs.curves import WorldOffset, reference_path
+from configs.curves import reference_path
 from configs.loading import load
+from configs.paths import AT_CENTRE
 from configs.resolve import agent_brief, plant_brief
 from plant.body import RigidBody, State
 from plant.integrate import rk4
@@ -34,7 +35,7 @@ def final_errors(scenario, seed: int) -> tuple[float, float]:
     brief = agent_brief(scenario, "r1", network=NOWHERE, bus=())
     plant = plant_brief(scenario, network=NOWHERE).robots[0]
     robot = RigidBody(plant.body, plant.disturbance)
-    path = robot_path(reference_path(scenario.path), WorldOffset(0.0, 0.0))
+    path = robot_path(reference_path(scenario.path), AT_CENTRE)
     h = scenario.clock.control_period_s
     law = law_of(brief, path, h)
     far, where = 3.0 * draw.random() ** 0.5, draw.uniform(-pi, pi)
@@ -67,7 +68,7 @@ def test_it_tracks_from_any_start_within_three_metres(name: str) -> None:
 
 def test_far_off_the_path_the_approach_speed_is_bounded() -> None:
     brief = agent_brief(load("realtime_100hz"), "r1", network=NOWHERE, bus=())
-    path = robot_path(reference_path(load("realtime_100hz").path), WorldOffset(0.0, 0.0))
+    path = robot_path(reference_path(load("realtime_100hz").path), AT_CENTRE)
     law = law_of(brief, path, 0.01)
     out = law(None, RobotMotion(-500.0, 0.0, 0.0, 0.0, 0.0), path(0.0), 0.0)
     signals = dict(zip(NAMES, out.signals, strict=True))
@@ -77,7 +78,7 @@ def test_far_off_the_path_the_approach_speed_is_bounded() -> None:
 
 def test_estimates_hold_still_while_a_wheel_is_at_its_limit() -> None:
     brief = agent_brief(load("realtime_100hz"), "r1", network=NOWHERE, bus=())
-    path = robot_path(reference_path(load("realtime_100hz").path), WorldOffset(0.0, 0.0))
+    path = robot_path(reference_path(load("realtime_100hz").path), AT_CENTRE)
     law = law_of(brief, path, 0.01)
     first = law(None, RobotMotion(-9.0, 3.0, 1.0, 5.0, -9.0), path(0.0), 0.6)
     again = law(first.state, RobotMotion(-9.0, 3.0, 1.0, 5.0, -9.0), path(0.0), 0.6)

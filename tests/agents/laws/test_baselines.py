@@ -13,8 +13,9 @@ from agents.laws.fixed_dsc import PAPER_THETA, FixedDsc
 from agents.laws.interface import PathVariable, RobotMotion, Wheels
 from agents.paths import robot_path
 from configs.brief import NetworkLink
-from configs.curves import WorldOffset, reference_path
+from configs.curves import reference_path
 from configs.loading import load
+from configs.paths import World
 from configs.resolve import plant_brief
 from fleetloop.check.loop import true_theta
 from plant.body import RigidBody, State
@@ -25,7 +26,7 @@ PLANT = plant_brief(PAPER, network=NetworkLink("test", "", "", "")).robots[0]
 BODY = RigidBody(PLANT.body, PLANT.disturbance)
 WHEELS = Wheels(0.04, 0.1)
 H = 0.001
-PATH = robot_path(reference_path(PAPER.path), WorldOffset(0.0, 2.0))
+PATH = robot_path(reference_path(PAPER.path), World(kind="world", y_m=2.0))
 START = State(-8.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
