@@ -13,7 +13,7 @@ import can
 
 from agents.agent import Agent
 from agents.guard import Phase
-from agents.lockstep import LockstepCounters, LockstepLoop, give
+from agents.lockstep import LockstepCounters, LockstepLoop, deliver
 from agents.realtime import RealtimeCounters, RealtimeLoop
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import open_bus, to_message
@@ -40,7 +40,7 @@ from configs.brief import AgentBrief
 from configs.errors import FleetloopError, InfrastructureError
 from configs.roles import AGENT
 
-NEWEST = 64
+REALTIME_DEPTH = 64
 """In real time, messages of each neighbour that wait: the newest wins."""
 CONTROLLER_PRIORITY = 40
 """SCHED_FIFO, below the plant's: the drives answer whoever computes."""
@@ -53,7 +53,7 @@ def run(brief: AgentBrief, stop: Stop) -> str:
     """
     name_process(f"agent {brief.robot}")
     try:
-        depth = NEWEST if brief.schedule.realtime else POLLED_DEPTH
+        depth = REALTIME_DEPTH if brief.schedule.realtime else POLLED_DEPTH
         link = open_polled(brief.network, brief.schedule.start_deadline_s, stop, depth=depth)
     except StoppedError:
         return stop.reason
@@ -87,11 +87,11 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> str:
     hellos.add(path, agent.share(-1).encode())
     hellos.add(telemetry, Rows(0, 0, b"", False).encode())
     run_loop = _realtime if brief.schedule.realtime else _lockstep
-    wired = _Wired(agent, bus, link, path, hellos, rows, report)
-    return run_loop(wired, stop)
+    connections = _Connections(agent, bus, link, path, hellos, rows, report)
+    return run_loop(connections, stop)
 
 
-class _Wired(NamedTuple):
+class _Connections(NamedTuple):
     """A controller with all that it talks to."""
 
     agent: Agent
@@ -110,7 +110,7 @@ class _Wired(NamedTuple):
             self.hellos,
             take,
             self.agent.missing_to_start,
-            who=brief.robot,
+            name=brief.robot,
             within_s=brief.schedule.start_deadline_s,
             stop=stop,
         )
@@ -151,8 +151,8 @@ class _Wired(NamedTuple):
                 durations_ns=counters.durations_ns()
                 | {"processor": processor_wait_ns() - waited_ns},
                 profile_ns=sampler.nanoseconds(),
-                stop_reason=guard.stopped_because,
-                stop_tick=guard.stopped_tick,
+                stop_reason=guard.stop_reason,
+                stop_tick=guard.stop_tick,
                 deadlines=counters.deadlines(),
             )
             self.report.put(report.encode())
@@ -163,37 +163,50 @@ class _Wired(NamedTuple):
         """Whatever ended the loop before its time: what disarms the drives, if it can be sent."""
         if self.agent.phase is Phase.DONE:
             return
-        for can_id, data in self.agent.leave():
+        for can_id, data in self.agent.shut_down():
             with suppress(can.CanError, OSError):
                 self.bus.send(to_message(can_id, data))
         with suppress(can.CanError, OSError):
             self.bus.recv(0.0)  # what was gathered goes out
 
 
-def _lockstep(wired: _Wired, stop: Stop) -> str:
-    bus = wired.bus
+def _lockstep(connections: _Connections, stop: Stop) -> str:
+    bus = connections.bus
     if not isinstance(bus, FleetloopBus):
-        raise InfrastructureError(f"{wired.agent.brief.robot}: only a bus of ours can set the pace")
-    loop = LockstepLoop(wired.agent, bus, wired.link, wired.path, wired.hellos)
-    wired.await_peers(loop.take, stop)
+        raise InfrastructureError(
+            f"{connections.agent.brief.robot}: only a bus of ours can set the pace"
+        )
+    loop = LockstepLoop(
+        connections.agent, bus, connections.link, connections.path, connections.hellos
+    )
+    connections.await_peers(loop.on_arrival, stop)
     first = loop.await_first_frame(stop)
     if first is None:
         return stop.reason
     settle_memory()
-    return wired.run(partial(loop.run, first, stop), stop, loop.counters)
+    return connections.run(partial(loop.run, first, stop), stop, loop.counters)
 
 
-def _realtime(wired: _Wired, stop: Stop) -> str:
-    brief = wired.agent.brief
-    beat = wired.link.publisher(keys.progress(brief.network.run, AGENT.process(brief.robot)))
-    loop = RealtimeLoop(wired.agent, wired.bus, wired.link, wired.path, wired.hellos, beat)
-    wired.await_peers(lambda arrival: (give(wired.agent, arrival), None)[1], stop)
+def _realtime(connections: _Connections, stop: Stop) -> str:
+    brief = connections.agent.brief
+    progress = connections.link.publisher(
+        keys.progress(brief.network.run, AGENT.process(brief.robot))
+    )
+    loop = RealtimeLoop(
+        connections.agent,
+        connections.bus,
+        connections.link,
+        connections.path,
+        connections.hellos,
+        progress,
+    )
+    connections.await_peers(lambda arrival: (deliver(connections.agent, arrival), None)[1], stop)
     settle_memory()
     missing = go_realtime(CONTROLLER_PRIORITY)
     epoch_ns = loop.await_go(stop)
     if epoch_ns is None:
         return stop.reason
-    return wired.run(partial(loop.run, epoch_ns, stop), stop, loop.counters, missing)
+    return connections.run(partial(loop.run, epoch_ns, stop), stop, loop.counters, missing)
 
 
 def _serve(brief: AgentBrief, stop: Stop) -> None:

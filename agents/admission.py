@@ -24,7 +24,7 @@ from configs.reach import within_world
 
 LOCALISATION = "the localisation system"
 LEADER = "the leader"
-MOST_LATE = 5000
+LATE_MESSAGES_TOLERATED = 5000
 """Messages from before the run that may still have been on their way when it began."""
 _AHEAD_TICKS = LEAD_TICKS + 2
 """A state is said a tick before it is due, and this robot may be between two ticks."""
@@ -47,9 +47,9 @@ class Admission:
         self._ahead_ns = round(brief.coordination.ahead_limit_s * 1e9) + 2 * schedule.period_ns
         self._old_ns = round(brief.coordination.silence_limit_s * 1e9)
         self._newest_ns: dict[str, int] = {}
-        self._late_by: Counter[str] = Counter()
+        self._late_count: Counter[str] = Counter()
 
-    def path(self, robot: str, state: PathState) -> bool:
+    def admits_path_state(self, robot: str, state: PathState) -> bool:
         """Whether a path state may be used."""
         if state.tick < 0 <= self.tick:
             return self._late(robot)
@@ -63,7 +63,7 @@ class Admission:
             self._newest_ns[robot] = state.t_ns
         return True
 
-    def pose(self, fix: PoseFix) -> bool:
+    def admits_pose(self, fix: PoseFix) -> bool:
         """Whether a pose may be used."""
         if fix.tick < 0 <= self.tick:
             return self._late(LOCALISATION)
@@ -77,7 +77,7 @@ class Admission:
             self._newest_ns[LOCALISATION] = fix.t_ns
         return True
 
-    def leader(self, speed: LeaderSpeed) -> bool:
+    def admits_leader_speed(self, speed: LeaderSpeed) -> bool:
         """Whether a leader's speed may be used."""
         for _, value in speed.steps:
             if far := self._reach.too_fast(value, "v_r"):
@@ -87,8 +87,8 @@ class Admission:
 
     def _late(self, sender: str) -> bool:
         """Refuse what was said before the run; more than can have been on its way is a flood."""
-        self._late_by[sender] += 1
-        if self._late_by[sender] > MOST_LATE:
+        self._late_count[sender] += 1
+        if self._late_count[sender] > LATE_MESSAGES_TOLERATED:
             self.refusals.note("message", sender, "start", "dated before the run, which goes on")
         return False
 

@@ -30,7 +30,7 @@ from typing import Any
 
 from agents.admission import Admission
 from agents.coordination import CoordinationState, Coordinator
-from agents.guard import WHOLE, Guard, Phase, TorqueOutcome
+from agents.guard import UNCHANGED, Guard, Phase, TorqueOutcome
 from agents.laws.build import build, failure
 from agents.laws.interface import PathVariable, Reference, RobotMotion
 from agents.limits import EncoderCheck
@@ -45,7 +45,7 @@ from configs.brief import AgentBrief
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 DIVERGED = (ArithmeticError, ValueError)
 """What arithmetic raises where it ends: overflow, division by zero, the sine of infinity."""
-_NOWHERE = Reference(nan, nan, nan, nan, nan)
+_NO_REFERENCE = Reference(nan, nan, nan, nan, nan)
 POSE_HISTORY_TICKS = 64
 """In real time, a fix may be this old: the odometry since is known."""
 
@@ -73,19 +73,19 @@ class Agent:
         self._coordinator = Coordinator(brief.coordination, self._h, brief.hears_leader)
         start = brief.coordination
         self._coordination = CoordinationState(start.v_hat_0, start.mu_0, brief.s_0)
-        self.heard_since = self._drives.heard_since
+        self.feedback_since = self._drives.feedback_since
         """Whether both encoder frames came after a bus time [ns]."""
-        self._astray = False  # the path variable would be beyond reach
+        self._diverged = False  # the path variable would be beyond reach
         self.admission = self._admission = Admission(brief)
         """What is believed of what arrives, and what was refused."""
         self._reach = brief.reach
         self._leader: LeaderSpeed | None = None
         self._start_fix: PoseFix | None = None
         self._fixes: dict[int, PoseFix] = {}  # by tick, until due
-        self._states: dict[int, dict[str, PathState]] = {}  # by tick, until due
-        self._unheard = set(brief.hears)
-        self._at_once = brief.schedule.realtime
-        self._encoders = EncoderCheck(brief.host.encoder_mismatch_limit_wheel_rad, self._h)
+        self._path_states: dict[int, dict[str, PathState]] = {}  # by tick, until due
+        self._awaited = set(brief.hears)
+        self._realtime = brief.schedule.realtime
+        self._encoder_check = EncoderCheck(brief.host.encoder_mismatch_limit_wheel_rad, self._h)
         fused = brief.localisation == "fused"
         self._pose_mismatch_m = brief.host.pose_mismatch_limit_m if fused else inf
         self.last_tick = brief.schedule.ticks
@@ -94,7 +94,7 @@ class Agent:
         """Whether the closing tick has come."""
         self.late_s = self.round_trip_s = 0.0
         """What the loop measured of the clock at this tick, for the record."""
-        self.hear = self._drives.hear
+        self.on_frame = self._drives.on_frame
         """Take one frame from the bus: identifier, data, bus time [ns] at which it came."""
 
     @property
@@ -104,28 +104,28 @@ class Agent:
 
     # --- what arrives ------------------------------------------------------------------------
 
-    def take_pose(self, fix: PoseFix) -> None:
+    def receive_pose(self, fix: PoseFix) -> None:
         """Take a pose from the localisation system; ticks below 0: where the robot starts."""
-        if not self._admission.pose(fix):
+        if not self._admission.admits_pose(fix):
             return
         if fix.tick < 0:
             self._start_fix = fix
         else:
             self._fixes[fix.tick] = fix
 
-    def take_path(self, robot: str, state: PathState) -> None:
+    def receive_path_state(self, robot: str, state: PathState) -> None:
         """Take what an in-neighbour says of its path variable; ticks below 0: where it starts."""
-        if not self._admission.path(robot, state):
+        if not self._admission.admits_path_state(robot, state):
             return
-        self._unheard.discard(robot)
-        if state.tick < 0 or self._at_once:
-            self._neighbours.hear(robot, state.t_ns, state.s, state.v_hat)
+        self._awaited.discard(robot)
+        if state.tick < 0 or self._realtime:
+            self._neighbours.receive(robot, state.t_ns, state.s, state.v_hat)
         else:
-            self._states.setdefault(state.tick, {})[robot] = state
+            self._path_states.setdefault(state.tick, {})[robot] = state
 
-    def take_leader(self, speed: LeaderSpeed) -> None:
+    def receive_leader_speed(self, speed: LeaderSpeed) -> None:
         """Take the virtual leader's speed, now and to come."""
-        if self._admission.leader(speed):
+        if self._admission.admits_leader_speed(speed):
             self._leader = speed
 
     def refusals(self) -> list[str]:
@@ -138,7 +138,7 @@ class Agent:
 
     def missing_to_start(self) -> list[str]:
         """Whom the robot has to hear before the run, and has not yet."""
-        missing = [f"the path variable of {robot}" for robot in sorted(self._unheard)]
+        missing = [f"the path variable of {robot}" for robot in sorted(self._awaited)]
         if self._start_fix is None:
             missing.append("the localisation system")
         if self._leader is None and self.brief.hears_leader:
@@ -152,7 +152,7 @@ class Agent:
         if self._schedule.localises(pose_tick) and pose_tick not in self._fixes:
             missing.append("pose")
         if self._schedule.shares(tick):
-            heard = self._states.get(tick, {})
+            heard = self._path_states.get(tick, {})
             missing += [f"path state of {r}" for r in self.brief.hears if r not in heard]
         return missing
 
@@ -170,63 +170,63 @@ class Agent:
             InfrastructureError: the drives were not armed when control had to start.
         """
         self._admission.tick = tick
-        motion = self._drives.motion()
-        if motion is None:
+        wheel_motion = self._drives.motion()
+        if wheel_motion is None:
             return self._guard.arm(tick)
-        sense = self._localiser.wheels(*motion)
-        if self._encoders.active:
-            self._guard.note_doubt("encoders", self._encoders(motion))
+        motion = self._localiser.wheels(*wheel_motion)
+        if self._encoder_check.active:
+            self._guard.note_fault("encoders", self._encoder_check(wheel_motion))
         if tick <= 0:
             if self._start_fix is not None:
                 start = self._start_fix
-                sense = self._localiser.fix(start.x_m, start.y_m, start.theta_rad)
+                motion = self._localiser.fix(start.x_m, start.y_m, start.theta_rad)
             if tick < 0:
                 return self._guard.arm(tick)
-        if self._at_once:
-            sense = self._take_newest(tick, sense)
+        if self._realtime:
+            motion = self._apply_newest_fix(tick, motion)
         elif self._schedule.owes(tick):
-            sense = self._take_due(tick, sense)
+            motion = self._apply_due(tick, motion)
         if tick >= self.last_tick:
             self.closed = True
-            return self._guard.leave()
+            return self._guard.shut_down()
         if not self._guard.begun:
             self._guard.begin(tick)
-        return self._control(tick, sense)
+        return self._control(tick, motion)
 
-    def _take_due(self, tick: int, sense: RobotMotion) -> RobotMotion:
+    def _apply_due(self, tick: int, motion: RobotMotion) -> RobotMotion:
         """Use what is due at this tick, in the order of names whatever the order of arrival."""
-        for robot, state in sorted(self._states.pop(tick, {}).items()):
-            self._neighbours.hear(robot, state.t_ns, state.s, state.v_hat)
+        for robot, state in sorted(self._path_states.pop(tick, {}).items()):
+            self._neighbours.receive(robot, state.t_ns, state.s, state.v_hat)
         fix = self._fixes.pop(tick - self._pose_delay, None)
         if fix is None:
-            return sense
-        return self._fix(tick, fix, self._pose_delay, sense)
+            return motion
+        return self._apply_fix(tick, fix, self._pose_delay, motion)
 
-    def _take_newest(self, tick: int, sense: RobotMotion) -> RobotMotion:
+    def _apply_newest_fix(self, tick: int, motion: RobotMotion) -> RobotMotion:
         """In real time: use the newest fix, as old as it is, unless it is too old to place."""
         if not self._fixes:
-            return sense
+            return motion
         fix = self._fixes[max(self._fixes)]
         self._fixes.clear()
         ago = max(tick - fix.tick, 0)
         if ago > POSE_HISTORY_TICKS:
-            return sense
-        return self._fix(tick, fix, ago, sense)
+            return motion
+        return self._apply_fix(tick, fix, ago, motion)
 
-    def _fix(self, tick: int, fix: PoseFix, ago: int, carried: RobotMotion) -> RobotMotion:
+    def _apply_fix(self, tick: int, fix: PoseFix, ago: int, carried: RobotMotion) -> RobotMotion:
         """Use a fix of some ticks ago; `carried` is where the ones before have been carried on."""
         try:
-            sense = self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad, ago)
+            motion = self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad, ago)
         except DIVERGED:  # it is not of this world: like none at all
             return carried
         self._guard.note_pose(tick - ago)
         if self._pose_mismatch_m < inf:
-            apart_m = hypot(sense.x - carried.x, sense.y - carried.y)
+            apart_m = hypot(motion.x - carried.x, motion.y - carried.y)
             far = apart_m > self._pose_mismatch_m
-            self._guard.note_doubt(
+            self._guard.note_fault(
                 "pose", f"pose and odometry are {apart_m:.2g} m apart" if far else None
             )
-        return sense
+        return motion
 
     def _control(self, tick: int, motion: RobotMotion) -> Sequence[Frame]:
         """The coordination and the law at one tick; where either diverges the robot stops."""
@@ -234,7 +234,7 @@ class Agent:
         v_hat, mu, s = coordination = self._coordination
         s_dot = mu + v_hat
         n, sum_s, sum_v = self._neighbours.sums(t_ns)
-        v_r = self._leader.at(t_ns) if self._leader is not None else 0.0
+        v_r = self._leader.speed_at(t_ns) if self._leader is not None else 0.0
         after = self._coordinator.advance(coordination, n, sum_s, sum_v, v_r)
         along = _new(PathVariable, (s, s_dot, (after[0] + after[1] - s_dot) / self._h))
         guard = self._guard
@@ -242,37 +242,37 @@ class Agent:
             reference = self._path(s)
             out = self._law_step(self._law_state, motion, reference, along)
         except Exception as error:  # whatever a law or a path raises ends this robot's motion only
-            reference, signals = _NOWHERE, self._no_signals
+            reference, signals = _NO_REFERENCE, self._no_signals
             how, why = failure(error)
-            frames = guard.act(tick, nan, nan, f"the law {how} at s = {s:.4g} m: {why}")
+            frames = guard.command(tick, nan, nan, f"the law {how} at s = {s:.4g} m: {why}")
         else:
             signals = tuple(out[3])
-            frames = guard.act(tick, out[0], out[1])
+            frames = guard.command(tick, out[0], out[1])
         outcome = guard.outcome
-        if outcome is WHOLE:
+        if outcome is UNCHANGED:
             self._law_state = out.state
         elif outcome is TorqueOutcome.LIMITED:
             self._law_state = self._law_hold(self._law_state, out.state)
-        elif outcome is TorqueOutcome.ANEW:
+        elif outcome is TorqueOutcome.RESTARTED:
             self._law_state = None
-        self._go_on(t_ns * 1e-9 + self._h, after)
+        self._accept_path_variable(t_ns * 1e-9 + self._h, after)
         x_d, y_d, theta_d, _, _ = reference
         used = (t_ns * 1e-9, *motion, s, s_dot, mu, v_hat, n, x_d, y_d, theta_d)
         sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
         self._rows.add(tick, (*used, *signals, *sent))
         return frames
 
-    def _go_on(self, t_s: float, after: CoordinationState) -> None:
+    def _accept_path_variable(self, t_s: float, after: CoordinationState) -> None:
         """Take the next path variable; one beyond reach is not taken, and the robot stops."""
         v_hat, mu, s = after
         far = self._reach.beyond(t_s, s, v_hat if isfinite(mu) else mu)
         if far is None:
             self._coordination = after
-        if (far is None) is self._astray:
-            self._astray = far is not None
+        if (far is None) is self._diverged:
+            self._diverged = far is not None
             trouble = None if far is None else f"its path variable diverged: {far}"
-            self._guard.note_doubt("path variable", trouble)
+            self._guard.note_fault("path variable", trouble)
 
-    def leave(self) -> Sequence[Frame]:
+    def shut_down(self) -> Sequence[Frame]:
         """Disarm for good: told to stop before the closing tick."""
-        return self._guard.leave()
+        return self._guard.shut_down()

@@ -14,28 +14,28 @@ class BusClock:
     """Counts the ticks of one controller.
 
     Args:
-        heard_since: whether both encoder frames came after a bus time [ns].
+        feedback_since: whether both encoder frames came after a bus time [ns].
     """
 
-    __slots__ = ("_due_ns", "_heard_since", "_next", "_period_ns")
+    __slots__ = ("_due_ns", "_feedback_since", "_next", "_period_ns")
 
-    def __init__(self, schedule: Schedule, heard_since: Callable[[int], bool]) -> None:
-        self._heard_since = heard_since
+    def __init__(self, schedule: Schedule, feedback_since: Callable[[int], bool]) -> None:
+        self._feedback_since = feedback_since
         self._period_ns = schedule.period_ns
         self._next = -schedule.countdown_ticks
         self._due_ns = schedule.bus_time_ns(self._next)
 
     def due(self, now_ns: int) -> int | None:
         """The tick to compute, a frame of bus time `now_ns` having been heard."""
-        if now_ns >= self._due_ns and self._heard_since(self._due_ns - 1):
-            return self._take()
+        if now_ns >= self._due_ns and self._feedback_since(self._due_ns - 1):
+            return self._advance()
         return None
 
-    def passed(self) -> int:
+    def due_without_frames(self) -> int:
         """The tick to compute, its period having passed without its frames."""
-        return self._take()
+        return self._advance()
 
-    def _take(self) -> int:
+    def _advance(self) -> int:
         tick = self._next
         self._next = tick + 1
         self._due_ns += self._period_ns

@@ -35,13 +35,13 @@ class Phase(Enum):
 class TorqueOutcome(Enum):
     """What became of the law's torques."""
 
-    WHOLE = auto()
+    UNCHANGED = auto()
     LIMITED = auto()  # what the law would learn from this tick is the limit
-    NOTHING = auto()
-    ANEW = auto()  # nothing, and the law begins again with the next tick
+    WITHHELD = auto()
+    RESTARTED = auto()  # nothing, and the law begins again with the next tick
 
 
-WHOLE = TorqueOutcome.WHOLE
+UNCHANGED = TorqueOutcome.UNCHANGED
 _DRIVING = Phase.DRIVING
 
 
@@ -67,15 +67,15 @@ class Guard:
         self.phase = Phase.ARMING
         self.begun = False
         """Whether tick 0 has come."""
-        self.outcome = TorqueOutcome.NOTHING
+        self.outcome = TorqueOutcome.WITHHELD
         """What became of the torques that the law asked for in this tick."""
-        self.stopped_tick = 0
-        self.stopped_because = ""
+        self.stop_tick = 0
+        self.stop_reason = ""
         """Why the robot stands still now, "" if it doesn't."""
         self.events: list[Event] = []
         self.announce: Callable[[str], None] = lambda _: None
         """Told of each event as it happens, in words; whoever runs the controller says to whom."""
-        self._said: list[str] = []
+        self._announced: list[str] = []
         self.stalled = ""
         """Why the last ticks came late, "" if they didn't; see `note_stall`."""
         self.bus_fault: str | None = None
@@ -89,7 +89,7 @@ class Guard:
         self._pose_age_ticks = -(-host.pose_age_limit_ns // schedule.period_ns)
         self._pose_until = self._pose_age_ticks if host.pose_age_limit_ns else schedule.ticks
         """The last tick that the newest fix is good for."""
-        self._doubts: dict[str, str] = {}  # by sensor: why it isn't to be believed
+        self._noted_faults: dict[str, str] = {}  # by sensor: why it isn't to be believed
         self._rearming = Rearming(host)
         self._refusal: str | None = None  # came while READY, and is a person's to clear
 
@@ -100,18 +100,18 @@ class Guard:
         if self._pose_age_ticks:
             self._pose_until = tick + self._pose_age_ticks
 
-    def note_doubt(self, sensor: str, reason: str | None) -> None:
+    def note_fault(self, sensor: str, reason: str | None) -> None:
         """Why a sensor isn't to be believed now, None if it is."""
         if reason is not None:
-            self._doubts[sensor] = reason
-        elif self._doubts:
-            self._doubts.pop(sensor, None)
+            self._noted_faults[sensor] = reason
+        elif self._noted_faults:
+            self._noted_faults.pop(sensor, None)
 
     def note_stall(self, tick: int, reason: str) -> None:
         """Why ticks come late from this one on; set `stalled` to "" when that is over."""
         self.stalled = reason
-        if len(self._said) < 2 * MAX_EVENTS:
-            self._say(f"{self._when(tick)}: {reason}")
+        if len(self._announced) < 2 * MAX_EVENTS:
+            self._announce(f"{self._when(tick)}: {reason}")
 
     def note_unsent(self, tick: int) -> None:
         """The frames of this tick did not get onto the bus: arming has lost a step."""
@@ -163,31 +163,33 @@ class Guard:
 
     # --- from tick 0 on --------------------------------------------------------------------------
 
-    def act(self, tick: int, right: float, left: float, trouble: str = "") -> Sequence[Frame]:
+    def command(
+        self, tick: int, right_wheel_N_m: float, left_wheel_N_m: float, trouble: str = ""
+    ) -> Sequence[Frame]:
         """The frames of a tick at which the law asks for these torques [N·m]; see `outcome`.
 
         `trouble` says why it asks for none that are finite, if more is known than that.
         """
         drives, now_ns = self.drives, self._bus_time_ns(tick)
-        self.outcome = TorqueOutcome.NOTHING
+        self.outcome = TorqueOutcome.WITHHELD
         if self.phase is not _DRIVING:
-            return self._come_back(tick, now_ns)
+            return self._recover(tick, now_ns)
         fault = drives.fault(now_ns)
-        if fault is None and (tick > self._pose_until or self._doubts or self.bus_fault):
+        if fault is None and (tick > self._pose_until or self._noted_faults or self.bus_fault):
             fault = self._own_fault(tick)
-        if fault is None and not isfinite(right + left):
+        if fault is None and not isfinite(right_wheel_N_m + left_wheel_N_m):
             fault = trouble or "the law asks for a torque that is not finite"
         if fault is not None:
             return self._stop(tick, fault)
-        self.outcome = WHOLE
+        self.outcome = UNCHANGED
         if self._limiter.active:
-            limited = self._limiter(right, left)
-            if limited != (right, left):
+            limited = self._limiter(right_wheel_N_m, left_wheel_N_m)
+            if limited != (right_wheel_N_m, left_wheel_N_m):
                 self.outcome = TorqueOutcome.LIMITED
-            right, left = limited
-        return drives.torque(right, left)
+            return drives.torque(*limited)
+        return drives.torque(right_wheel_N_m, left_wheel_N_m)
 
-    def leave(self) -> Sequence[Frame]:
+    def shut_down(self) -> Sequence[Frame]:
         """Disarm for good; latched at the drives if the scenario wants that."""
         self.phase = Phase.DONE
         frames = self.drives.disarm()
@@ -198,7 +200,7 @@ class Guard:
     def notices(self) -> list[str]:
         """What a report should say beside the numbers, in words."""
         dry = ["dry run: nothing was sent to the drives"] if self._brief.host.dry_run else []
-        return [*dry, *self._said, *self.drives.notices]
+        return [*dry, *self._announced, *self.drives.notices]
 
     def _own_fault(self, tick: int) -> str | None:
         """What is wrong beside the drives, None if nothing is."""
@@ -208,35 +210,35 @@ class Guard:
             age = tick - self._pose_until + self._pose_age_ticks
             age_s = age * self._brief.schedule.period_s
             return f"no pose from the localisation system for {age_s:.2f} s"
-        return next(iter(self._doubts.values()), None)
+        return next(iter(self._noted_faults.values()), None)
 
     def _stop(self, tick: int, reason: str) -> Sequence[Frame]:
         """Take the torque from both wheels."""
         if self.stalled:
             reason = f"{self.stalled}: {reason}"
-        self.stopped_tick = tick
-        self.stopped_because = f"{self._when(tick)}: {reason}"
+        self.stop_tick = tick
+        self.stop_reason = f"{self._when(tick)}: {reason}"
         self._change(tick, Phase.STOPPED, reason)
         return self.drives.disarm()
 
-    def _come_back(self, tick: int, now_ns: int) -> Sequence[Frame]:
+    def _recover(self, tick: int, now_ns: int) -> Sequence[Frame]:
         """Wait until nothing stands in the way; then the whole way of arming, to torque 0."""
         drives, rearming = self.drives, self._rearming
         if self.phase is Phase.STOPPED:
-            if rearming.hopeless or not rearming.may_begin(self._obstacle(tick, now_ns), now_ns):
+            if rearming.exhausted or not rearming.may_begin(self._obstacle(tick, now_ns), now_ns):
                 return drives.rest(now_ns)
             self._change(tick, Phase.REARMING, "")
             return drives.disarm()
         obstacle = self._obstacle(tick, now_ns)
-        if obstacle is None and not drives.armed and rearming.late(now_ns):
+        if obstacle is None and not drives.armed and rearming.timed_out(now_ns):
             obstacle = f"could not arm again: {drives.missing(now_ns)}"
         if obstacle is not None:
             return self._stop(tick, obstacle)
         if not drives.armed:
             return drives.arm(now_ns)
         self._limiter.reset()
-        self.outcome = TorqueOutcome.ANEW
-        self.stopped_because = ""
+        self.outcome = TorqueOutcome.RESTARTED
+        self.stop_reason = ""
         self._change(tick, _DRIVING, "armed again")
         return drives.torque(0.0, 0.0)
 
@@ -248,8 +250,8 @@ class Guard:
         if len(self.events) < MAX_EVENTS:
             event = Event(self._when(tick), phase, reason)
             self.events.append(event)
-            self._say(str(event))
+            self._announce(str(event))
 
-    def _say(self, text: str) -> None:
-        self._said.append(text)
+    def _announce(self, text: str) -> None:
+        self._announced.append(text)
         self.announce(text)

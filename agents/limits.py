@@ -30,14 +30,14 @@ class TorqueLimiter:
     def __call__(self, right: float, left: float) -> tuple[float, float]:
         """The torques that may be sent [N·m]."""
         before_right, before_left = self._last
-        self._last = self._one(right, before_right), self._one(left, before_left)
+        self._last = self._limited(right, before_right), self._limited(left, before_left)
         return self._last
 
     def reset(self) -> None:
         """The wheels are without torque."""
         self._last = (0.0, 0.0)
 
-    def _one(self, torque: float, before: float) -> float:
+    def _limited(self, torque: float, before: float) -> float:
         limit, step = self._limit, self._step
         torque = min(max(torque, before - step), before + step)
         return min(max(torque, -limit), limit)

@@ -76,12 +76,12 @@ class Localiser:
             self._half * (right_speed + left_speed),
             self._half_over_b * (right_speed - left_speed),
         )
-        return self._sense()
+        return self._motion()
 
     def fix(self, x: float, y: float, theta: float, ticks_ago: int = 0) -> RobotMotion:
         """Take a pose of now, or of some periods ago; return the motion now."""
         if self._fixed and self._mode == "odometry":
-            return self._sense()
+            return self._motion()
         o_x, o_y, o_theta = self._past[-1 - ticks_ago]
         if self._fixed:
             then = self._anchor[2] + (o_theta - self._anchor[5])
@@ -89,9 +89,9 @@ class Localiser:
         self._fixed = True
         turned = theta - o_theta
         self._anchor = (x, y, theta, o_x, o_y, o_theta, cos(turned), sin(turned))
-        return self._sense()
+        return self._motion()
 
-    def _sense(self) -> RobotMotion:
+    def _motion(self) -> RobotMotion:
         f_x, f_y, f_theta, o_x, o_y, o_theta, c, s = self._anchor
         v, omega = self._speeds
         if self._held:

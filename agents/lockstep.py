@@ -34,7 +34,7 @@ BUS_SHARE = 2.0
 """Multiple of the tick deadline that a controller waits for its bus: the plant has its own word
 first."""
 
-_SAID = {"pose": ("pose", LOCALISATION), "leader": ("speed", LEADER)}
+_KINDS_AND_SENDERS = {"pose": ("pose", LOCALISATION), "leader": ("speed", LEADER)}
 
 
 @dataclass(slots=True)
@@ -79,9 +79,9 @@ class LockstepLoop:
         self._hellos = hellos
         self.counters = LockstepCounters()
 
-    def take(self, arrival: Arrival) -> None:
+    def on_arrival(self, arrival: Arrival) -> None:
         """Give one message to the agent; what nobody understands is counted."""
-        self.counters.undecodable += not give(self._agent, arrival)
+        self.counters.undecodable += not deliver(self._agent, arrival)
 
     def await_first_frame(self, stop: Stop) -> can.Message | None:
         """Say hello until the plant's first frame comes; None when told to stop."""
@@ -108,25 +108,25 @@ class LockstepLoop:
         counters = self.counters
         message: can.Message | None = first
         asked_ns = self._clock.monotonic_ns()
-        hear, clock, schedule = (
-            agent.hear,
-            BusClock(self._schedule, agent.heard_since),
+        on_frame, clock, schedule = (
+            agent.on_frame,
+            BusClock(self._schedule, agent.feedback_since),
             self._schedule,
         )
         timeout_s = BUS_SHARE * schedule.tick_deadline_s
         while True:
             if message is None:
-                tick: int | None = clock.passed()
+                tick: int | None = clock.due_without_frames()
             else:
                 now_ns = round(message.timestamp * 1e9)
-                hear(can_id_of(message), message.data, now_ns)
+                on_frame(can_id_of(message), message.data, now_ns)
                 tick = clock.due(now_ns)
             if tick is not None:
                 came_ns = self._clock.monotonic_ns()
                 if schedule.owes(tick):
-                    self._listen(tick, stop)
+                    self._await_messages(tick, stop)
                 heard_ns = self._clock.monotonic_ns()
-                self._send(agent.step(tick) if not stop.requested else agent.leave())
+                self._send(agent.step(tick) if not stop.requested else agent.shut_down())
                 if schedule.shares(tick + 1):
                     self._path.put(agent.share(tick + 1).encode())
                 counters.bus_ns += came_ns - asked_ns
@@ -149,7 +149,7 @@ class LockstepLoop:
                 # As on hardware: the next one is newer.
                 self.counters.unsent += 1
 
-    def _listen(self, tick: int, stop: Stop) -> None:
+    def _await_messages(self, tick: int, stop: Stop) -> None:
         """Wait for what the schedule owes this tick, or for a stop."""
         agent = self._agent
         clock: AwakeClock | None = None
@@ -162,7 +162,7 @@ class LockstepLoop:
                 deadline = clock.now() + within_s
             left_s = deadline - clock.now()
             if arrival is not None and left_s > -within_s:
-                self.take(arrival)
+                self.on_arrival(arrival)
             elif left_s <= 0.0:
                 said = "; ".join((f"no {', no '.join(missing)}", *agent.refusals()))
                 raise PeerSilentError(f"{self._robot}: tick {tick}: within {within_s:g} s {said}")
@@ -198,20 +198,20 @@ def did_not_start(agent: Agent) -> InfrastructureError:
     return InfrastructureError("; ".join(said))
 
 
-def give(agent: Agent, arrival: Arrival) -> bool:
+def deliver(agent: Agent, arrival: Arrival) -> bool:
     """Give one message to the agent, by its tag; return whether it was understood."""
     kind, _, robot = arrival.tag.partition("/")
     match kind:
         case "path" if (state := PathState.decode(arrival.payload)) is not None:
-            agent.take_path(robot, state)
+            agent.receive_path_state(robot, state)
         case "pose" if (fix := PoseFix.decode(arrival.payload)) is not None:
-            agent.take_pose(fix)
+            agent.receive_pose(fix)
         case "leader" if (speed := LeaderSpeed.decode(arrival.payload)) is not None:
-            agent.take_leader(speed)
+            agent.receive_leader_speed(speed)
         case "go":
             pass  # lockstep begins with the first frame
         case _:
-            what, sender = _SAID.get(kind, ("path state", robot))
+            what, sender = _KINDS_AND_SENDERS.get(kind, ("path state", robot))
             agent.admission.malformed(what, sender)
             return False
     return True

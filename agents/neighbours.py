@@ -59,7 +59,7 @@ class Neighbours:
         self._age_limit_s = limits.age_limit_s
         self._silence_limit_s = limits.silence_limit_s
 
-    def hear(self, name: str, t_ns: int, s: float, v_hat: float) -> None:
+    def receive(self, name: str, t_ns: int, s: float, v_hat: float) -> None:
         """Take what `name` said of time `t_ns`; older than what is known, it is ignored."""
         neighbour = self._by_name[name]
         if neighbour.heard and t_ns <= neighbour.t_ns:

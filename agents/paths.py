@@ -76,28 +76,28 @@ def _shifted_cosine(path: Cosine, offset: World) -> RobotPath:
     a, k = path.amplitude_m, path.wavenumber_rad_m
     ak, akk = a * k, a * k * k
 
-    def at(s: float) -> Reference:
+    def reference_at(s: float) -> Reference:
         c = cos(k * s)
         dy = -ak * sin(k * s)
         square = 1.0 + dy * dy
         there = (x_0 + s, y_0 + a * c, atan2(dy, 1.0), sqrt(square), -akk * c / square)
         return _new(Reference, there)
 
-    return at
+    return reference_at
 
 
 def _shifted(centre: _Curve, x_m: float, y_m: float) -> RobotPath:
-    def at(s: float) -> Reference:
+    def reference_at(s: float) -> Reference:
         x, y, theta, v_bar, omega_bar = _reference(*centre(s))
         return Reference(x + x_m, y + y_m, theta, v_bar, omega_bar)
 
-    return at
+    return reference_at
 
 
 def _turning(centre: _Curve, offset: _Curve) -> RobotPath:
     """Γ_0 + R(θ) l with θ = θ_d0(s), differentiated twice; R' = θ' R J, J a quarter turn."""
 
-    def at(s: float) -> Reference:
+    def reference_at(s: float) -> Reference:
         x, y = centre(s)
         l_x, l_y = offset(s)
         square = x.d1 * x.d1 + y.d1 * y.d1
@@ -128,7 +128,7 @@ def _turning(centre: _Curve, offset: _Curve) -> RobotPath:
             ),
         )
 
-    return at
+    return reference_at
 
 
 def _varying(offset: VaryingOffset) -> _Curve:
@@ -136,7 +136,7 @@ def _varying(offset: VaryingOffset) -> _Curve:
     ahead, left = offset.ahead_coefficients, offset.left_coefficients
     first, last = knots[0], knots[-1]
 
-    def at(s: float) -> PlanarJet:
+    def jet_at(s: float) -> PlanarJet:
         inside = min(max(s, first), last)
         n = min(bisect_right(knots, inside), len(ahead)) - 1
         u = inside - knots[n]
@@ -145,7 +145,7 @@ def _varying(offset: VaryingOffset) -> _Curve:
             return PlanarJet(Jet(x.value, 0.0, 0.0, 0.0), Jet(y.value, 0.0, 0.0, 0.0))
         return PlanarJet(x, y)
 
-    return at
+    return jet_at
 
 
 # --- paths of the centre --------------------------------------------------------------------------
@@ -172,11 +172,11 @@ def _own(choice: Choice) -> _Curve:
     shape: Any = choice.parameters
     jet = shape.jet
 
-    def at(s: float) -> PlanarJet:
+    def jet_at(s: float) -> PlanarJet:
         x, y = jet(s)
         return PlanarJet(Jet(*x), Jet(*y))
 
-    return at
+    return jet_at
 
 
 def _line(path: Line) -> _Curve:
@@ -184,52 +184,52 @@ def _line(path: Line) -> _Curve:
 
     x_0, y_0 = path.start_m
 
-    def at(s: float) -> PlanarJet:
+    def jet_at(s: float) -> PlanarJet:
         return PlanarJet(Jet(x_0 + s * c, c, 0.0, 0.0), Jet(y_0 + s * n, n, 0.0, 0.0))
 
-    return at
+    return jet_at
 
 
 def _cosine(path: Cosine) -> _Curve:
-    def at(s: float) -> PlanarJet:
+    def jet_at(s: float) -> PlanarJet:
         return PlanarJet(
             Jet(path.start_m[0] + s, 1.0, 0.0, 0.0),
             _add(path.start_m[1], _wave(path.amplitude_m, path.wavenumber_rad_m, s, 1)),
         )
 
-    return at
+    return jet_at
 
 
 def _circle(path: Circle) -> _Curve:
     rate = (-1.0 if path.clockwise else 1.0) / path.radius_m
 
-    def at(s: float) -> PlanarJet:
+    def jet_at(s: float) -> PlanarJet:
         turned = s + path.start_angle_rad / rate
         return PlanarJet(
             _add(path.centre_m[0], _wave(path.radius_m, rate, turned, 1)),
             _add(path.centre_m[1], _wave(path.radius_m, rate, turned, 0)),
         )
 
-    return at
+    return jet_at
 
 
 def _figure_eight(path: FigureEight) -> _Curve:
     rate = 1.0 / path.half_length_m
 
-    def at(s: float) -> PlanarJet:
+    def jet_at(s: float) -> PlanarJet:
         return PlanarJet(
             _add(path.centre_m[0], _wave(path.half_length_m, rate, s, 0)),
             _add(path.centre_m[1], _wave(path.half_width_m, 2.0 * rate, s, 0)),
         )
 
-    return at
+    return jet_at
 
 
 def _spline(path: SplinePath) -> _Curve:
     knots = path.knots_m
     first, last = knots[0], knots[-1]
 
-    def at(s: float) -> PlanarJet:
+    def jet_at(s: float) -> PlanarJet:
         if path.closed:
             inside = first + (s - first) % (last - first)
         else:
@@ -246,7 +246,7 @@ def _spline(path: SplinePath) -> _Curve:
             Jet(y.value + beyond * y.d1, y.d1, 0.0, 0.0),
         )
 
-    return at
+    return jet_at
 
 
 def _wave(amplitude: float, k: float, s: float, quarters: int) -> Jet:

@@ -22,7 +22,7 @@ import can
 from agents.agent import Agent
 from agents.bus_health import BusHealth
 from agents.guard import Phase
-from agents.lockstep import did_not_start, give
+from agents.lockstep import deliver, did_not_start
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import can_id_of, to_frame, to_message
 from bridge.frame import ERR, Frame
@@ -41,7 +41,7 @@ BACKLOG_S = 1.0
 """Longest time for dropping what the bus gathered; no interface keeps more than this takes."""
 
 
-BEAT_EVERY_S = 0.2
+PROGRESS_PERIOD_S = 0.2
 """How often a controller says that it lives."""
 
 
@@ -76,7 +76,7 @@ class RealtimeLoop:
         link: Link,
         path: Publisher,
         hellos: Hellos,
-        beat: Publisher,
+        progress: Publisher,
         *,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
@@ -88,8 +88,8 @@ class RealtimeLoop:
         self._link = link
         self._path = path
         self._hellos = hellos
-        self._beat = beat
-        self._beat_every = max(round(BEAT_EVERY_S / agent.brief.schedule.period_s), 1)
+        self._progress = progress
+        self._progress_ticks = max(round(PROGRESS_PERIOD_S / agent.brief.schedule.period_s), 1)
         self._lateness = Lateness(agent.brief.schedule.period_s)
         self._health = BusHealth(agent.brief.robot, agent.brief.host.bus_error_limit_ns)
         self._echoes = Echoes() if hands_back(agent.brief.bus) else None
@@ -110,7 +110,7 @@ class RealtimeLoop:
                 if arrival is None:
                     break
                 if arrival.tag != "go":
-                    self.counters.undecodable += not give(self._agent, arrival)
+                    self.counters.undecodable += not deliver(self._agent, arrival)
                 elif (epoch_ns := self._epoch_ns(arrival.payload)) is not None:
                     return epoch_ns
                 arrival = self._link.receive(0.0)
@@ -162,16 +162,16 @@ class RealtimeLoop:
                 self.counters.misses += 1
                 agent.round_trip_s = nan
             agent.admission.now_ns = now_ns - epoch_ns
-            self._hear_peers()
-            frames = agent.step(tick) if not stop.requested else agent.leave()
+            self._receive_messages()
+            frames = agent.step(tick) if not stop.requested else agent.shut_down()
             overdue = now_ns >= due_ns + period_ns and agent.phase is Phase.DRIVING
             if overdue:
                 self.counters.skipped += 1
             else:
                 self._send(frames, tick)
             self.counters.ticks += tick >= 0
-            if tick % self._beat_every == 0:
-                self._beat.put(Progress(tick, tick * period_ns, 0).encode())
+            if tick % self._progress_ticks == 0:
+                self._progress.put(Progress(tick, tick * period_ns, 0).encode())
             tick += 1
             if schedule.shares(tick):
                 self._path.put(agent.share(tick).encode())
@@ -196,10 +196,10 @@ class RealtimeLoop:
             while self._bus.recv(0.0) is not None and self._clock.monotonic_s() < deadline:
                 pass
 
-    def _hear_peers(self) -> None:
+    def _receive_messages(self) -> None:
         """Take what the network brought; of a flood no more than a tick has room for."""
         for arrival in waiting(self._link, self._most_arrivals):
-            self.counters.undecodable += not give(self._agent, arrival)
+            self.counters.undecodable += not deliver(self._agent, arrival)
 
     def _send(self, frames: Sequence[Frame], tick: int) -> None:
         send, health = self._bus.send, self._health
@@ -209,7 +209,7 @@ class RealtimeLoop:
                 if self._echoes is not None:
                     self._echoes.sent(Frame(can_id, data), self._clock.monotonic_s())
         except (can.CanError, OSError) as error:
-            self._bear(error)
+            self._on_bus_error(error)
             self._agent.guard.note_unsent(tick)
         else:
             self._sent_ns = self._clock.monotonic_ns()
@@ -217,7 +217,7 @@ class RealtimeLoop:
                 health.sent()
                 self._agent.guard.bus_fault = None
 
-    def _bear(self, error: Exception) -> None:
+    def _on_bus_error(self, error: Exception) -> None:
         """Count an error of the bus, stop the wheels if it lasts, raise if it is the end."""
         health, now_ns = self._health, self._clock.monotonic_ns()
         health.failed(error, now_ns)
@@ -235,7 +235,7 @@ class RealtimeLoop:
             try:
                 message = self._bus.recv(max(left_ns, 0) * 1e-9)
             except (can.CanError, OSError) as error:
-                self._bear(error)
+                self._on_bus_error(error)
                 # An interface that is down may say so at once, again and again.
                 self._clock.sleep(max(due_ns - self._clock.monotonic_ns(), 0) * 1e-9)
                 return
@@ -250,7 +250,7 @@ class RealtimeLoop:
                 continue
             if self._echoes is not None and self._echoes.is_echo(to_frame(message), came_ns * 1e-9):
                 continue
-            agent.hear(can_id, message.data, bus_ns)
-            if self._sent_ns and agent.heard_since(self._sent_ns - self._power_up_ns):
+            agent.on_frame(can_id, message.data, bus_ns)
+            if self._sent_ns and agent.feedback_since(self._sent_ns - self._power_up_ns):
                 agent.round_trip_s = (came_ns - self._sent_ns) * 1e-9
                 self._sent_ns = 0

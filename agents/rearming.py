@@ -22,7 +22,7 @@ class Rearming:
         self._began_ns = 0
 
     @property
-    def hopeless(self) -> bool:
+    def exhausted(self) -> bool:
         """Whether a stopped robot stays stopped whatever happens."""
         return not self._attempts_left
 
@@ -40,6 +40,6 @@ class Rearming:
         self._began_ns = now_ns
         return True
 
-    def late(self, now_ns: int) -> bool:
+    def timed_out(self, now_ns: int) -> bool:
         """Whether closed loop should have been there by now."""
         return now_ns - self._began_ns > self._limits.rearm_limit_ns

@@ -47,20 +47,20 @@ class _Controller(NamedTuple):
     @classmethod
     def of(cls, agent: Agent) -> "_Controller":
         """A controller before its first tick."""
-        return cls(agent, BusClock(agent.brief.schedule, agent.heard_since))
+        return cls(agent, BusClock(agent.brief.schedule, agent.feedback_since))
 
     def react(self, received: Sequence[tuple[int, Frame]]) -> list[Frame]:
         """The answer to frames with their bus times; to none at all: a tick has passed."""
         agent, clock = self
         said: list[Frame] = []
-        hear, due = agent.hear, clock.due
+        on_frame, due = agent.on_frame, clock.due
         for at_ns, (can_id, data) in received:
-            hear(can_id, data, at_ns)
+            on_frame(can_id, data, at_ns)
             tick = due(at_ns)
             if tick is not None:
                 said += agent.step(tick)
         if not received:
-            said += agent.step(clock.passed())
+            said += agent.step(clock.due_without_frames())
         return said
 
 
@@ -83,16 +83,16 @@ class _Controllers:
         stamp_ns, frames = self._stamp_ns, self._frames
         answers: list[Frame] = []
         for agent, clock in self._controllers.values():
-            hear = agent.hear
+            on_frame = agent.on_frame
             tick = None
             for can_id, data in frames:
-                hear(can_id, data, stamp_ns)
+                on_frame(can_id, data, stamp_ns)
                 if tick is None:
                     tick = clock.due(stamp_ns)
                     if tick is not None:
                         answers += agent.step(tick)
             if not frames:
-                answers += agent.step(clock.passed())
+                answers += agent.step(clock.due_without_frames())
         return answers
 
     def forward(self, stamp_ns: int, ended: Sequence[Transmitted], asked: str | None) -> None:  # noqa: ARG002
@@ -168,7 +168,7 @@ class InProcessRun:
         self._steps = [bus.steps() for bus in self._buses.values()]
         for agent in self._agents:
             if agent.brief.hears_leader:
-                agent.take_leader(LeaderSpeed(leader.speed_steps))
+                agent.receive_leader_speed(LeaderSpeed(leader.speed_steps))
         self.ticks = 0
         self.wall_s = 0.0
 
@@ -181,9 +181,9 @@ class InProcessRun:
     def stopped_robots(self) -> dict[str, str]:
         """Robots that stopped themselves or whose motion diverged, and why."""
         stopped = {
-            agent.brief.robot: agent.guard.stopped_because
+            agent.brief.robot: agent.guard.stop_reason
             for agent in self._agents
-            if agent.guard.stopped_because
+            if agent.guard.stop_reason
         }
         return stopped | diverged_robots(self._robots, self._schedule.period_ns)
 
@@ -245,14 +245,14 @@ class InProcessRun:
             state = PathState.decode(agent.share(tick).encode())
             if state is not None:
                 for hearer in self._hearers[robot]:
-                    hearer.take_path(robot, state)
+                    hearer.receive_path_state(robot, state)
 
 
 def _localise(robot: EmulatedRobot, agent: Agent, tick: int, t_ns: int) -> None:
     x, y, theta, *_ = robot.state
     fix = PoseFix.decode(PoseFix(tick, t_ns, x, y, theta).encode())
     if fix is not None:
-        agent.take_pose(fix)
+        agent.receive_pose(fix)
 
 
 def _write(

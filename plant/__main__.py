@@ -218,7 +218,7 @@ def _await_go(brief: PlantBrief, link: Link, hellos: Hellos, stop: Stop) -> None
         hellos,
         note,
         lambda: () if gone else ("the launcher's go",),
-        who="plant",
+        name="plant",
         within_s=brief.schedule.start_deadline_s,
         stop=stop,
     )
@@ -258,7 +258,7 @@ def _record(
     robots = {other.robot: other for other in others}
     for arrival in waiting(link, ARRIVALS_PER_ROBOT * len(others)):
         if (other := robots.get(arrival.tag)) is not None:
-            other.take_pose(PoseFix.decode(arrival.payload))
+            other.receive_pose(PoseFix.decode(arrival.payload))
     for other, buffer in zip(others, rows, strict=True):
         buffer.add(tick, other.row(tick * period_s))
 

@@ -151,7 +151,7 @@ class Motor:
         viscous = self._model.viscous_friction_shaft_N_m_s
         return torque - coulomb - viscous * (push - coulomb) / (self._inertia_rate + viscous)
 
-    def sense(self) -> tuple[float, float]:
+    def measure(self) -> tuple[float, float]:
         """(torque estimate [N·m], current [A]) as the drive has them: noisy, and in steps.
 
         The estimate knows the current and the drive's torque constant, not the motor's. Draws one

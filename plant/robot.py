@@ -70,38 +70,38 @@ class EmulatedRobot:
             pose.x_m, pose.y_m, pose.theta_rad, brief.v_m_s, brief.omega_rad_s, 0.0, 0.0
         )
 
-    def feed(self) -> None:
-        """Tell both drives what their encoders see."""
+    def update_encoders(self) -> None:
+        """Hand both drives the position and speed of their encoders."""
         state = self.state
         right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
         right, left = PER_RADIAN * self._gear_right, PER_RADIAN * self._gear_left
-        self._right.feed(state.right_wheel_rad * right, right_speed * right)
-        self._left.feed(state.left_wheel_rad * left, left_speed * left)
+        self._right.update_encoder(state.right_wheel_rad * right, right_speed * right)
+        self._left.update_encoder(state.left_wheel_rad * left, left_speed * left)
 
     def feedback(self, now_ns: int) -> Sequence[Frame]:
         """Both encoder frames, once both drives have taken a set-point since the last ones."""
         if min(self._right.fed_ns, self._left.fed_ns) <= self._answered_ns:
             return ()
         self._answered_ns = now_ns
-        self.feed()
+        self.update_encoders()
         return self._right.feedback(now_ns), self._left.feedback(now_ns)
 
     def frames_due(self, now_ns: int) -> list[Frame]:
         """What both drives send at this instant, in order of arbitration."""
-        self.feed()
+        self.update_encoders()
         frames = [*self._right.due(now_ns), *self._left.due(now_ns)]
         if len(frames) > 1:
             frames.sort()
         return frames
 
-    def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
+    def on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Give one frame from the bus to the drives that it may concern; return their replies."""
         can_id, right, left = frame[0], self._right, self._left
         if can_id == right.setpoint_id != left.setpoint_id:
-            return right.hear(frame, now_ns)
+            return right.on_frame(frame, now_ns)
         if can_id == left.setpoint_id != right.setpoint_id:
-            return left.hear(frame, now_ns)
-        replies = right.hear(frame, now_ns), left.hear(frame, now_ns)
+            return left.on_frame(frame, now_ns)
+        replies = right.on_frame(frame, now_ns), left.on_frame(frame, now_ns)
         return [*replies[0], *replies[1]] if any(replies) else ()
 
     def advance(self, t_s: float, period_s: float, substeps: int) -> None:
@@ -133,7 +133,7 @@ class EmulatedRobot:
             self.advance((from_ns - zero_ns) * 1e-9, span_ns * 1e-9, -(-span_ns // step_ns))
         if to_ns > self.moved_ns:
             self.moved_ns = to_ns
-            self.feed()
+            self.update_encoders()
 
     def _stop(self, sound: State, divergence: Divergence) -> State:
         """The motion diverged: the state at rest where it was sound at last."""
@@ -175,7 +175,7 @@ class RealisticRobot(EmulatedRobot):
         """What a motor turns at least, seen at its shaft [kg·m²]."""
         return min(self._body.mbar_1, self._body.mbar_2) / (gear_ratio * gear_ratio)
 
-    def feed(self) -> None:
+    def update_encoders(self) -> None:
         """The encoders have told their drives already, at every step."""
 
     def advance(self, t_s: float, period_s: float, substeps: int) -> None:
@@ -195,8 +195,8 @@ class RealisticRobot(EmulatedRobot):
                 if after is None:
                     after = self._stop(state, Divergence(t_s, state.v, state.omega, *torques))
                 state = after
-            right.feed(*train.right_encoder.step(state.right_wheel_rad * gear_r, step))
-            left.feed(*train.left_encoder.step(state.left_wheel_rad * gear_l, step))
+            right.update_encoder(*train.right_encoder.step(state.right_wheel_rad * gear_r, step))
+            left.update_encoder(*train.left_encoder.step(state.left_wheel_rad * gear_l, step))
         self.state = state
         self._demand_right_wheel_N_m, self._demand_left_wheel_N_m = (
             demands[0] * gear_r,
@@ -216,8 +216,8 @@ class RealisticRobot(EmulatedRobot):
             (self._right, train.right_motor, supply.right_A),
             (self._left, train.left_motor, supply.left_A),
         ):
-            torque, current = motor.sense()
-            drive.take_measurements(
+            torque, current = motor.measure()
+            drive.update_measurements(
                 DriveMeasurements(torque, current, motor.fet_C, motor.motor_C, supply.bus_V, amps)
             )
 

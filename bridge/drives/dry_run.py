@@ -23,8 +23,8 @@ class DryRun:
         self._client = client
         self.armed = False
         self.sent_wheel_N_m = (0.0, 0.0)
-        self.hear: Callable[[int, bytes | bytearray, int], None] = client.hear
-        self.heard_since: Callable[[int], bool] = client.heard_since
+        self.on_frame: Callable[[int, bytes | bytearray, int], None] = client.on_frame
+        self.feedback_since: Callable[[int], bool] = client.feedback_since
         self.motion: Callable[[], tuple[float, float, float, float] | None] = client.motion
         self.obstacle: Callable[[int], str | None] = client.obstacle
         self.refusal: Callable[[], str | None] = client.refusal

@@ -38,10 +38,10 @@ class DriveClient(Protocol):
     def notices(self) -> tuple[str, ...]:
         """Commands of other hosts to the drives, in words."""
 
-    def hear(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
+    def on_frame(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         """Take any frame from the bus."""
 
-    def heard_since(self, bus_ns: int) -> bool:
+    def feedback_since(self, bus_ns: int) -> bool:
         """Whether both wheels' encoder frames came after this bus time."""
 
     def motion(self) -> Motion | None:
@@ -83,7 +83,7 @@ class DriveNode(Protocol):
     setpoint_id: int
     """The identifier of the set-point that it takes at its address now; negative: it takes none."""
 
-    def feed(self, revolutions: float, rev_s: float) -> None:
+    def update_encoder(self, revolutions: float, rev_s: float) -> None:
         """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
 
     def lose_estimate(self) -> None:
@@ -95,7 +95,7 @@ class DriveNode(Protocol):
     def feedback(self, now_ns: int) -> Frame:
         """The encoder frame out of its turn; the next cyclic one comes a period later."""
 
-    def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
+    def on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Take one frame from the bus; return the replies."""
 
     @property
@@ -106,7 +106,7 @@ class DriveNode(Protocol):
     def next_due_ns(self) -> int:
         """The earliest bus time at which `due` has something to do; after its last call."""
 
-    def take_measurements(self, measurements: DriveMeasurements) -> None:
+    def update_measurements(self, measurements: DriveMeasurements) -> None:
         """Take the drive's measurements of its motor and supply."""
 
     def torque_demand_shaft(self, dt_s: float) -> float:
@@ -142,7 +142,7 @@ class VersionQuery(Protocol):
     versions: Versions | None
     """The answer, None until it came."""
 
-    def hear(self, frame: Frame) -> Frame | None:
+    def on_frame(self, frame: Frame) -> Frame | None:
         """Take a frame from the bus; return the request, once."""
 
     @property

@@ -47,14 +47,14 @@ class Hellos:
 def await_hellos(
     link: Link,
     hellos: Hellos,
-    take: Callable[[Arrival], object],
+    deliver: Callable[[Arrival], object],
     missing: Callable[[], Iterable[str]],
     *,
-    who: str,
+    name: str,
     within_s: float,
     stop: Stop,
 ) -> None:
-    """Say hello and take arrivals until nothing is missing.
+    """Say hello and deliver arrivals until nothing is missing.
 
     Raises:
         InfrastructureError: something was still missing after `within_s`; the text names it.
@@ -66,9 +66,9 @@ def await_hellos(
             return
         if clock.now() > deadline:
             raise InfrastructureError(
-                f"{who}: not ready after {within_s:g} s: heard nothing of {', '.join(absent)}"
+                f"{name}: not ready after {within_s:g} s: heard nothing of {', '.join(absent)}"
             )
         if (arrival := link.receive(min(hellos.say(), LOOK_S))) is not None:
-            take(arrival)
+            deliver(arrival)
         for more in waiting(link):
-            take(more)
+            deliver(more)

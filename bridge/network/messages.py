@@ -86,7 +86,7 @@ class LeaderSpeed(NamedTuple):
 
     steps: tuple[tuple[int, float], ...]
 
-    def at(self, t_ns: int) -> float:
+    def speed_at(self, t_ns: int) -> float:
         """Speed at a time [m/s]; the first step holds before it too."""
         steps = self.steps
         if len(steps) == 1:

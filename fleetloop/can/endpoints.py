@@ -66,7 +66,7 @@ def ask(bus: FleetloopBus, name: str, within_s: float) -> Versions:
     try:
         while query.versions is None and (left_s := deadline - SYSTEM_CLOCK.monotonic_s()) > 0.0:
             message = bus.recv(left_s)
-            request = query.hear(to_frame(message)) if message is not None else None
+            request = query.on_frame(to_frame(message)) if message is not None else None
             if request is not None:
                 bus.send(to_message(*request), left_s)
     except can.CanError as error:

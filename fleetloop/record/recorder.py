@@ -166,7 +166,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
             Hellos(brief.hello_every_s),
             recorder.take,
             lambda: sorted(recorder.unheard),
-            who=RECORDER.name,
+            name=RECORDER.name,
             within_s=brief.start_deadline_s,
             stop=stop,
         )

@@ -132,8 +132,8 @@ class IdealBus:
     def _react(self, frames: Sequence[Frame], bus_ns: int) -> list[Frame]:
         replies: list[Frame] = []
         for robot in self.robots:
-            hear = robot.hear
+            on_frame = robot.on_frame
             for frame in frames:
-                if replied := hear(frame, bus_ns):
+                if replied := on_frame(frame, bus_ns):
                     replies += replied
         return replies

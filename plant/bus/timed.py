@@ -246,7 +246,7 @@ class TimedBus:
         while self._mail and self._mail[0][0] <= at_ns:
             _, _, drive, frame = heappop(self._mail)
             drive.robot.move(at_ns, self._zero_ns, self._step_ns)
-            self._submit(drive, drive.drive.hear(frame, at_ns))
+            self._submit(drive, drive.drive.on_frame(frame, at_ns))
             drive.due_ns = drive.drive.next_due_ns
         for drive in self._drives:
             if drive.due_ns <= at_ns:

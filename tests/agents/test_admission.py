@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.robot_bench import NOWHERE, SCENARIO, Bench
 
-from agents.admission import MOST_LATE, Admission
+from agents.admission import LATE_MESSAGES_TOLERATED, Admission
 from agents.agent import Agent
-from agents.lockstep import give
+from agents.lockstep import deliver
 from bridge.network.link import Arrival
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from configs.brief import LEAD_TICKS
@@ -26,7 +26,7 @@ REALTIME = agent_brief(
 )
 
 
-def at(tick: int, brief=BRIEF) -> Admission:
+def admission_at(tick: int, brief=BRIEF) -> Admission:
     """The judge of a robot that has just computed this tick, at its very time."""
     admission = Admission(brief)
     admission.tick, admission.now_ns = tick, tick * PERIOD_NS
@@ -39,39 +39,42 @@ def state(tick: int, s: float = 0.5, v_hat: float = 0.6) -> PathState:
 
 def refused(admission: Admission, message: PathState) -> str:
     """Why a path state of r1 is refused."""
-    assert not admission.path("r1", message)
+    assert not admission.admits_path_state("r1", message)
     (line,) = admission.refusals.lines()
     assert line.startswith("refused 1 path state of r1: ")
     return line.partition(": ")[2]
 
 
 def test_in_lockstep_what_the_schedule_knows_is_believed_once() -> None:
-    admission = at(SHARE)
-    assert admission.path("r1", state(2 * SHARE))
+    admission = admission_at(SHARE)
+    assert admission.admits_path_state("r1", state(2 * SHARE))
     assert refused(admission, state(2 * SHARE)).endswith("came twice")
-    assert at(SHARE).path("r1", state(2 * SHARE))
+    assert admission_at(SHARE).admits_path_state("r1", state(2 * SHARE))
 
 
 def test_in_lockstep_what_is_over_is_refused() -> None:
-    assert refused(at(SHARE), state(SHARE)) == f"tick {SHARE} came when tick {SHARE} was over"
+    assert (
+        refused(admission_at(SHARE), state(SHARE))
+        == f"tick {SHARE} came when tick {SHARE} was over"
+    )
 
 
 def test_in_lockstep_nothing_from_further_ahead_than_a_bus_may_be_is_believed() -> None:
     far = -(-(SHARE + LEAD_TICKS + 3) // SHARE) * SHARE
-    assert "ahead" in refused(at(SHARE), state(far))
+    assert "ahead" in refused(admission_at(SHARE), state(far))
     hour = HOUR_NS // PERIOD_NS
-    assert refused(at(0), state(hour)) == "dated 3600 s ahead"
+    assert refused(admission_at(0), state(hour)) == "dated 3600 s ahead"
 
 
 @pytest.mark.parametrize("brief", [BRIEF, REALTIME])
 def test_a_time_that_is_not_its_tick_s_is_refused(brief) -> None:
     lie = PathState(2 * SHARE, 2 * SHARE * PERIOD_NS + HOUR_NS, 0.5, 0.6)
-    assert "is not at" in refused(at(SHARE, brief), lie)
+    assert "is not at" in refused(admission_at(SHARE, brief), lie)
 
 
 def test_a_tick_at_which_nothing_is_shared_is_refused() -> None:
     assert SHARE > 1
-    assert "nothing is shared at tick" in refused(at(SHARE), state(SHARE + 1))
+    assert "nothing is shared at tick" in refused(admission_at(SHARE), state(SHARE + 1))
 
 
 @pytest.mark.parametrize(
@@ -79,62 +82,64 @@ def test_a_tick_at_which_nothing_is_shared_is_refused() -> None:
 )
 @pytest.mark.parametrize("brief", [BRIEF, REALTIME])
 def test_what_the_scenario_can_not_reach_is_refused(brief, s: float, v_hat: float) -> None:
-    said = refused(at(SHARE, brief), state(2 * SHARE, s, v_hat))
+    said = refused(admission_at(SHARE, brief), state(2 * SHARE, s, v_hat))
     assert "where this scenario has" in said
 
 
 def test_in_real_time_a_neighbour_dated_an_hour_ahead_is_refused_and_heard_when_right() -> None:
-    admission = at(SHARE, REALTIME)
+    admission = admission_at(SHARE, REALTIME)
     ticks = HOUR_NS // PERIOD_NS // SHARE * SHARE
     assert refused(admission, state(ticks)).startswith("dated 3")
-    assert admission.path("r1", state(2 * SHARE))
+    assert admission.admits_path_state("r1", state(2 * SHARE))
 
 
 def test_in_real_time_data_from_before_the_silence_limit_is_refused() -> None:
     old = round(BRIEF.coordination.silence_limit_s * 1e9) // PERIOD_NS // SHARE * SHARE
-    assert at(old, REALTIME).path("r1", state(0))
-    assert "back" in refused(at(old + SHARE, REALTIME), state(0))
+    assert admission_at(old, REALTIME).admits_path_state("r1", state(0))
+    assert "back" in refused(admission_at(old + SHARE, REALTIME), state(0))
 
 
 def test_in_real_time_old_and_repeated_data_is_refused() -> None:
-    admission = at(4 * SHARE, REALTIME)
-    assert admission.path("r1", state(3 * SHARE))
-    assert not admission.path("r1", state(3 * SHARE))
-    assert not admission.path("r1", state(2 * SHARE))
-    assert admission.path("r3", state(2 * SHARE))  # each neighbour by itself
+    admission = admission_at(4 * SHARE, REALTIME)
+    assert admission.admits_path_state("r1", state(3 * SHARE))
+    assert not admission.admits_path_state("r1", state(3 * SHARE))
+    assert not admission.admits_path_state("r1", state(2 * SHARE))
+    assert admission.admits_path_state("r3", state(2 * SHARE))  # each neighbour by itself
     assert len(admission.refusals.lines()) == 2
 
 
 def test_where_somebody_starts_is_believed_until_control_begins() -> None:
-    assert at(-1).path("r1", state(-1))
-    assert at(-1).pose(PoseFix(-1, 0, 0.0, 0.0, 0.0))
-    begun = at(0)
-    assert not begun.path("r1", state(-1))
-    assert not begun.pose(PoseFix(-1, 0, 0.0, 0.0, 0.0))
+    assert admission_at(-1).admits_path_state("r1", state(-1))
+    assert admission_at(-1).admits_pose(PoseFix(-1, 0, 0.0, 0.0, 0.0))
+    begun = admission_at(0)
+    assert not begun.admits_path_state("r1", state(-1))
+    assert not begun.admits_pose(PoseFix(-1, 0, 0.0, 0.0, 0.0))
     assert begun.refusals.lines() == []  # late, and no lie
-    for _ in range(2 * MOST_LATE):
-        begun.path("r1", state(-1))
-    assert begun.refusals.floods() == [f"r1 ({MOST_LATE + 1} messages)"]
+    for _ in range(2 * LATE_MESSAGES_TOLERATED):
+        begun.admits_path_state("r1", state(-1))
+    assert begun.refusals.floods() == [f"r1 ({LATE_MESSAGES_TOLERATED + 1} messages)"]
 
 
 def test_poses_are_dated_like_path_states_and_of_this_world() -> None:
     tick = SCHEDULE.localise_every * 3
     good = PoseFix(tick, tick * PERIOD_NS, 1.0, 2.0, 3.0)
-    admission = at(tick)  # it is due a little later
-    assert admission.pose(good)
-    assert not admission.pose(good)
-    assert not at(tick + SCHEDULE.pose_delay_ticks).pose(good)
-    assert not at(tick).pose(good._replace(x_m=1e300))
-    assert not at(tick).pose(good._replace(theta_rad=-1e9))
-    assert not at(tick).pose(good._replace(t_ns=good.t_ns + PERIOD_NS))
-    assert not at(0, REALTIME).pose(PoseFix(HOUR_NS // PERIOD_NS, HOUR_NS, 0.0, 0.0, 0.0))
-    assert at(tick, REALTIME).pose(good)
+    admission = admission_at(tick)  # it is due a little later
+    assert admission.admits_pose(good)
+    assert not admission.admits_pose(good)
+    assert not admission_at(tick + SCHEDULE.pose_delay_ticks).admits_pose(good)
+    assert not admission_at(tick).admits_pose(good._replace(x_m=1e300))
+    assert not admission_at(tick).admits_pose(good._replace(theta_rad=-1e9))
+    assert not admission_at(tick).admits_pose(good._replace(t_ns=good.t_ns + PERIOD_NS))
+    assert not admission_at(0, REALTIME).admits_pose(
+        PoseFix(HOUR_NS // PERIOD_NS, HOUR_NS, 0.0, 0.0, 0.0)
+    )
+    assert admission_at(tick, REALTIME).admits_pose(good)
 
 
 def test_a_leader_that_is_faster_than_the_scenario_is_not_followed() -> None:
-    admission = at(0)
-    assert admission.leader(LeaderSpeed(((0, 0.6),)))
-    assert not admission.leader(LeaderSpeed(((0, 0.6), (10, 1e9))))
+    admission = admission_at(0)
+    assert admission.admits_leader_speed(LeaderSpeed(((0, 0.6),)))
+    assert not admission.admits_leader_speed(LeaderSpeed(((0, 0.6), (10, 1e9))))
     (line,) = admission.refusals.lines()
     assert line.startswith("refused 1 speed of the leader: v_r = 1e+09 m/s")
 
@@ -143,7 +148,7 @@ def test_states_of_far_ticks_are_not_kept() -> None:
     bench = Bench("r2")
     bench.drive(1)
     for tick in range(0, 100_000 * SHARE, SHARE):
-        bench.agent.take_path("r1", state(tick))
+        bench.agent.receive_path_state("r1", state(tick))
     assert sum(map(len, bench.agent._states.values())) <= LEAD_TICKS // SHARE + 2
     assert any("path states of r1" in line for line in bench.agent.notices())
 
@@ -151,7 +156,7 @@ def test_states_of_far_ticks_are_not_kept() -> None:
 def test_a_wait_that_names_what_is_missing_says_what_was_refused_of_it() -> None:
     bench = Bench("r2")
     bench.run(SCHEDULE.countdown_ticks)
-    bench.agent.take_path("r1", state(0, s=1e6))
+    bench.agent.receive_path_state("r1", state(0, s=1e6))
     assert bench.agent.missing(0) == ["path state of r1"]
     (line,) = bench.agent.refusals()
     assert line.startswith("refused 1 path state of r1: s = 1e+06 m at 0 s")
@@ -160,7 +165,7 @@ def test_a_wait_that_names_what_is_missing_says_what_was_refused_of_it() -> None
 def test_what_is_no_message_is_counted_by_its_sender() -> None:
     bench = Bench("r2")
     for kind in ("path/r1", "pose", "leader"):
-        assert not give(bench.agent, Arrival(kind, "key", b"\xc1"))
+        assert not deliver(bench.agent, Arrival(kind, "key", b"\xc1"))
     assert bench.agent.refusals() == [
         "refused 1 path state of r1: not well formed",
         "refused 1 pose of the localisation system: not well formed",
@@ -190,9 +195,9 @@ def test_whatever_peers_say_the_controller_goes_on_with_numbers(brief, said) -> 
     for n, message in enumerate(said):
         agent.admission.now_ns = n * PERIOD_NS
         if isinstance(message, PathState):
-            agent.take_path("r1", message)
+            agent.receive_path_state("r1", message)
         else:
-            agent.take_pose(message)
+            agent.receive_pose(message)
         bench.tick()
         shared = agent.share(n + 1)
         assert isfinite(shared.s)

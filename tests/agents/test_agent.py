@@ -37,7 +37,7 @@ def test_drives_that_do_not_arm_in_time_are_an_error_that_says_why() -> None:
     bench = Bench()
     for _ in range(bench.schedule.countdown_ticks):
         for axis in bench.axes:
-            axis.hear(Frame(identifier(axis.node_id, Command.ESTOP), b""), 0)
+            axis.on_frame(Frame(identifier(axis.node_id, Command.ESTOP), b""), 0)
         bench.tick()
     with pytest.raises(InfrastructureError, match=r"r2.*ESTOP_REQUESTED"):
         bench.tick()
@@ -48,10 +48,10 @@ def test_a_drive_that_drops_out_stops_both_wheels_and_sharing_goes_on() -> None:
     bench.run(bench.schedule.countdown_ticks)
     bench.tick()
     stop = Frame(identifier(1, Command.ESTOP), b"")
-    bench.axes[1].hear(stop, bench.schedule.bus_time_ns(0))
+    bench.axes[1].on_frame(stop, bench.schedule.bus_time_ns(0))
     bench.run(119)
     assert bench.agent.phase is Phase.STOPPED
-    assert "left drive (node 1) dropped out: ESTOP_REQUESTED" in bench.agent.guard.stopped_because
+    assert "left drive (node 1) dropped out: ESTOP_REQUESTED" in bench.agent.guard.stop_reason
     assert [axis.torque_demand_shaft(0.0) for axis in bench.axes] == [0.0, 0.0]
     before = bench.agent.share(120).s
     bench.run(20)
@@ -72,22 +72,22 @@ def test_what_is_missing_is_named() -> None:
     brief = agent_brief(SCENARIO, "r1", network=NOWHERE, bus=())
     agent = Agent(brief, RowBuffer(row_of(brief.signals), lambda *_: None))
     assert agent.missing_to_start() == ["the localisation system", "the leader"]
-    agent.take_leader(LeaderSpeed(((0, 0.6),)))
-    agent.take_pose(PoseFix(-1, 0, 0.0, 0.0, 0.0))
+    agent.receive_leader_speed(LeaderSpeed(((0, 0.6),)))
+    agent.receive_pose(PoseFix(-1, 0, 0.0, 0.0, 0.0))
     assert agent.missing_to_start() == []
     bench = Bench("r2")
     assert bench.agent.missing(0) == ["path state of r1"]
     assert bench.agent.missing(1) == ["pose"]  # of tick 0, a period late
     assert bench.agent.missing(2) == []
-    bench.agent.take_path("r1", PathState(0, 0, 0.0, 0.6))
-    bench.agent.take_pose(PoseFix(0, 0, 0.0, 0.0, 0.0))
+    bench.agent.receive_path_state("r1", PathState(0, 0, 0.0, 0.6))
+    bench.agent.receive_pose(PoseFix(0, 0, 0.0, 0.0, 0.0))
     assert bench.agent.missing(0) == bench.agent.missing(1) == []
 
 
 def test_a_row_holds_what_was_used_and_commanded() -> None:
     bench = Bench()
     bench.run(bench.schedule.countdown_ticks)
-    bench.agent.take_path("r1", PathState(0, 0, 0.0, 0.6))
+    bench.agent.receive_path_state("r1", PathState(0, 0, 0.0, 0.6))
     bench.tick()
     bench.agent._rows.finish()
     (row,) = (dict(zip(COLUMNS, values, strict=True)) for values in bench.rows)
@@ -100,7 +100,7 @@ def test_a_row_holds_what_was_used_and_commanded() -> None:
 
 def test_a_leader_link_moves_the_estimate_and_its_absence_does_not() -> None:
     hearing, deaf = Bench("r1"), Bench("r2")
-    hearing.agent.take_leader(LeaderSpeed(((0, 1.0),)))
+    hearing.agent.receive_leader_speed(LeaderSpeed(((0, 1.0),)))
     for bench in (hearing, deaf):
         bench.run(bench.schedule.countdown_ticks)
         bench.run(3)

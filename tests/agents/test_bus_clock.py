@@ -28,6 +28,6 @@ def test_each_tick_is_due_once_whether_its_frames_came_or_its_period_passed(
     clock = BusClock(SCHEDULE, lambda _: True)
     ticks = []
     for k, here in enumerate(came):
-        ticks.append(clock.due(k * SCHEDULE.period_ns) if here else clock.passed())
+        ticks.append(clock.due(k * SCHEDULE.period_ns) if here else clock.due_without_frames())
     first = -SCHEDULE.countdown_ticks
     assert ticks == list(range(first, first + len(came)))

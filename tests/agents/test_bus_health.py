@@ -97,7 +97,7 @@ class Wire(can.BusABC):
         if self.echoes:
             self.inbox.append(frame)
         for axis in self.bench.axes:
-            axis.hear(frame, self.bus_ns)
+            axis.on_frame(frame, self.bus_ns)
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         self._live()
@@ -120,7 +120,7 @@ class PoseLink:
         period_ns = self.bench.schedule.period_ns
         tick = (self.clock.now_ns - self.epoch_ns) // period_ns
         if self.bench.schedule.localises(tick) and self.bench.pose is not None:
-            self.bench.agent.take_pose(PoseFix(tick, tick * period_ns, *self.bench.pose))
+            self.bench.agent.receive_pose(PoseFix(tick, tick * period_ns, *self.bench.pose))
 
 
 class Rig:
@@ -169,7 +169,7 @@ def test_an_interface_taken_down_and_up_is_survived_and_driven_on_after_arming()
     phases = [event.phase for event in rig.bench.agent.guard.events]
     assert phases == [Phase.STOPPED, Phase.REARMING, Phase.DRIVING], rig.events
     assert rig.loop.counters.bus_errors > 100
-    assert rig.bench.agent.guard.stopped_because == ""
+    assert rig.bench.agent.guard.stop_reason == ""
     after = [frame for at_ns, frame in rig.wire.log if at_ns >= up_ns]
     driven = [n for n, frame in enumerate(after) if set_points([frame]) not in ([], [ZERO])]
     clearing = [n for n, frame in enumerate(after) if frame.can_id == 0x018]

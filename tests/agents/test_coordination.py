@@ -26,7 +26,7 @@ def fleet(scenario: Scenario, share_every: int, ticks: int) -> np.ndarray:
         now_ns = tick * 1_000_000
         if tick % share_every == 0:
             for speaker, hearer in graph.edges:
-                ears[hearer].hear(speaker, now_ns, states[speaker].s, states[speaker].v_hat)
+                ears[hearer].receive(speaker, now_ns, states[speaker].s, states[speaker].v_hat)
         sums = {r: ears[r].sums(now_ns) for r in graph.robots}
         states = {r: minds[r].advance(states[r], *sums[r], 0.6) for r in graph.robots}
         history.append([states[r] for r in graph.robots])

@@ -85,8 +85,8 @@ def test_whatever_encoders_say_the_controller_lives_and_sends_numbers(
     bench = Bench("r2", law=LAW.choose({"law": law}, ""), localisation=source, host=host)
     bench.drive(3)
     for right, left, right_speed, left_speed in wheels:
-        bench.axes[0].feed(right, right_speed)
-        bench.axes[1].feed(left, left_speed)
+        bench.axes[0].update_encoder(right, right_speed)
+        bench.axes[1].update_encoder(left, left_speed)
         for data in set_points(bench.tick()):
             assert isfinite(struct.unpack("<f", data)[0])
         said = bench.agent.share(bench.tick_now)

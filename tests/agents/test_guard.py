@@ -183,7 +183,7 @@ def test_odometry_alone_needs_no_pose() -> None:
 def test_a_torque_that_is_not_finite_never_reaches_the_bus(torque: float) -> None:
     bench = Bench()
     bench.drive(5)
-    frames = list(bench.agent.guard.act(bench.tick_now, torque, 0.1))
+    frames = list(bench.agent.guard.command(bench.tick_now, torque, 0.1))
     assert set_points(frames) == [ZERO, ZERO]
     assert "not finite" in bench.why
 
@@ -203,7 +203,7 @@ def test_an_encoder_that_jumps_or_a_pose_that_does_is_not_believed() -> None:
     limits = ("host.encoder_mismatch_limit_wheel_rad=1.0", "host.pose_mismatch_limit_m=0.3")
     bench = Bench("r2", *limits)
     bench.drive(50)
-    bench.axes[0].feed(1.0, 0.0)
+    bench.axes[0].update_encoder(1.0, 0.0)
     failing(bench, 3)
     assert "right encoder: angle and speed disagree by 6.3 rad" in bench.why
     bench = Bench("r2", *limits)
@@ -377,7 +377,7 @@ def test_a_dry_run_computes_and_records_and_sends_nothing() -> None:
     wet.agent._rows.finish(), dry.agent._rows.finish()
     assert dry.rows[0] == wet.rows[0]
     assert "dry run: nothing was sent to the drives" in dry.agent.guard.notices()
-    assert list(dry.agent.leave()) == []
+    assert list(dry.agent.shut_down()) == []
 
 
 def test_a_dry_run_names_drives_that_could_not_be_driven() -> None:
@@ -402,7 +402,7 @@ def test_leaving_disarms_from_every_phase_as_configured(phase: Phase, estop: boo
         bench.estop(0)
     bench.until(phase)
     bench.run(2)
-    frames = list(bench.agent.leave())
+    frames = list(bench.agent.shut_down())
     assert bench.phase is Phase.DONE
     assert set_points(frames) == [ZERO, ZERO]
     assert commands(frames).count(Cmd.ESTOP) == (2 if estop else 0)
@@ -429,7 +429,7 @@ HAPPENINGS = {
     "unsent": lambda bench: bench.agent.guard.note_unsent(bench.tick_now),
     "all well": mend,
     "cleared": lambda bench: [
-        axis.hear(frame, bench.now_ns)
+        axis.on_frame(frame, bench.now_ns)
         for axis in bench.axes
         for frame in [bench.agent.guard.drives._axes[axis.node_id].frame(Cmd.CLEAR_ERRORS, b"\0")]
     ],
@@ -480,6 +480,6 @@ def test_a_pose_of_the_future_does_not_stand_in_for_those_to_come() -> None:
     bench = Bench("r2", schedule=schedule)
     bench.drive(5)
     bench.pose = None
-    bench.agent.take_pose(PoseFix(10**6, 0, 1.95, 0.05, 1.57))
+    bench.agent.receive_pose(PoseFix(10**6, 0, 1.95, 0.05, 1.57))
     failing(bench)
     assert "no pose" in bench.why

@@ -16,25 +16,25 @@ def ears(*names: str) -> Neighbours:
 
 def test_a_value_is_carried_on_by_its_age_to_the_middle_of_the_period() -> None:
     heard = ears("r2")
-    heard.hear("r2", 0, 1.0, 0.6)
+    heard.receive("r2", 0, 1.0, 0.6)
     assert heard.sums(0).s == pytest.approx(1.0 + 0.6 * HALF)
     assert heard.sums(15 * MS).s == pytest.approx(1.0 + 0.6 * (0.015 + HALF))
 
 
 def test_a_value_is_carried_on_no_further_than_the_age_limit() -> None:
     heard = ears("r2")
-    heard.hear("r2", 0, 1.0, 0.6)
+    heard.receive("r2", 0, 1.0, 0.6)
     assert heard.sums(800 * MS).s == pytest.approx(1.0 + 0.6 * (0.5 + HALF))
 
 
 def test_a_silent_neighbour_leaves_the_sums_and_comes_back_when_it_speaks() -> None:
     heard = ears("r2", "r3")
-    heard.hear("r2", 0, 1.0, 0.5)
-    heard.hear("r3", 0, 2.0, 0.5)
+    heard.receive("r2", 0, 1.0, 0.5)
+    heard.receive("r3", 0, 2.0, 0.5)
     assert heard.sums(1000 * MS).n == 2
-    heard.hear("r3", 1000 * MS, 3.0, 0.5)
+    heard.receive("r3", 1000 * MS, 3.0, 0.5)
     assert heard.sums(1001 * MS).n == 1
-    heard.hear("r2", 1002 * MS, 4.0, 0.5)
+    heard.receive("r2", 1002 * MS, 4.0, 0.5)
     assert heard.sums(1002 * MS).n == 2
 
 
@@ -44,10 +44,10 @@ def test_who_has_not_spoken_yet_does_not_count() -> None:
 
 def test_old_and_repeated_messages_change_nothing() -> None:
     heard = ears("r2")
-    heard.hear("r2", 20 * MS, 1.0, 0.6)
+    heard.receive("r2", 20 * MS, 1.0, 0.6)
     before = heard.sums(30 * MS)
-    heard.hear("r2", 10 * MS, 9.0, 9.0)
-    heard.hear("r2", 20 * MS, 9.0, 9.0)
+    heard.receive("r2", 10 * MS, 9.0, 9.0)
+    heard.receive("r2", 20 * MS, 9.0, 9.0)
     assert heard.sums(30 * MS) == before
 
 
@@ -55,15 +55,15 @@ def test_sums_do_not_depend_on_the_order_of_arrival() -> None:
     one, other = ears("r2", "r3", "r4"), ears("r2", "r3", "r4")
     said = [("r2", 0.1, 0.6), ("r3", 0.7, 0.5), ("r4", 1e-9, 0.3)]
     for name, s, v in said:
-        one.hear(name, 0, s, v)
+        one.receive(name, 0, s, v)
     for name, s, v in reversed(said):
-        other.hear(name, 0, s, v)
+        other.receive(name, 0, s, v)
     assert one.sums(7 * MS) == other.sums(7 * MS)
 
 
 def test_the_speed_estimate_is_held_as_received() -> None:
     heard = ears("r2")
-    heard.hear("r2", 0, 0.0, 0.50)
-    heard.hear("r2", 20 * MS, 0.0, 0.52)
+    heard.receive("r2", 0, 0.0, 0.50)
+    heard.receive("r2", 20 * MS, 0.0, 0.52)
     assert heard.sums(30 * MS).v == 0.52
     assert heard.sums(300 * MS).v == 0.52

@@ -39,8 +39,8 @@ def one_robot(heard: int, hears_leader: bool, share_every: int) -> np.ndarray:
         names = [f"r{n}" for n in range(heard)]
         ears = Neighbours(names, LIMITS, H_S)
         for name in names:
-            ears.hear(name, 0, unit[6] / heard, unit[5] / heard)
-            ears.hear(name, period_ns, unit[4] / heard, unit[3] / heard)
+            ears.receive(name, 0, unit[6] / heard, unit[5] / heard)
+            ears.receive(name, period_ns, unit[4] / heard, unit[3] / heard)
         state = CoordinationState(*unit[:3])
         for tick in range(share_every):
             state = mind.advance(state, *ears.sums(period_ns + tick * tick_ns), 0.0)

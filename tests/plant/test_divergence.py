@@ -32,7 +32,7 @@ def robot_of(preset: str = "ideal", *overrides: str) -> EmulatedRobot:
 
 
 def tell(robot: EmulatedRobot, node: int, command: Command, data: bytes, now_ns: int = 0) -> None:
-    robot.hear(Frame(identifier(node, command), data), now_ns)
+    robot.on_frame(Frame(identifier(node, command), data), now_ns)
 
 
 def arm(robot: EmulatedRobot) -> None:

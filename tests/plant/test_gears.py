@@ -43,9 +43,9 @@ def pushed(
     robot = emulated_robot(plant_brief(scenario, network=NetworkLink("t", "", "", "")).robots[0])
     closed = f.ONE_U32.pack(AxisState.CLOSED_LOOP_CONTROL)
     for node in (0, 1):
-        robot.hear(Frame(identifier(node, Command.SET_AXIS_STATE), closed), 0)
+        robot.on_frame(Frame(identifier(node, Command.SET_AXIS_STATE), closed), 0)
         torque = f.ONE_FLOAT.pack(shaft_N_m)
-        robot.hear(Frame(identifier(node, Command.SET_INPUT_TORQUE), torque), 0)
+        robot.on_frame(Frame(identifier(node, Command.SET_INPUT_TORQUE), torque), 0)
     for tick in range(ticks):
         robot.frames_due(tick * PERIOD_NS)
         robot.advance(tick * 1e-3, 1e-3, 1)
@@ -78,18 +78,20 @@ def test_the_velocity_limit_of_check_is_where_the_wheel_gets_nothing_more(
     at_m_s = 0.5 * limit.speed_m_s
     robot, _ = pushed(scenario, 0.0, 0)
     robot.state = robot.state._replace(v=at_m_s)
-    robot.feed()
+    robot.update_encoders()
     radius_m = scenario.body_of(scenario.robot[0]).wheel_radius_m
     left = limit.torque_wheel_N_m - limit.slope_wheel_N_m_s * at_m_s / radius_m
     for drive in robot.drives:
-        drive.hear(Frame(identifier(drive.node_id, Command.SET_AXIS_STATE), f.ONE_U32.pack(8)), 0)
-        drive.hear(
+        drive.on_frame(
+            Frame(identifier(drive.node_id, Command.SET_AXIS_STATE), f.ONE_U32.pack(8)), 0
+        )
+        drive.on_frame(
             Frame(
                 identifier(drive.node_id, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(sign * 50.0)
             ),
             0,
         )
-        drive.hear(
+        drive.on_frame(
             Frame(identifier(drive.node_id, Command.SET_LIMITS), f.TWO_FLOATS.pack(10.0, 1e6)), 0
         )
         demand = drive.torque_demand_shaft(0.001) * sign * ratio

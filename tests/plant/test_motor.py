@@ -74,7 +74,7 @@ def test_no_demand_takes_the_current_above_its_limit() -> None:
 def test_a_wrong_torque_constant_in_the_drive_shows_at_the_wheel_and_not_in_its_estimate() -> None:
     made = motor(torque_constant_N_m_A=0.04, torque_noise_shaft_N_m=0.0, **FREE)
     assert settled(made, 0.2) == pytest.approx(0.16)
-    assert made.sense()[0] == pytest.approx(0.2)
+    assert made.measure()[0] == pytest.approx(0.2)
 
 
 def test_above_its_no_load_speed_a_motor_can_not_push() -> None:
@@ -242,7 +242,7 @@ def test_a_robot_on_two_wheels_stops_and_does_not_chatter() -> None:
 def test_the_estimate_is_noisy_and_the_current_comes_in_steps() -> None:
     made = motor()
     settled(made, 0.1234)
-    samples = [made.sense() for _ in range(4000)]
+    samples = [made.measure() for _ in range(4000)]
     torques = [torque for torque, _ in samples]
     assert fmean(torques) == pytest.approx(0.1234, abs=1e-4)
     assert pstdev(torques) == pytest.approx(1e-3, rel=0.05)
@@ -253,13 +253,13 @@ def test_the_estimate_is_noisy_and_the_current_comes_in_steps() -> None:
 def test_noise_and_steps_may_be_switched_off() -> None:
     made = motor(torque_noise_shaft_N_m=0.0, current_quantum_A=0.0)
     settled(made, 0.1234)
-    assert made.sense() == pytest.approx((0.1234, 2.468))
+    assert made.measure() == pytest.approx((0.1234, 2.468))
 
 
 def test_the_same_seed_gives_the_same_noise_and_another_one_another() -> None:
     def noise(seed: int) -> list[float]:
         made = motor(seed)
-        return [made.sense()[0] for _ in range(5)]
+        return [made.measure()[0] for _ in range(5)]
 
     assert noise(3) == noise(3) != noise(4)
 
@@ -274,7 +274,7 @@ def test_nothing_that_is_asked_of_a_motor_makes_it_anything_but_finite(
     for demand, speed, step_s in steps:
         torque = made.step(demand, speed, step_s)
         source.step(made.power_W, made.power_W, step_s)
-        values = (torque, made.current_A, made.power_W, made.fet_C, made.motor_C, *made.sense())
+        values = (torque, made.current_A, made.power_W, made.fet_C, made.motor_C, *made.measure())
         assert all(map(isfinite, values))
         assert not isnan(source.bus_V)
         assert abs(made.current_A) <= 10.0 + 1e-9

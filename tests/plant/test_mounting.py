@@ -22,11 +22,11 @@ def driven(*overrides: str) -> tuple[tuple[float, ...], tuple[float, ...], Emula
     robot = emulated_robot(plant_brief(scenario, network=NETWORK).robots[0])
     client = protocol("odrive").client(agent_brief(scenario, "r1", network=NETWORK, bus=()).drives)
     for frame in (*client.torque(0.2, 0.1), *CLOSE):
-        robot.hear(frame, 0)
+        robot.on_frame(frame, 0)
     for k in range(50):
         robot.advance(k * 0.002, 0.002, 2)
     for frame in robot.frames_due(100_000_000):
-        client.hear(*frame, 100_000_000)
+        client.on_frame(*frame, 100_000_000)
     motion = client.motion()
     assert motion is not None
     return motion, robot.row(0.1), robot

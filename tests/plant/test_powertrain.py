@@ -63,7 +63,7 @@ def trace(parts: Powertrain) -> list[object]:
     seen: list[object] = []
     for n in range(50):
         parts.step((0.1, 0.1), (20.0, 20.0), STEP_S)
-        seen.append(parts.right_motor.sense())
+        seen.append(parts.right_motor.measure())
         seen.append(parts.right_encoder.step(20.0 * n * STEP_S, STEP_S))
     return seen
 
@@ -75,11 +75,11 @@ def test_a_run_is_the_same_by_seed() -> None:
 def test_no_source_of_noise_depends_on_how_often_another_is_asked() -> None:
     quiet, asked = built(), built()
     for _ in range(10):
-        asked.left_motor.sense()
+        asked.left_motor.measure()
         asked.left_encoder.step(1.0, STEP_S)
     assert trace(quiet) == trace(asked)
 
 
 def test_right_and_left_have_noises_of_their_own() -> None:
     parts = built()
-    assert parts.right_motor.sense() != parts.left_motor.sense()
+    assert parts.right_motor.measure() != parts.left_motor.measure()

@@ -23,8 +23,10 @@ def robot_of() -> EmulatedRobot:
 
 def arm(robot: EmulatedRobot, right: float, left: float) -> None:
     for node, torque in ((0, right), (1, left)):
-        robot.hear(Frame(identifier(node, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(torque)), 0)
-        robot.hear(Frame(identifier(node, Command.SET_AXIS_STATE), f.ONE_U32.pack(8)), 0)
+        robot.on_frame(
+            Frame(identifier(node, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(torque)), 0
+        )
+        robot.on_frame(Frame(identifier(node, Command.SET_AXIS_STATE), f.ONE_U32.pack(8)), 0)
 
 
 def test_frames_of_an_instant_come_in_order_of_arbitration() -> None:
@@ -76,8 +78,8 @@ def test_feedback_comes_once_both_drives_have_taken_a_set_point() -> None:
     arm(robot, 0.0, 0.0)
     right = Frame(identifier(0, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(0.1))
     left = Frame(identifier(1, Command.SET_INPUT_TORQUE), f.ONE_FLOAT.pack(0.1))
-    robot.hear(right, 5_000)
+    robot.on_frame(right, 5_000)
     assert robot.feedback(6_000) == ()
-    robot.hear(left, 7_000)
+    robot.on_frame(left, 7_000)
     assert [frame.can_id for frame in robot.feedback(8_000)] == [0x009, 0x029]
     assert robot.feedback(9_000) == ()

@@ -36,7 +36,7 @@ def axis(**changes) -> OdriveNode:
 
 
 def tell(node: OdriveNode, command: Command, data: bytes = b"", now_ns: int = 0) -> list[Frame]:
-    return list(node.hear(Frame(f.identifier(node.node_id, command), data), now_ns))
+    return list(node.on_frame(Frame(f.identifier(node.node_id, command), data), now_ns))
 
 
 def ask_state(node: OdriveNode, state: int, now_ns: int = 0) -> None:
@@ -63,10 +63,10 @@ def modes(node: OdriveNode, control: int, inputs: int = 1) -> None:
 
 
 def beat(node: OdriveNode, now_ns: int = 0) -> f.Heartbeat:
-    (frame,) = node.hear(f.request(node.node_id, Command.HEARTBEAT), now_ns)
+    (frame,) = node.on_frame(f.request(node.node_id, Command.HEARTBEAT), now_ns)
     return f.decode_heartbeat(frame.data)
 
 
 def asked(node: OdriveNode, command: Command, now_ns: int = 0) -> tuple[float, float]:
-    (frame,) = node.hear(f.request(node.node_id, command), now_ns)
+    (frame,) = node.on_frame(f.request(node.node_id, command), now_ns)
     return f.decode_floats(frame.data)

@@ -39,8 +39,8 @@ class Bench:
         self.silent: set[int] = set()  # drives that neither say nor hear anything
         self.mute: set[tuple[int, Command]] = set()  # what drives don't say
         self.pose: tuple[float, float, float] | None = (1.95, 0.05, 1.57)  # None: it is silent
-        self.agent.take_pose(PoseFix(-1, 0, 1.95, 0.05, 1.57))
-        self.agent.take_path(
+        self.agent.receive_pose(PoseFix(-1, 0, 1.95, 0.05, 1.57))
+        self.agent.receive_path_state(
             "r1", PathState(-1, -brief.schedule.period_ns, 0.0, 0.6)
         ) if brief.hears else None
 
@@ -58,7 +58,7 @@ class Bench:
 
     @property
     def why(self) -> str:
-        return self.agent.guard.stopped_because
+        return self.agent.guard.stop_reason
 
     def tick(self) -> list[Frame]:
         """One period: what drives and localisation say, the controller's answer."""
@@ -77,16 +77,16 @@ class Bench:
                 command = Command(frame.can_id & 0x1F)
                 node = axis.node_id
                 if node not in self.silent and (node, command) not in self.mute:
-                    self.agent.hear(*frame, now_ns)
+                    self.agent.on_frame(*frame, now_ns)
         if self.pose is not None and self.schedule.localises(tick):
-            self.agent.take_pose(PoseFix(tick, tick * self.schedule.period_ns, *self.pose))
+            self.agent.receive_pose(PoseFix(tick, tick * self.schedule.period_ns, *self.pose))
 
     def answer(self, frames: list[Frame]) -> None:
         """The drives hear the controller."""
         for frame in frames:
             for axis in self.axes:
                 if axis.node_id not in self.silent:
-                    axis.hear(frame, self.now_ns)
+                    axis.on_frame(frame, self.now_ns)
 
     def run(self, ticks: int) -> list[list[Frame]]:
         """Some periods: what was sent in each."""
@@ -108,15 +108,15 @@ class Bench:
     def estop(self, node: int, *, heard: bool = False) -> None:
         """Somebody stops a drive, on the bus or by its own input."""
         frame = Frame(identifier(node, Command.ESTOP), b"")
-        self.axes[node].hear(frame, self.now_ns)
+        self.axes[node].on_frame(frame, self.now_ns)
         if heard:
-            self.agent.hear(*frame, self.now_ns)
+            self.agent.on_frame(*frame, self.now_ns)
 
     def reboot(self, node: int) -> None:
         """A drive loses its power for a moment: idle, without an error, limits forgotten."""
         axis = self.axes[node]
-        axis.hear(Frame(identifier(node, Command.SET_AXIS_STATE), b"\1\0\0\0"), self.now_ns)
-        axis.hear(Frame(identifier(node, Command.REBOOT), b"\0"), self.now_ns)
+        axis.on_frame(Frame(identifier(node, Command.SET_AXIS_STATE), b"\1\0\0\0"), self.now_ns)
+        axis.on_frame(Frame(identifier(node, Command.REBOOT), b"\0"), self.now_ns)
 
     def torques(self) -> tuple[float, float]:
         """What the drives ask of their motors."""

@@ -43,7 +43,7 @@ _PACK_TWO = f.TWO_FLOATS.pack
 _new = tuple.__new__  # of a frame, past its constructor: this is the hot path
 _UNPACK_TWO = f.TWO_FLOATS.unpack
 
-_Hearer = Callable[[bytes | bytearray, int], None]
+_Handler = Callable[[bytes | bytearray, int], None]
 
 
 class _Step(Enum):
@@ -61,7 +61,7 @@ class OdriveClient:
         self._left = RemoteAxis("left", link.left_node, link.mounting.left_sign, link)
         self._axes = (self._right, self._left)
         self._encoders = self._by_id(Command.GET_ENCODER_ESTIMATES)
-        self._others = self._hearers()
+        self._others = self._handlers_by_id()
         self._encoder_limit_ns = link.encoder_age_limit_ns
         self._heartbeat_limit_ns = link.heartbeat_age_limit_ns
         self._torque_ids = tuple(self._by_id(Command.SET_INPUT_TORQUE))
@@ -77,32 +77,32 @@ class OdriveClient:
         self.sent_wheel_N_m = (0.0, 0.0)
         """(right, left) torque last sent, at the wheels [N·m], as float32 carries it."""
 
-    def hear(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
+    def on_frame(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         """Take any frame from the bus."""
         axis = self._encoders.get(can_id)
         if axis is None:
-            hearer = self._others.get(can_id)
-            if hearer is not None:
-                hearer(data, now_ns)
+            handler = self._others.get(can_id)
+            if handler is not None:
+                handler(data, now_ns)
         elif len(data) == 8:
             angle, speed = _UNPACK_TWO(data)
             total = angle + speed
             if total - total == 0.0:  # both are finite
                 axis.angle_wheel_rad = angle * axis.wheel_rad_per_shaft_rev
                 axis.speed_wheel_rad_s = speed * axis.wheel_rad_per_shaft_rev
-                axis.stamp_ns = now_ns
+                axis.encoder_ns = now_ns
                 axis.encoder_frames += 1
         elif not data:
-            axis.hear_request(Command.GET_ENCODER_ESTIMATES)
+            axis.on_request(Command.GET_ENCODER_ESTIMATES)
 
-    def heard_since(self, bus_ns: int) -> bool:
+    def feedback_since(self, bus_ns: int) -> bool:
         """Whether both wheels' encoder frames came after this bus time."""
-        return self._right.stamp_ns > bus_ns and self._left.stamp_ns > bus_ns
+        return self._right.encoder_ns > bus_ns and self._left.encoder_ns > bus_ns
 
     def motion(self) -> Motion | None:
         """The newest wheel angles and speeds, None before both wheels were heard."""
         right, left = self._right, self._left
-        if right.stamp_ns == NEVER or left.stamp_ns == NEVER:
+        if right.encoder_ns == NEVER or left.encoder_ns == NEVER:
             return None
         return (
             right.angle_wheel_rad,
@@ -192,16 +192,16 @@ class OdriveClient:
         """Why the wheels can't be driven now, None if they can."""
         if now_ns <= self._well_until_ns:
             since_ns = now_ns - self._encoder_limit_ns
-            if self._right.stamp_ns >= since_ns and self._left.stamp_ns >= since_ns:
+            if self._right.encoder_ns >= since_ns and self._left.encoder_ns >= since_ns:
                 return None
         for axis in self._axes:
             if axis.trouble:
                 return f"{axis.name}{axis.trouble}"
-            heard_ns = axis.heard_ns
+            heartbeat_ns = axis.heartbeat_ns
             if (
-                heard_ns is None
-                or now_ns - heard_ns > self._heartbeat_limit_ns
-                or now_ns - axis.stamp_ns > self._encoder_limit_ns
+                heartbeat_ns is None
+                or now_ns - heartbeat_ns > self._heartbeat_limit_ns
+                or now_ns - axis.encoder_ns > self._encoder_limit_ns
             ):
                 return axis.absence(now_ns, self._link)
             if self.armed and not axis.closed_loop:
@@ -268,42 +268,42 @@ class OdriveClient:
     def _by_id(self, command: Command) -> dict[int, RemoteAxis]:
         return {f.identifier(axis.node, command): axis for axis in self._axes}
 
-    def _hearers(self) -> dict[int, _Hearer]:
+    def _handlers_by_id(self) -> dict[int, _Handler]:
         """What isn't an encoder frame: heartbeats, requests of others, commands of others."""
-        hearers: dict[int, _Hearer] = {}
+        handlers: dict[int, _Handler] = {}
         for axis in self._axes:
-            hearers[f.identifier(axis.node, Command.HEARTBEAT)] = partial(self._hear_beat, axis)
+            handlers[f.identifier(axis.node, Command.HEARTBEAT)] = partial(self._on_heartbeat, axis)
             for asked in (Command.HEARTBEAT, Command.GET_ENCODER_ESTIMATES):
-                hearers[f.identifier(axis.node, asked) | RTR] = partial(_hear_request, axis, asked)
+                handlers[f.identifier(axis.node, asked) | RTR] = partial(_on_request, axis, asked)
             for command in _FOREIGN:
-                hearers[f.identifier(axis.node, command)] = partial(_hear_command, axis)
+                handlers[f.identifier(axis.node, command)] = partial(_on_command, axis)
             for flag in (0, RTR):
-                hearers[f.identifier(axis.node, Command.ESTOP) | flag] = partial(
-                    self._hear_estop, axis
+                handlers[f.identifier(axis.node, Command.ESTOP) | flag] = partial(
+                    self._on_estop, axis
                 )
-        return hearers
+        return handlers
 
-    def _hear_beat(self, axis: RemoteAxis, data: bytes | bytearray, now_ns: int) -> None:
+    def _on_heartbeat(self, axis: RemoteAxis, data: bytes | bytearray, now_ns: int) -> None:
         since_ns = self._closing_ns
-        if axis.hear_heartbeat(data, now_ns) and since_ns is not None and not self.armed:
+        if axis.on_heartbeat(data, now_ns) and since_ns is not None and not self.armed:
             self.armed = self._right.ready_since(since_ns) and self._left.ready_since(since_ns)
-        self._note_well()
+        self._update_health()
 
-    def _hear_estop(self, axis: RemoteAxis, _data: bytes | bytearray, _now_ns: int) -> None:
-        axis.hear_estop()
-        self._note_well()
+    def _on_estop(self, axis: RemoteAxis, _data: bytes | bytearray, _now_ns: int) -> None:
+        axis.on_estop()
+        self._update_health()
 
-    def _note_well(self) -> None:
+    def _update_health(self) -> None:
         well = all(axis.closed_loop and not axis.trouble for axis in self._axes)
-        heard_ns = min(axis.heard_ns or NEVER for axis in self._axes)
-        self._well_until_ns = heard_ns + self._heartbeat_limit_ns if well else NEVER
+        heartbeat_ns = min(axis.heartbeat_ns or NEVER for axis in self._axes)
+        self._well_until_ns = heartbeat_ns + self._heartbeat_limit_ns if well else NEVER
 
 
-def _hear_request(axis: RemoteAxis, asked: Command, _data: bytes | bytearray, _now_ns: int) -> None:
-    axis.hear_request(asked)
+def _on_request(axis: RemoteAxis, asked: Command, _data: bytes | bytearray, _now_ns: int) -> None:
+    axis.on_request(asked)
 
 
-def _hear_command(axis: RemoteAxis, _data: bytes | bytearray, _now_ns: int) -> None:
+def _on_command(axis: RemoteAxis, _data: bytes | bytearray, _now_ns: int) -> None:
     axis.commanded += 1
 
 

@@ -47,7 +47,7 @@ class GetVersion:
         self.versions: Versions | None = None
         self._node: int | None = None
 
-    def hear(self, frame: Frame) -> Frame | None:
+    def on_frame(self, frame: Frame) -> Frame | None:
         """Take a frame from the bus; return the request at the first heartbeat."""
         can_id, data = frame
         if self._node is None:

@@ -107,7 +107,7 @@ class LocalAxis:
 
     # --- the plant's end -------------------------------------------------------------------------
 
-    def feed(self, revolutions: float, rev_s: float) -> None:
+    def update_encoder(self, revolutions: float, rev_s: float) -> None:
         """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
         self.position = revolutions + self._offset
         self.velocity = rev_s
@@ -117,7 +117,7 @@ class LocalAxis:
         self._lasting = AxisError.MISSING_ESTIMATE
         self.disarm(self._lasting)
 
-    def take_measurements(self, measurements: DriveMeasurements) -> None:
+    def update_measurements(self, measurements: DriveMeasurements) -> None:
         """Take what the drive measures; derate, and disarm if that says so."""
         self.measurements = measurements
         model = self.model

@@ -83,7 +83,7 @@ class OdriveNode(LocalAxis):
 
     # --- the hot path ----------------------------------------------------------------------------
 
-    def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
+    def on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Take one frame from the bus; return the replies."""
         can_id, data = frame
         if can_id == self.setpoint_id and len(data) == 4:
@@ -100,7 +100,7 @@ class OdriveNode(LocalAxis):
             return _NONE
         if self._boots_ns != NEVER:
             self._boot(now_ns)
-        return self._hear(frame, now_ns)
+        return self._on_frame(frame, now_ns)
 
     def due(self, now_ns: int) -> Sequence[Frame]:
         """Frames due until this instant; the watchdog is looked at first."""
@@ -179,7 +179,7 @@ class OdriveNode(LocalAxis):
 
     # --- what it hears ---------------------------------------------------------------------------
 
-    def _hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
+    def _on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         can_id, data = frame
         node, command = (can_id & 0x7FF) >> f.BITS, can_id & 0x1F
         ours = self.parameters.node_id

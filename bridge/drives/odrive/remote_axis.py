@@ -3,7 +3,7 @@
     angle, speed    of the wheel, from the newest encoder frame whose numbers are finite
     trouble         why its wheel must not be driven: errors, an e-stop seen on its way to it, two
                     senders of its telemetry
-    heard_ns        bus time of its newest heartbeat, stamp_ns of its newest encoder frame
+    heartbeat_ns        bus time of its newest heartbeat, encoder_ns of its newest encoder frame
 
 Answers to requests of other hosts are told from a second sender by counting the requests.
 """
@@ -34,13 +34,13 @@ class RemoteAxis:
         "closed_loop",
         "commanded",
         "encoder_frames",
+        "encoder_ns",
         "errors",
-        "heard_ns",
+        "heartbeat_ns",
         "name",
         "node",
         "result",
         "speed_wheel_rad_s",
-        "stamp_ns",
         "state",
         "to_shaft",
         "to_wheel",
@@ -58,8 +58,8 @@ class RemoteAxis:
         self.to_wheel = sign * ratio
         """Torque at the wheel per torque at the shaft."""
         self.angle_wheel_rad = self.speed_wheel_rad_s = 0.0
-        self.stamp_ns = NEVER
-        self.heard_ns: int | None = None
+        self.encoder_ns = NEVER
+        self.heartbeat_ns: int | None = None
         self.state = int(AxisState.UNDEFINED)
         self.result = 0
         self.closed_loop = False
@@ -80,14 +80,14 @@ class RemoteAxis:
 
     # --- what is heard ---------------------------------------------------------------------------
 
-    def hear_heartbeat(self, data: bytes | bytearray, now_ns: int) -> bool:
+    def on_heartbeat(self, data: bytes | bytearray, now_ns: int) -> bool:
         """Take a heartbeat; False if it is a request for one, or none at all."""
         if len(data) != f.HEARTBEAT.size:
             self._heartbeats -= not data
             return False
         heartbeat = f.decode_heartbeat(data)
         self._heartbeats += 1
-        self.heard_ns = now_ns
+        self.heartbeat_ns = now_ns
         self.errors = heartbeat.errors
         self.state, self.result = heartbeat.state, heartbeat.result
         self.closed_loop = heartbeat.state == AxisState.CLOSED_LOOP_CONTROL
@@ -95,14 +95,14 @@ class RemoteAxis:
         self._note_trouble()
         return True
 
-    def hear_request(self, command: Command) -> None:
+    def on_request(self, command: Command) -> None:
         """Somebody asked for a frame out of its turn: it is no sign of a second sender."""
         if command is Command.HEARTBEAT:
             self._heartbeats -= 1
         else:
             self.encoder_frames -= 1
 
-    def hear_estop(self) -> None:
+    def on_estop(self) -> None:
         """Somebody stopped it: known before its next heartbeat says so."""
         self.errors |= AxisError.ESTOP_REQUESTED
         self.closed_loop = False
@@ -135,20 +135,23 @@ class RemoteAxis:
 
     def ready_since(self, since_ns: int) -> bool:
         """Whether it said after `since_ns` that it is in closed loop, and nothing is wrong."""
-        heard_ns = self.heard_ns
+        heartbeat_ns = self.heartbeat_ns
         return (
-            heard_ns is not None and heard_ns > since_ns and self.closed_loop and not self.trouble
+            heartbeat_ns is not None
+            and heartbeat_ns > since_ns
+            and self.closed_loop
+            and not self.trouble
         )
 
     def absence(self, now_ns: int, link: DriveLink) -> str:
         """Why it isn't there, "" if it is."""
-        if self.heard_ns is None:
+        if self.heartbeat_ns is None:
             return f"{self.name}: no heartbeat heard yet"
-        if now_ns - self.heard_ns > link.heartbeat_age_limit_ns:
-            return f"{self.name}: no heartbeat for {(now_ns - self.heard_ns) * 1e-9:.1f} s"
-        if self.stamp_ns == NEVER:
+        if now_ns - self.heartbeat_ns > link.heartbeat_age_limit_ns:
+            return f"{self.name}: no heartbeat for {(now_ns - self.heartbeat_ns) * 1e-9:.1f} s"
+        if self.encoder_ns == NEVER:
             return f"{self.name}: no encoder frame heard yet"
-        if now_ns - self.stamp_ns > link.encoder_age_limit_ns:
+        if now_ns - self.encoder_ns > link.encoder_age_limit_ns:
             return f"{self.name}: no encoder frames any more"
         return ""
 

@@ -119,7 +119,7 @@ def test_what_is_too_long_is_not_even_looked_at() -> None:
 
 def test_the_leader_speed_holds_from_each_step_on_and_before_the_first() -> None:
     speed = LeaderSpeed(((0, 0.6), (10, 0.4), (20, 0.5)))
-    assert [speed.at(t) for t in (-5, 0, 9, 10, 19, 20, 99)] == [
+    assert [speed.speed_at(t) for t in (-5, 0, 9, 10, 19, 20, 99)] == [
         0.6,
         0.6,
         0.6,

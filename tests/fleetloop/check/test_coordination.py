@@ -38,7 +38,7 @@ def driven(scenario: Scenario, ticks: int) -> np.ndarray:
         now_ns = round(tick * h * 1e9)
         if tick % every == 0:
             for speaker, hearer in graph.edges:
-                ears[hearer].hear(speaker, now_ns, states[speaker].s, states[speaker].v_hat)
+                ears[hearer].receive(speaker, now_ns, states[speaker].s, states[speaker].v_hat)
         rows.append([states[robot].s for robot in graph.robots])
         speed = scenario.leader.speed_m_s
         states = {r: minds[r].advance(states[r], *ears[r].sums(now_ns), speed) for r in states}

@@ -28,7 +28,7 @@ class PlainClient:
         self.armed = False
         self.sent_wheel_N_m = (0.0, 0.0)
 
-    def hear(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
+    def on_frame(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         for node, gear in zip(self._nodes, self._gears, strict=True):
             if can_id == MOTION + node:
                 rev, rev_s = ENCODER.unpack(data)
@@ -36,7 +36,7 @@ class PlainClient:
                 self._motion[node] = rev * REV * per_rev, rev_s * REV_S * per_rev
                 self._stamps[node] = now_ns
 
-    def heard_since(self, bus_ns: int) -> bool:
+    def feedback_since(self, bus_ns: int) -> bool:
         return min(self._stamps.values()) > bus_ns
 
     def motion(self) -> Motion | None:

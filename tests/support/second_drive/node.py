@@ -23,7 +23,7 @@ class PlainNode:
         self.input_torque_shaft = 0.0
         self._motion = (0.0, 0.0)
 
-    def feed(self, revolutions: float, rev_s: float) -> None:
+    def update_encoder(self, revolutions: float, rev_s: float) -> None:
         self._motion = (revolutions, rev_s)
 
     def lose_estimate(self) -> None:
@@ -39,14 +39,14 @@ class PlainNode:
         rev, rev_s = self._motion
         return Frame(self._id, ENCODER.pack(round(rev / REV), round(rev_s / REV_S)))
 
-    def hear(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
+    def on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         if frame.can_id == self.setpoint_id:
             (steps,) = SET_POINT.unpack(frame.data)
             self.input_torque_shaft = steps * self._unit
             self.fed_ns = now_ns
         return ()
 
-    def take_measurements(self, measurements: DriveMeasurements) -> None:
+    def update_measurements(self, measurements: DriveMeasurements) -> None:
         pass
 
     def torque_demand_shaft(self, dt_s: float) -> float:  # noqa: ARG002

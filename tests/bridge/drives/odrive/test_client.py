@@ -41,11 +41,11 @@ class Robot:
         """A period: what the drives hear, and what they then say."""
         for frame in answers:
             for axis in self.axes:
-                axis.hear(frame, self.now_ns)
+                axis.on_frame(frame, self.now_ns)
         self.now_ns += MS
         for axis in self.axes:
             for frame in axis.due(self.now_ns):
-                self.client.hear(*frame, self.now_ns)
+                self.client.on_frame(*frame, self.now_ns)
 
     def arm(self) -> int:
         for count in range(1000):
@@ -72,7 +72,7 @@ def test_arming_ends_with_both_axes_in_closed_loop_at_zero_torque(robot: Robot) 
 def test_a_latched_error_is_cleared_on_the_way(robot: Robot) -> None:
     for frame in robot.client.estop():
         for axis in robot.axes:
-            axis.hear(frame, 0)
+            axis.on_frame(frame, 0)
     robot.arm()
     assert [axis.errors for axis in robot.axes] == [AxisError(0)] * 2
 
@@ -91,17 +91,17 @@ def test_torques_reach_their_own_wheels_and_are_known_as_sent(robot: Robot) -> N
 
 
 def test_readings_are_radians(robot: Robot) -> None:
-    robot.axes[0].feed(1.5, 0.25)
-    robot.axes[1].feed(-1.0, 0.5)
+    robot.axes[0].update_encoder(1.5, 0.25)
+    robot.axes[1].update_encoder(-1.0, 0.5)
     robot.tick()
-    assert robot.client.heard_since(robot.now_ns - 1)
-    assert not robot.client.heard_since(robot.now_ns)
+    assert robot.client.feedback_since(robot.now_ns - 1)
+    assert not robot.client.feedback_since(robot.now_ns)
     assert robot.client.motion() == pytest.approx((3 * pi, -2 * pi, pi / 2, pi))
 
 
 def test_a_drive_that_trips_is_named_with_its_error(robot: Robot) -> None:
     robot.arm()
-    robot.axes[1].hear(Frame(identifier(1, Command.ESTOP), b""), robot.now_ns)
+    robot.axes[1].on_frame(Frame(identifier(1, Command.ESTOP), b""), robot.now_ns)
     for _ in range(100):
         robot.tick(*robot.client.torque(0.0, 0.0))
     assert robot.client.fault(robot.now_ns) == ("left drive (node 1) dropped out: ESTOP_REQUESTED")
@@ -135,8 +135,8 @@ def test_a_torque_beyond_float32_saturates() -> None:
 
 
 def test_frames_of_wrong_length_are_no_readings(robot: Robot) -> None:
-    robot.client.hear(identifier(0, Command.GET_ENCODER_ESTIMATES), bytes(4), 5)
-    robot.client.hear(identifier(0, Command.HEARTBEAT), bytes(3), 5)
+    robot.client.on_frame(identifier(0, Command.GET_ENCODER_ESTIMATES), bytes(4), 5)
+    robot.client.on_frame(identifier(0, Command.HEARTBEAT), bytes(3), 5)
     assert robot.client.motion() is None
     assert "no heartbeat heard yet" in robot.client.fault(5)
 
@@ -197,7 +197,7 @@ def test_what_keeps_each_drive_from_closed_loop_is_said_of_both(robot: Robot) ->
 @pytest.mark.parametrize("remote", [0, RTR])
 def test_an_estop_on_the_bus_counts_before_the_next_heartbeat(robot: Robot, remote: int) -> None:
     robot.arm()
-    robot.client.hear(identifier(0, Command.ESTOP) | remote, b"", robot.now_ns)
+    robot.client.on_frame(identifier(0, Command.ESTOP) | remote, b"", robot.now_ns)
     assert robot.client.fault(robot.now_ns) == "right drive (node 0) dropped out: ESTOP_REQUESTED"
     assert robot.client.refusal() is not None
 
@@ -209,7 +209,7 @@ def test_a_host_may_clear_a_watchdog_but_not_an_estop(robot: Robot) -> None:
     assert "WATCHDOG" in robot.client.fault(robot.now_ns)
     assert robot.client.refusal() is None
     assert robot.client.obstacle(robot.now_ns) is None
-    robot.axes[0].hear(Frame(identifier(0, Command.ESTOP), b""), robot.now_ns)
+    robot.axes[0].on_frame(Frame(identifier(0, Command.ESTOP), b""), robot.now_ns)
     for _ in range(100):
         robot.tick()
     assert "ESTOP_REQUESTED" in robot.client.refusal()
@@ -229,7 +229,7 @@ def test_a_second_sender_of_encoder_frames_or_heartbeats_is_a_fault(robot: Robot
         robot.tick(*robot.client.torque(0.0, 0.0))
         for frame in twin.due(robot.now_ns):
             if frame.can_id & 0x1F == Command.GET_ENCODER_ESTIMATES:
-                robot.client.hear(*frame, robot.now_ns)
+                robot.client.on_frame(*frame, robot.now_ns)
     fault = robot.client.fault(robot.now_ns)
     assert fault.startswith("left drive (node 1): 2.0 times the encoder frames of one sender")
     assert robot.client.obstacle(robot.now_ns) == fault
@@ -240,7 +240,7 @@ def test_a_second_sender_of_encoder_frames_or_heartbeats_is_a_fault(robot: Robot
         robot.tick(*robot.client.torque(0.0, 0.0))
         if robot.now_ns % (100 * MS) == 37 * MS:
             beat = f.HEARTBEAT.pack(0, AxisState.CLOSED_LOOP_CONTROL, 0, 0, 0)
-            robot.client.hear(identifier(0, Command.HEARTBEAT), beat, robot.now_ns)
+            robot.client.on_frame(identifier(0, Command.HEARTBEAT), beat, robot.now_ns)
     assert "2.0 times the heartbeats" in robot.client.fault(robot.now_ns)
 
 
@@ -251,9 +251,9 @@ def test_answers_to_somebody_elses_requests_are_no_second_sender(robot: Robot, a
         robot.tick(*robot.client.torque(0.0, 0.0))
         for command in (Command.GET_ENCODER_ESTIMATES, Command.HEARTBEAT):
             question = Frame(identifier(1, command) | ask, bytes(8) if ask else b"")
-            robot.client.hear(*question, robot.now_ns)
-            for answer in robot.axes[1].hear(question, robot.now_ns):
-                robot.client.hear(*answer, robot.now_ns)
+            robot.client.on_frame(*question, robot.now_ns)
+            for answer in robot.axes[1].on_frame(question, robot.now_ns):
+                robot.client.on_frame(*answer, robot.now_ns)
         assert robot.client.fault(robot.now_ns) is None
 
 
@@ -267,7 +267,7 @@ def test_a_drive_that_delivers_a_fifth_of_a_second_at_once_is_no_second_sender()
         for axis in robot.axes:
             for k in range(200):  # a backlog
                 for frame in axis.due(stamp_ns + k * MS):
-                    robot.client.hear(*frame, stamp_ns + 200 * MS)
+                    robot.client.on_frame(*frame, stamp_ns + 200 * MS)
         robot.now_ns = stamp_ns + 200 * MS
         assert robot.client.fault(robot.now_ns) is None
 
@@ -277,22 +277,22 @@ def test_readings_that_are_not_finite_are_not_taken(robot: Robot) -> None:
     before = robot.client.motion()
     for angle, speed in ((nan, 0.0), (0.0, nan), (inf, 0.0), (inf, -inf)):
         data = f.TWO_FLOATS.pack(angle, speed)
-        robot.client.hear(identifier(0, Command.GET_ENCODER_ESTIMATES), data, robot.now_ns + 1)
+        robot.client.on_frame(identifier(0, Command.GET_ENCODER_ESTIMATES), data, robot.now_ns + 1)
     assert robot.client.motion() == before
-    assert not robot.client.heard_since(robot.now_ns)
+    assert not robot.client.feedback_since(robot.now_ns)
 
 
 def test_error_frames_and_other_numbers_are_nothing_to_it(robot: Robot) -> None:
     robot.arm()
     for can_id in (0x001 | ERR, 0x009 | ERR, 0x002 | ERR, 0x002 | EFF, 0x042, 0x7FF):
-        robot.client.hear(can_id, bytes(8), robot.now_ns + MS)
+        robot.client.on_frame(can_id, bytes(8), robot.now_ns + MS)
     assert robot.client.fault(robot.now_ns) is None
     assert robot.client.notices == ()
 
 
 def test_commands_of_somebody_else_are_noticed(robot: Robot) -> None:
     robot.arm()
-    robot.client.hear(identifier(1, Command.SET_INPUT_TORQUE), bytes(4), robot.now_ns)
+    robot.client.on_frame(identifier(1, Command.SET_INPUT_TORQUE), bytes(4), robot.now_ns)
     assert robot.client.notices == ("left drive (node 1): 1 commands of another host",)
 
 
@@ -320,8 +320,8 @@ def test_mounting_turns_wheel_values_into_shaft_values_and_back(signs, ratio, ri
             LINK, mounting=Mounting(right_sign=signs[0], left_sign=signs[1], gear_ratio=ratio)
         )
     )
-    robot.axes[0].feed(right, 2 * right)
-    robot.axes[1].feed(left, 2 * left)
+    robot.axes[0].update_encoder(right, 2 * right)
+    robot.axes[1].update_encoder(left, 2 * left)
     robot.tick()
     per_turn = [2 * pi * sign / ratio for sign in signs]
     expected = right * per_turn[0], left * per_turn[1]
@@ -346,5 +346,5 @@ def test_default_mounting_changes_no_bit() -> None:
 def test_no_frame_can_raise(can_id: int, data: bytes) -> None:
     client = OdriveClient(LINK)
     for number in (can_id, can_id & 0x3F, (can_id & 0x3F) | RTR):
-        client.hear(number, data, 1)
+        client.on_frame(number, data, 1)
     client.fault(2), client.missing(2), client.obstacle(2), client.refusal()

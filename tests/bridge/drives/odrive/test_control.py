@@ -26,7 +26,7 @@ def spin(node: OdriveNode, seconds: float, inertia: float = 0.01, dt: float = 0.
     for _ in range(round(seconds / dt)):
         speed += node.torque_demand_shaft(dt) / inertia * dt / (2 * pi)
         at += speed * dt
-        node.feed(at, speed)
+        node.update_encoder(at, speed)
         speeds.append(speed)
     return speeds
 
@@ -39,7 +39,7 @@ def test_velocity_mode_is_proportional_and_integral_with_feed_forward() -> None:
     floats(node, Command.SET_INPUT_VEL, 2.0, 0.05)
     assert node.torque_demand_shaft(0.01) == pytest.approx(0.05 + 0.1 * 2.0)
     assert node.torque_demand_shaft(0.01) == pytest.approx(0.05 + 0.1 * 2.0 + 0.5 * 2.0 * 0.01)
-    node.feed(0.0, 3.0)
+    node.update_encoder(0.0, 3.0)
     assert node.torque_demand_shaft(0.01) == pytest.approx(0.05 - 0.1 + 2 * 0.01)
 
 
@@ -63,7 +63,7 @@ def test_the_velocity_limit_holds_in_velocity_mode_and_the_current_limit_everywh
 
 def test_position_mode_is_a_cascade_over_velocity_mode() -> None:
     node = axis(**UNWATCHED)
-    node.feed(1.0, 0.5)
+    node.update_encoder(1.0, 0.5)
     modes(node, ControlMode.POSITION)
     floats(node, Command.SET_POS_GAIN, 4.0)
     floats(node, Command.SET_VEL_GAINS, 0.1, 0.0)
@@ -86,7 +86,7 @@ def test_arming_in_position_mode_holds_the_place_where_the_axis_is() -> None:
     node = axis(**UNWATCHED)
     modes(node, ControlMode.POSITION)
     position(node, 100.0)
-    node.feed(7.0, 0.0)
+    node.update_encoder(7.0, 0.0)
     assert arm(node).torque_demand_shaft(0.001) == 0.0
 
 

@@ -40,10 +40,10 @@ def test_a_remote_frame_sets_nothing_and_clears_nothing() -> None:
     torque(node, 0.25, 5)
     for command in Command:
         if command not in (Command.ESTOP, Command.ADDRESS):
-            node.hear(Frame(f.identifier(NODE, command) | RTR, bytes(8)), 7)
+            node.on_frame(Frame(f.identifier(NODE, command) | RTR, bytes(8)), 7)
     assert (node.torque_demand_shaft(0.001), node.fed_ns) == (0.25, 5)
     node.estop()
-    node.hear(Frame(f.identifier(NODE, Command.CLEAR_ERRORS) | RTR, b""), 8)
+    node.on_frame(Frame(f.identifier(NODE, Command.CLEAR_ERRORS) | RTR, b""), 8)
     assert beat(node).errors == AxisError.ESTOP_REQUESTED
 
 
@@ -90,7 +90,7 @@ def test_nonsense_limits_neither_reverse_the_torque_nor_make_it_no_number(limits
 def test_infinite_limits_are_none() -> None:
     node = arm(axis())
     floats(node, Command.SET_LIMITS, inf, inf)
-    node.feed(0.0, 1e4)
+    node.update_encoder(0.0, 1e4)
     torque(node, 1e6)
     assert node.torque_demand_shaft(0.001) == 1e6
 
@@ -155,7 +155,7 @@ def test_idle_takes_the_torque_away_at_once() -> None:
 def test_an_emergency_stop_acts_whatever_its_frame_and_latches(can_id: int) -> None:
     node = arm(axis())
     torque(node, 0.25)
-    node.hear(Frame(can_id, b""), 0)
+    node.on_frame(Frame(can_id, b""), 0)
     assert node.torque_demand_shaft(0.001) == 0.0
     ask_state(node, AxisState.CLOSED_LOOP_CONTROL)
     assert beat(node)[:2] == (AxisError.ESTOP_REQUESTED, AxisState.IDLE)
@@ -204,7 +204,7 @@ def test_silence_without_a_watchdog_leaves_the_last_torque_for_ever() -> None:
 
 def test_a_29_bit_identifier_with_our_number_is_ignored() -> None:
     node = arm(axis())
-    assert not node.hear(Frame(node.setpoint_id | EFF, QUARTER), 5)
+    assert not node.on_frame(Frame(node.setpoint_id | EFF, QUARTER), 5)
     assert (node.torque_demand_shaft(0.001), node.fed_ns) == (0.0, 0)
 
 
@@ -214,7 +214,7 @@ def test_frames_for_other_nodes_are_ignored(other: int) -> None:
     torque(node, 0.25)
     for command in Command:
         if command is not Command.ADDRESS:
-            assert not node.hear(Frame(f.identifier(other, command), bytes(8)), 5)
+            assert not node.on_frame(Frame(f.identifier(other, command), bytes(8)), 5)
     assert (node.torque_demand_shaft(0.001), node.fed_ns, node.ignored) == (0.25, 0, 0)
 
 
@@ -222,7 +222,7 @@ def test_frames_for_other_nodes_are_ignored(other: int) -> None:
 def test_an_unknown_command_is_ignored_and_counted(command: int) -> None:
     node = arm(axis())
     torque(node, 0.25)
-    assert not node.hear(Frame(NODE << f.BITS | command, bytes(8)), 5)
+    assert not node.on_frame(Frame(NODE << f.BITS | command, bytes(8)), 5)
     assert (node.torque_demand_shaft(0.001), node.fed_ns, node.ignored) == (0.25, 0, 1)
 
 
@@ -231,7 +231,7 @@ def test_telemetry_that_somebody_imitates_is_ignored() -> None:
     before = beat(node)
     spoofs = [c for c in Command if c.name.startswith("GET_")] + [Command.HEARTBEAT, Command.TX_SDO]
     for command in spoofs:
-        assert not node.hear(Frame(f.identifier(NODE, command), b"\xff" * 8), 5)
+        assert not node.on_frame(Frame(f.identifier(NODE, command), b"\xff" * 8), 5)
     assert (beat(node), node.fed_ns, node.ignored) == (before, 0, len(spoofs))
 
 

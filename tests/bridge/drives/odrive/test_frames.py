@@ -72,7 +72,7 @@ def test_documented_bytes_of_a_torque_and_of_closed_loop() -> None:
 @given(st.floats(-1e6, 1e6, width=32), st.floats(-1e3, 1e3, width=32))
 def test_the_vendors_dbc_reads_our_encoder_frames(position: float, speed: float) -> None:
     node = OdriveNode(MODEL, 1, 1)
-    node.feed(position, speed)
+    node.update_encoder(position, speed)
     (_, frame, _) = node.due(0)
     name, signals = decoded(load_dbc(), frame)
     assert name == "Axis1_Get_Encoder_Estimates"
@@ -83,7 +83,7 @@ def test_every_cyclic_and_every_requested_frame_is_one_of_the_dbc(dbc) -> None:
     node = OdriveNode(MODEL, 2, 0x1234)
     sent = list(node.due(0))
     for command in Command:
-        sent += node.hear(Frame(f.identifier(2, command) | RTR, bytes(8)), 0)
+        sent += node.on_frame(Frame(f.identifier(2, command) | RTR, bytes(8)), 0)
     names = {decoded(dbc, frame)[0].removeprefix("Axis2_") for frame in sent}
     assert {
         "Heartbeat",
@@ -108,11 +108,11 @@ def test_every_frame_that_the_controller_sends_is_one_of_the_dbc(dbc) -> None:
     sent = []
     for now_ns in range(0, 400_000_000, 1_000_000):
         for frame in (frame for drive in drives for frame in drive.due(now_ns)):
-            client.hear(*frame, now_ns)
+            client.on_frame(*frame, now_ns)
         said = client.arm(now_ns)
         for frame in said:
             for drive in drives:
-                drive.hear(frame, now_ns)
+                drive.on_frame(frame, now_ns)
         sent += said
     assert client.armed
     sent += [*client.torque(0.1, 0.2), *client.disarm(), *client.estop()]

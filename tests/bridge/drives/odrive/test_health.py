@@ -24,7 +24,7 @@ from bridge.drives.odrive.node import OdriveNode
 def driven(**changes) -> OdriveNode:
     node = arm(axis(watchdog_ns=0, **changes))
     torque(node, 5.0)
-    node.take_measurements(HEALTHY)
+    node.update_measurements(HEALTHY)
     return node
 
 
@@ -34,16 +34,16 @@ def driven(**changes) -> OdriveNode:
 @pytest.mark.parametrize("which", ["fet_C", "motor_C"])
 def test_the_current_limit_falls_linearly_with_temperature(which, celsius, factor) -> None:
     node = driven()
-    node.take_measurements(HEALTHY._replace(**{which: celsius}))
+    node.update_measurements(HEALTHY._replace(**{which: celsius}))
     assert node.torque_demand_shaft(0.001) == pytest.approx(0.5 * factor)
     assert node.state is AxisState.CLOSED_LOOP_CONTROL
-    node.take_measurements(HEALTHY)
+    node.update_measurements(HEALTHY)
     assert node.torque_demand_shaft(0.001) == pytest.approx(0.5)
 
 
 def test_limits_set_while_hot_are_derated() -> None:
     node = driven()
-    node.take_measurements(HEALTHY._replace(fet_C=110.0))
+    node.update_measurements(HEALTHY._replace(fet_C=110.0))
     floats(node, Command.SET_LIMITS, 10.0, 4.0)
     assert node.torque_demand_shaft(0.001) == pytest.approx(4.0 * 0.5 * 0.05)
 
@@ -64,13 +64,13 @@ def test_limits_set_while_hot_are_derated() -> None:
 )
 def test_what_leaves_its_range_disarms_and_keeps_from_arming_while_it_lasts(changes, error) -> None:
     node = driven()
-    node.take_measurements(HEALTHY._replace(**changes))
+    node.update_measurements(HEALTHY._replace(**changes))
     assert node.torque_demand_shaft(0.001) == 0.0
     assert beat(node)[:3] == (error, AxisState.IDLE, ProcedureResult.DISARMED)
     tell(node, Command.CLEAR_ERRORS)
     ask_state(node, AxisState.CLOSED_LOOP_CONTROL)
     assert beat(node)[:2] == (error, AxisState.IDLE)
-    node.take_measurements(HEALTHY)
+    node.update_measurements(HEALTHY)
     assert beat(node).errors == error  # latched
     tell(node, Command.CLEAR_ERRORS)
     arm(node)
@@ -81,14 +81,14 @@ def test_what_leaves_its_range_disarms_and_keeps_from_arming_while_it_lasts(chan
 )
 def test_what_is_just_within_its_range_does_not_disarm(changes) -> None:
     node = driven()
-    node.take_measurements(HEALTHY._replace(**changes))
+    node.update_measurements(HEALTHY._replace(**changes))
     assert node.state is AxisState.CLOSED_LOOP_CONTROL
 
 
 def test_measurements_are_told_on_the_bus() -> None:
     node = driven()
-    node.feed(0.0, 2.0)
-    node.take_measurements(
+    node.update_encoder(0.0, 2.0)
+    node.update_measurements(
         HEALTHY._replace(torque_shaft_N_m=0.4, current_A=8.0, bus_V=23.5, bus_A=2.0, motor_C=41.0)
     )
     node.torque_demand_shaft(0.001)
@@ -109,9 +109,9 @@ def test_a_motor_without_thermistor_has_no_temperature() -> None:
 def felt_for(node: OdriveNode, seconds: float, velocity: float, watts: float) -> None:
     """Told to push with 0.5 N·m at an encoder that says `velocity`, drawing `watts`."""
     for k in range(round(seconds * 1000)):
-        node.feed(velocity * k * 0.001, velocity)
+        node.update_encoder(velocity * k * 0.001, velocity)
         node.torque_demand_shaft(0.001)
-        node.take_measurements(
+        node.update_measurements(
             HEALTHY._replace(torque_shaft_N_m=0.5, current_A=10.0, bus_A=watts / 24.0)
         )
 
@@ -140,7 +140,7 @@ def test_an_encoder_that_freezes_goes_unnoticed_and_velocity_mode_pushes_on() ->
     modes(node, ControlMode.VELOCITY)
     floats(arm(node), Command.SET_INPUT_VEL, 2.0, 0.0)
     for t in range(3000):
-        node.feed(1.0, 0.0)
+        node.update_encoder(1.0, 0.0)
         node.due(t * MS)
         demand = node.torque_demand_shaft(0.001)
     assert demand == pytest.approx(0.5)
@@ -150,14 +150,14 @@ def test_an_encoder_that_freezes_goes_unnoticed_and_velocity_mode_pushes_on() ->
 def test_an_encoder_that_jumps_goes_unnoticed_in_torque_mode() -> None:
     node = arm(axis())
     torque(node, 0.2)
-    node.feed(1000.0, 0.0)
+    node.update_encoder(1000.0, 0.0)
     node.due(MS)
     assert node.torque_demand_shaft(0.001) == pytest.approx(0.2)
 
 
 def test_an_encoder_that_jumps_too_fast_is_an_overspeed() -> None:
     node = arm(axis())
-    node.feed(1000.0, -12.1)
+    node.update_encoder(1000.0, -12.1)
     assert node.torque_demand_shaft(0.001) == 0.0
     assert node.errors == AxisError.VELOCITY_LIMIT_VIOLATION
 
@@ -166,6 +166,6 @@ def test_an_encoder_that_jumps_too_fast_is_an_overspeed() -> None:
 def test_an_encoder_without_a_number_is_a_missing_estimate(motion) -> None:
     node = arm(axis())
     torque(node, 0.2)
-    node.feed(*motion)
+    node.update_encoder(*motion)
     assert node.torque_demand_shaft(0.001) == 0.0
     assert node.errors == AxisError.MISSING_ESTIMATE

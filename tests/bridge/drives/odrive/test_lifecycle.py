@@ -30,7 +30,7 @@ NUMBER = {endpoint.path: endpoint.number for endpoint in ENDPOINTS.values()}
 
 def told(node: OdriveNode, serial: int, node_id: int, length: int = 8) -> None:
     data = (bytes((node_id,)) + serial.to_bytes(6, "little") + b"\0")[:length]
-    node.hear(Frame(f.identifier(f.UNADDRESSED, Command.ADDRESS), data), 0)
+    node.on_frame(Frame(f.identifier(f.UNADDRESSED, Command.ADDRESS), data), 0)
 
 
 def read(node: OdriveNode, path: str, code: str = "f") -> float:
@@ -124,7 +124,7 @@ def test_a_reboot_is_silent_for_a_while_and_forgets_what_was_not_saved() -> None
     tell(node, Command.REBOOT, b"\0", 10 * MS)
     assert node.next_due_ns == 510 * MS
     assert not node.due(509 * MS)
-    assert not node.hear(f.request(NODE, Command.HEARTBEAT), 509 * MS)
+    assert not node.on_frame(f.request(NODE, Command.HEARTBEAT), 509 * MS)
     assert [frame.can_id & 0x1F for frame in node.due(510 * MS)] == [1, 9]
     assert read(node, "axis0.controller.config.vel_limit") == 10.0
 
@@ -157,7 +157,7 @@ def test_dfu_mode_is_the_end_of_it(command: int, data: bytes) -> None:
     node = axis()
     tell(node, Command(command), data)
     assert not node.due(3600 * SECOND)
-    assert not node.hear(f.request(NODE, Command.HEARTBEAT), 3600 * SECOND)
+    assert not node.on_frame(f.request(NODE, Command.HEARTBEAT), 3600 * SECOND)
 
 
 # --- address -------------------------------------------------------------------------------------
@@ -170,7 +170,7 @@ def test_an_unaddressed_drive_is_silent_but_answers_for_its_address_after_a_whil
     assert not node.due(SECOND)
     torque(node, 0.2)
     assert node.input_torque_shaft == 0.0
-    assert not node.hear(f.request(f.UNADDRESSED, Command.ADDRESS), SECOND)
+    assert not node.on_frame(f.request(f.UNADDRESSED, Command.ADDRESS), SECOND)
     at_ns = node.next_due_ns
     assert SECOND < at_ns <= SECOND + ANSWER_WITHIN_NS
     (reply,) = node.due(at_ns)
@@ -185,7 +185,7 @@ def test_unaddressed_drives_answer_at_different_times() -> None:
     at = set()
     for serial in range(20):
         node = OdriveNode(MODEL, f.UNADDRESSED, serial)
-        node.hear(f.request(f.UNADDRESSED, Command.ADDRESS), 0)
+        node.on_frame(f.request(f.UNADDRESSED, Command.ADDRESS), 0)
         at.add(node.next_due_ns)
     assert len(at) > 15
 
@@ -219,7 +219,7 @@ def test_every_endpoint_reads_as_its_type() -> None:
 
 def test_endpoints_say_what_messages_say() -> None:
     node = arm(axis())
-    node.feed(1.5, 0.25)
+    node.update_encoder(1.5, 0.25)
     assert read(node, "vbus_voltage") == 24.0
     assert read(node, "axis0.pos_estimate") == 1.5
     assert read(node, "axis0.current_state", "B") == 8
@@ -275,13 +275,13 @@ def test_a_watchdog_that_is_turned_on_counts_from_then_on() -> None:
 def test_endpoint_requests_that_make_no_sense_get_no_answer_and_change_nothing(data) -> None:
     node = axis(firmware_version=(0, 6, 11))
     assert tell(node, Command.RX_SDO, data) == []
-    assert not node.hear(Frame(f.identifier(NODE, Command.RX_SDO) | RTR, bytes(8)), 0)
+    assert not node.on_frame(Frame(f.identifier(NODE, Command.RX_SDO) | RTR, bytes(8)), 0)
     assert read(node, "axis0.controller.config.vel_gain") == pytest.approx(1 / 6)
 
 
 def test_the_table_comes_in_the_form_of_the_vendors_file() -> None:
     flat = flat_endpoints((0, 6, 10))
-    said = axis().hear(f.request(NODE, Command.GET_VERSION), 0)[0].data
+    said = axis().on_frame(f.request(NODE, Command.GET_VERSION), 0)[0].data
     assert flat["fw_version"] == ".".join(map(str, said[4:7])) == "0.6.10"
     assert flat["hw_version"] == ".".join(map(str, said[1:4])) == "4.4.58"
     assert flat["endpoints"]["vbus_voltage"] == {"id": 1, "type": "float", "access": "r"}
@@ -317,8 +317,8 @@ def test_a_saved_configuration_outlives_the_reboot_and_nothing_is_saved_while_ar
     write(node, path, 1.25)
     (reply,) = call(node, "save_configuration")
     assert reply.data[4] == 1
-    assert not node.hear(f.request(NODE, Command.HEARTBEAT), SECOND - 1)
-    assert node.hear(f.request(NODE, Command.HEARTBEAT), SECOND)  # booted, before it says so
+    assert not node.on_frame(f.request(NODE, Command.HEARTBEAT), SECOND - 1)
+    assert node.on_frame(f.request(NODE, Command.HEARTBEAT), SECOND)  # booted, before it says so
     assert read(node, path) == 1.25
     arm(node, SECOND)
     assert call(node, "save_configuration", now_ns=SECOND)[0].data[4] == 0

@@ -29,9 +29,9 @@ def test_torque_is_limited_by_current_and_by_speed() -> None:
     node = arm(axis())
     torque(node, 5.0)
     assert node.torque_demand_shaft() == pytest.approx(0.5)  # 10 A × 0.05 N·m/A
-    node.feed(0.0, 9.4)
+    node.update_encoder(0.0, 9.4)
     assert node.torque_demand_shaft() == pytest.approx(0.1)  # (10 − 9.4) rev/s × 1/6
-    node.feed(0.0, 10.6)
+    node.update_encoder(0.0, 10.6)
     assert node.torque_demand_shaft() == pytest.approx(-0.1)
 
 
@@ -88,10 +88,10 @@ def test_the_watchdog_disarms_after_its_time_and_says_so() -> None:
 def test_requests_and_frames_for_others_do_not_feed_the_watchdog() -> None:
     node = arm(axis())
     for t in range(101):
-        node.hear(f.request(NODE, Command.GET_IQ), t * MS)
-        node.hear(Frame(f.identifier(NODE + 1, Command.SET_INPUT_TORQUE), bytes(4)), t * MS)
-        node.hear(Frame(f.identifier(NODE, Command.GET_ENCODER_ESTIMATES), bytes(8)), t * MS)
-        node.hear(Frame(f.identifier(NODE, Command.SET_INPUT_TORQUE) | RTR, bytes(4)), t * MS)
+        node.on_frame(f.request(NODE, Command.GET_IQ), t * MS)
+        node.on_frame(Frame(f.identifier(NODE + 1, Command.SET_INPUT_TORQUE), bytes(4)), t * MS)
+        node.on_frame(Frame(f.identifier(NODE, Command.GET_ENCODER_ESTIMATES), bytes(8)), t * MS)
+        node.on_frame(Frame(f.identifier(NODE, Command.SET_INPUT_TORQUE) | RTR, bytes(4)), t * MS)
     node.due(101 * MS)
     assert beat(node).errors == AxisError.WATCHDOG_TIMER_EXPIRED
 
@@ -119,7 +119,7 @@ def test_estop_and_clear_errors_work_with_any_length(length: int) -> None:
 
 def test_overspeed_disarms() -> None:
     node = arm(axis())
-    node.feed(0.0, 12.1)
+    node.update_encoder(0.0, 12.1)
     node.due(1 * MS)
     assert beat(node).errors == AxisError.VELOCITY_LIMIT_VIOLATION
 
@@ -133,7 +133,7 @@ def test_no_torque_that_is_not_finite_ever_reaches_the_motor(value: float) -> No
 
 def test_motion_beyond_what_the_wire_can_hold_saturates() -> None:
     node = axis(torque_limiters=False)
-    node.feed(1e60, -1e60)
+    node.update_encoder(1e60, -1e60)
     (frame,) = [frame for frame in node.due(0) if len(frame.data) == 8 and frame.can_id & 1][1:]
     position, speed = f.TWO_FLOATS.unpack(frame.data)
     assert (position, speed) == (pytest.approx(3.4028235e38), pytest.approx(-3.4028235e38))
@@ -156,7 +156,7 @@ def test_every_get_is_answered_to_a_remote_and_to_an_empty_frame() -> None:
                 Frame(f.identifier(NODE, command) | RTR, b""),
                 Frame(f.identifier(NODE, command), b""),
             ):
-                (reply,) = node.hear(ask, 0)
+                (reply,) = node.on_frame(ask, 0)
                 assert reply.can_id == f.identifier(NODE, command)
                 assert len(reply.data) == 8
 
@@ -170,18 +170,18 @@ def test_cyclic_frames_keep_their_period_without_drift_even_when_looked_at_late(
 
 
 def test_version_says_firmware_0_6() -> None:
-    (reply,) = axis().hear(f.request(NODE, Command.GET_VERSION), 0)
+    (reply,) = axis().on_frame(f.request(NODE, Command.GET_VERSION), 0)
     assert tuple(reply.data[4:6]) == (0, 6)
 
 
 def test_address_is_told_and_set_by_serial_number() -> None:
     node = axis()
-    (reply,) = node.hear(f.request(f.UNADDRESSED, Command.ADDRESS), 0)
+    (reply,) = node.on_frame(f.request(f.UNADDRESSED, Command.ADDRESS), 0)
     assert reply.data[0] == NODE
     assert int.from_bytes(reply.data[1:7], "little") == MODEL.serial_number
     serial = MODEL.serial_number.to_bytes(6, "little")
     ask = Frame(f.identifier(f.UNADDRESSED, Command.ADDRESS), b"\x09" + serial)
-    node.hear(ask, 0)
+    node.on_frame(ask, 0)
     assert node.node_id == 9
     torque(arm(node), 0.1)
     assert node.torque_demand_shaft() == pytest.approx(0.1)
@@ -190,7 +190,7 @@ def test_address_is_told_and_set_by_serial_number() -> None:
 def test_an_address_that_another_serial_number_takes_is_given_up() -> None:
     node = axis()
     other = (1).to_bytes(6, "little")
-    node.hear(Frame(f.identifier(f.UNADDRESSED, Command.ADDRESS), bytes((NODE,)) + other), 0)
+    node.on_frame(Frame(f.identifier(f.UNADDRESSED, Command.ADDRESS), bytes((NODE,)) + other), 0)
     assert node.node_id == f.UNADDRESSED
 
 
@@ -215,5 +215,5 @@ def test_extended_and_error_frames_are_ignored(data: bytes, flag: int) -> None:
     node = arm(axis())
     torque(node, 0.25)
     for command in Command:
-        assert not node.hear(Frame(f.identifier(NODE, command) | flag, data), 0)
+        assert not node.on_frame(Frame(f.identifier(NODE, command) | flag, data), 0)
     assert node.torque_demand_shaft() == 0.25

@@ -72,13 +72,13 @@ def test_nothing_raises_or_yields_a_torque_that_is_not_finite_or_not_armed(chang
         sent: list[Frame] = []
         match happening:
             case DriveMeasurements():
-                node.take_measurements(happening)
+                node.update_measurements(happening)
             case Frame():
-                sent += node.hear(happening, now_ns)
+                sent += node.on_frame(happening, now_ns)
             case int():
                 now_ns += happening
             case (revolutions, rev_s):
-                node.feed(revolutions, rev_s)
+                node.update_encoder(revolutions, rev_s)
         sent += node.due(now_ns)
         assert node.next_due_ns > now_ns
         demand = node.torque_demand_shaft(0.001)
@@ -97,7 +97,7 @@ def test_nothing_but_a_set_point_or_arming_feeds_the_watchdog(sent: list[Frame])
     for t, frame in enumerate(sent, 1):
         before = node.fed_ns
         state = node.state
-        node.hear(frame, t)
+        node.on_frame(frame, t)
         if node.fed_ns == before or not node.fed_ns:
             continue
         armed = state is not AxisState.CLOSED_LOOP_CONTROL is node.state
@@ -121,7 +121,7 @@ def test_calling_due_only_when_it_says_so_misses_nothing(changes, all_) -> None:
         match happening:
             case Frame():
                 both(now_ns)
-                assert seldom.hear(happening, now_ns) == often.hear(happening, now_ns)
+                assert seldom.on_frame(happening, now_ns) == often.on_frame(happening, now_ns)
             case int() if happening < 30 * MS:
                 now_ns += happening
                 both(now_ns)
