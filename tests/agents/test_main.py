@@ -6,7 +6,7 @@ import can
 import pytest
 from support.robot_bench import ZERO, Bench, commands, set_points
 
-from agents.__main__ import _Wired
+from agents.__main__ import _Connections
 from agents.guard import Phase
 from agents.lockstep import LockstepCounters
 from bridge.can_bus.pythoncan import to_frame
@@ -27,7 +27,7 @@ class Ending:
         self.said: list[str] = []
         bus = SimpleNamespace(send=self._send, recv=lambda _: None)
         publisher = SimpleNamespace(put=lambda _: self.said.append("report"))
-        self.wired = _Wired(
+        self.connections = _Connections(
             self.bench.agent, bus, None, publisher, Hellos(0.02), self.bench.agent._rows, publisher
         )
         self.stop = Stop()
@@ -46,7 +46,7 @@ class Ending:
             raise error
 
         with pytest.raises(type(error)):
-            self.wired.run(body, self.stop, LockstepCounters())
+            self.connections.run(body, self.stop, LockstepCounters())
 
 
 @pytest.mark.parametrize(
