@@ -1,1 +1,1 @@
-"""One robot's controller: what moves onto the robot."""
+"""The controller of one robot: the part that moves onto the robot."""

@@ -1,4 +1,4 @@
-"""One robot's controller process. The only file here that wires things.
+"""The process of one robot's controller: connects the agent to its bus and the network.
 
 Started by `fleetloop run` with an `AgentBrief` on standard input; `fleetloop agent` calls `run` in
 a process of its own, on the robot.
@@ -41,15 +41,15 @@ from configs.errors import FleetloopError, InfrastructureError
 from configs.roles import AGENT
 
 REALTIME_DEPTH = 64
-"""In real time, messages of each neighbour that wait: the newest wins."""
+"""Queue depth per subscription in real time; a full queue drops its oldest message."""
 CONTROLLER_PRIORITY = 40
-"""SCHED_FIFO, below the plant's: the drives answer whoever computes."""
+"""SCHED_FIFO priority, below the plant's: emulated drives preempt controllers."""
 
 
 def run(brief: AgentBrief, stop: Stop) -> str:
-    """Wire one agent to its bus and the network, wait for its peers, and run.
+    """Connect one agent to its bus and the network, wait for its peers, and run.
 
-    Returns why it stopped before the end of the run, "" if it did not.
+    Returns the reason for a stop before the end of the run, "" if there was none.
     """
     name_process(f"agent {brief.robot}")
     try:
@@ -92,7 +92,7 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> str:
 
 
 class _Connections(NamedTuple):
-    """A controller with all that it talks to."""
+    """One agent with its bus, its link and its publishers."""
 
     agent: Agent
     bus: can.BusABC
@@ -102,13 +102,13 @@ class _Connections(NamedTuple):
     rows: RowBuffer
     report: Publisher
 
-    def await_peers(self, take: Callable[[Arrival], None], stop: Stop) -> None:
-        """Wait until everybody was heard, and say that this controller is ready."""
+    def await_peers(self, deliver: Callable[[Arrival], None], stop: Stop) -> None:
+        """Wait for the first message of every peer, then declare this controller ready."""
         brief = self.agent.brief
         await_hellos(
             self.link,
             self.hellos,
-            take,
+            deliver,
             self.agent.missing_to_start,
             name=brief.robot,
             within_s=brief.schedule.start_deadline_s,
@@ -123,9 +123,9 @@ class _Connections(NamedTuple):
         counters: LockstepCounters | RealtimeCounters,
         missing_privileges: Sequence[str] = (),
     ) -> str:
-        """Run the loop's body; stop the wheels, hand on the last rows and say the last word.
+        """Run the loop's body; then stop the wheels, publish the last rows and the report.
 
-        Returns why the body stopped early, "" if it did not.
+        Returns the reason for an early end of the body, "" if there was none.
         """
         sampler = Sampler()
         began_ns, waited_ns = cpu_ns(), processor_wait_ns()
@@ -160,21 +160,21 @@ class _Connections(NamedTuple):
         return early
 
     def stop_wheels(self) -> None:
-        """Whatever ended the loop before its time: what disarms the drives, if it can be sent."""
+        """Disarm the drives, as far as the bus still sends, after a loop that ended early."""
         if self.agent.phase is Phase.DONE:
             return
         for can_id, data in self.agent.shut_down():
             with suppress(can.CanError, OSError):
                 self.bus.send(to_message(can_id, data))
         with suppress(can.CanError, OSError):
-            self.bus.recv(0.0)  # what was gathered goes out
+            self.bus.recv(0.0)  # flushes batched frames
 
 
 def _lockstep(connections: _Connections, stop: Stop) -> str:
     bus = connections.bus
     if not isinstance(bus, FleetloopBus):
         raise InfrastructureError(
-            f"{connections.agent.brief.robot}: only a bus of ours can set the pace"
+            f"{connections.agent.brief.robot}: lockstep needs a Fleetloop bus"
         )
     loop = LockstepLoop(
         connections.agent, bus, connections.link, connections.path, connections.hellos

@@ -1,18 +1,18 @@
-"""What of the messages that arrive is believed: one can be well formed and still be impossible.
+"""Plausibility of received messages: a well-formed message can still be impossible.
 
-    message       is refused if
-    path state    its time isn't its tick's, or nothing is shared at that tick
-                  lockstep: its tick is over, was said, or is further ahead than a bus may be
+    message       refused if
+    path state    its time isn't its tick's, or the schedule shares nothing at that tick
+                  lockstep: its tick is over, was received before, or is further ahead than a bus
+                  may be
                   real time: dated more than `ahead_limit_s` ahead of now, older than
-                  `silence_limit_s`, or not newer than what was heard before
-                  s or v̂ are beyond what the scenario can reach (`configs.reach`)
-    pose          likewise of its date; a place or heading beyond this world
-    leader speed  faster than the scenario
+                  `silence_limit_s`, or not newer than the last one of its sender
+                  s or v̂ are beyond the reach of the scenario (`configs.reach`)
+    pose          its date, likewise; a position or heading beyond the reach of any scenario
+    leader speed  faster than the scenario allows
 
-Ticks below 0 say where somebody starts; once control has begun they mean nothing, and those that
-were still on their way aren't counted. What is refused is counted by its sender, changes nothing,
-and so makes the sender silent: in lockstep the wait for it names it, in real time it leaves the
-sums.
+Ticks below 0 carry start values; they are ignored once control has begun, and late ones are not
+counted up to a limit. A refused message is counted by its sender and changes nothing, so its sender
+counts as silent: in lockstep the wait times out with its name, in real time it leaves the sums.
 """
 
 from collections import Counter
@@ -25,21 +25,21 @@ from configs.reach import within_world
 LOCALISATION = "the localisation system"
 LEADER = "the leader"
 LATE_MESSAGES_TOLERATED = 5000
-"""Messages from before the run that may still have been on their way when it began."""
+"""Start messages of one sender that may arrive after control has begun; more are a flood."""
 _AHEAD_TICKS = LEAD_TICKS + 2
-"""A state is said a tick before it is due, and this robot may be between two ticks."""
+"""A path state is published a tick before it is due, and this robot may be between two ticks."""
 
 
 class Admission:
-    """Judges the messages of one robot. Told the time, never asks for it."""
+    """Plausibility checks of one robot's messages. Reads no clock: `tick` and `now_ns` are set."""
 
     def __init__(self, brief: AgentBrief) -> None:
         schedule = brief.schedule
         self.refusals = Refusals()
         self.tick = -schedule.countdown_ticks - 1
-        """The last tick that was computed."""
+        """The tick computed last."""
         self.now_ns = self.tick * schedule.period_ns
-        """Scenario time by the wall clock; in real time whoever keeps the clock says it."""
+        """Scenario time [ns] by the wall clock; set by the loop in real time."""
         self._schedule = schedule
         self._period_ns = schedule.period_ns
         self._reach = brief.reach
@@ -50,7 +50,7 @@ class Admission:
         self._late_count: Counter[str] = Counter()
 
     def admits_path_state(self, robot: str, state: PathState) -> bool:
-        """Whether a path state may be used."""
+        """Whether a path state is plausible; one that isn't is counted."""
         if state.tick < 0 <= self.tick:
             return self._late(robot)
         wrong = self._path_date(robot, state)
@@ -64,7 +64,7 @@ class Admission:
         return True
 
     def admits_pose(self, fix: PoseFix) -> bool:
-        """Whether a pose may be used."""
+        """Whether a pose is plausible; one that isn't is counted."""
         if fix.tick < 0 <= self.tick:
             return self._late(LOCALISATION)
         wrong = self._pose_date(fix)
@@ -78,7 +78,7 @@ class Admission:
         return True
 
     def admits_leader_speed(self, speed: LeaderSpeed) -> bool:
-        """Whether a leader's speed may be used."""
+        """Whether the leader's speed is plausible; one that isn't is counted."""
         for _, value in speed.steps:
             if far := self._reach.too_fast(value, "v_r"):
                 self.refusals.note("speed", LEADER, "reach", far)
@@ -86,14 +86,14 @@ class Admission:
         return True
 
     def _late(self, sender: str) -> bool:
-        """Refuse what was said before the run; more than can have been on its way is a flood."""
+        """Refuse a start message received after the start; beyond the limit it is a flood."""
         self._late_count[sender] += 1
         if self._late_count[sender] > LATE_MESSAGES_TOLERATED:
             self.refusals.note("message", sender, "start", "dated before the run, which goes on")
         return False
 
     def malformed(self, what: str, sender: str) -> None:
-        """Count a message that was none."""
+        """Count a message that doesn't decode."""
         self.refusals.note(what, sender, "not well formed")
 
     def _path_date(self, robot: str, state: PathState) -> tuple[str, str] | None:
@@ -122,7 +122,7 @@ class Admission:
         return wrong or self._order(t_ns, self._newest_ns.get(LOCALISATION))
 
     def _due(self, tick: int, delay_ticks: int = 0) -> tuple[str, str] | None:
-        """In lockstep: between what is over and what nobody can know yet."""
+        """In lockstep: a reason if the tick is over or too far ahead, None otherwise."""
         ahead = tick - max(self.tick, -1)
         if ahead > _AHEAD_TICKS:
             return "ahead", f"dated {ahead * self._period_ns * 1e-9:.6g} s ahead"
@@ -131,7 +131,7 @@ class Admission:
         return None
 
     def _distance(self, t_ns: int) -> tuple[str, str] | None:
-        """In real time: near enough to now."""
+        """In real time: a reason if the date is too far from now, None otherwise."""
         ahead_ns = t_ns - self.now_ns
         if ahead_ns > self._ahead_ns:
             return "ahead", f"dated {ahead_ns * 1e-9:.6g} s ahead"

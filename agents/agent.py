@@ -1,6 +1,6 @@
-"""One robot's controller, one period at a time: sense, decide, act, share.
+"""The controller of one robot, one control period at a time: sense, decide, act, share.
 
-    phase      on                                                 to         what is sent
+    phase      on                                                 to         frames
     ARMING     both drives in closed loop without error           READY      arming frames, torque 0
     ARMING     tick 0                                             error      -
     READY      a fault before tick 0                              ARMING     torque 0, idle
@@ -13,15 +13,16 @@
 
 A fault is a drive that drops out or falls silent, two senders of a drive's telemetry, a bus that
 can't be sent on, a pose that is too old, sensors that disagree, or a law, a path or a path variable
-beyond what the scenario can reach: it diverged, and the last within is kept for the neighbours. It
-takes the torque from both wheels in the same tick: the frames that report a change of phase out of
-DRIVING are already torque 0. An obstacle is a fault that is still there, less what a host may clear
-by itself; an error that appears before tick 0 and is a person's to clear isn't cleared again. After
-arming again the first set-point is 0, the limiter starts from 0 and the law from its first tick.
+beyond the reach of the scenario: it diverged, and its last value within reach is kept for the
+neighbours. A fault takes the torque from both wheels in the same tick: the frames that report a
+change of phase out of DRIVING are already torque 0. An obstacle is a fault that persists, less the
+errors that a host may clear by itself; an error before tick 0 that a person must clear isn't
+cleared again. After rearming the first set-point is 0, the limiter starts from 0 and the law from
+its first tick.
 
 A stopped robot goes on sharing its path variable, so that its neighbours aren't cut off. A dry run
-goes through the same phases without a frame. An agent knows only what arrived as a CAN frame or as
-a message; it never reads a clock.
+goes through the same phases without a frame. An agent's only inputs are CAN frames, messages and
+tick numbers; it reads no clock.
 """
 
 from collections.abc import Sequence
@@ -44,14 +45,14 @@ from configs.brief import AgentBrief
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 DIVERGED = (ArithmeticError, ValueError)
-"""What arithmetic raises where it ends: overflow, division by zero, the sine of infinity."""
+"""Exceptions of arithmetic that diverges: overflow, division by zero, the sine of infinity."""
 _NO_REFERENCE = Reference(nan, nan, nan, nan, nan)
 POSE_HISTORY_TICKS = 64
-"""In real time, a fix may be this old: the odometry since is known."""
+"""Longest age of a fix in real time: the odometry since then is kept for that long."""
 
 
 class Agent:
-    """The controller of one robot. Told everything, asks nothing."""
+    """The controller of one robot. Pure: frames, messages and ticks in, frames out."""
 
     def __init__(self, brief: AgentBrief, rows: RowBuffer) -> None:
         self.brief = brief
@@ -59,7 +60,7 @@ class Agent:
         self._schedule = brief.schedule
         self._h = brief.schedule.period_s
         self.guard = self._guard = Guard(brief)
-        """Phase, faults, and what gets through to the drives."""
+        """Phases, faults and limits between the law and the drives."""
         self._drives = self._guard.drives
         self._path = robot_path(brief.path, brief.offset)
         law = build(brief.law, brief.wheels, self._h, self._path)
@@ -74,10 +75,10 @@ class Agent:
         start = brief.coordination
         self._coordination = CoordinationState(start.v_hat_0, start.mu_0, brief.s_0)
         self.feedback_since = self._drives.feedback_since
-        """Whether both encoder frames came after a bus time [ns]."""
-        self._diverged = False  # the path variable would be beyond reach
+        """Whether both encoder frames were received after a bus time [ns]."""
+        self._diverged = False  # the next path variable is beyond reach
         self.admission = self._admission = Admission(brief)
-        """What is believed of what arrives, and what was refused."""
+        """Plausibility of received messages, and the count of refused ones."""
         self._reach = brief.reach
         self._leader: LeaderSpeed | None = None
         self._start_fix: PoseFix | None = None
@@ -89,23 +90,23 @@ class Agent:
         fused = brief.localisation == "fused"
         self._pose_mismatch_m = brief.host.pose_mismatch_limit_m if fused else inf
         self.last_tick = brief.schedule.ticks
-        """The closing tick: of the scenario, or of a run that ends before it."""
+        """The closing tick of the scenario, or of a run that ends before it."""
         self.closed = False
         """Whether the closing tick has come."""
         self.late_s = self.round_trip_s = 0.0
-        """What the loop measured of the clock at this tick, for the record."""
+        """Lateness and feedback round trip at this tick [s], set by the loop, for the record."""
         self.on_frame = self._drives.on_frame
-        """Take one frame from the bus: identifier, data, bus time [ns] at which it came."""
+        """Process a frame from the bus: identifier, data, bus time of reception [ns]."""
 
     @property
     def phase(self) -> Phase:
-        """What the controller is about."""
+        """The phase of the controller."""
         return self._guard.phase
 
-    # --- what arrives ------------------------------------------------------------------------
+    # --- reception ---------------------------------------------------------------------------
 
     def receive_pose(self, fix: PoseFix) -> None:
-        """Take a pose from the localisation system; ticks below 0: where the robot starts."""
+        """Store a pose from the localisation system; ticks below 0: the start pose."""
         if not self._admission.admits_pose(fix):
             return
         if fix.tick < 0:
@@ -114,7 +115,7 @@ class Agent:
             self._fixes[fix.tick] = fix
 
     def receive_path_state(self, robot: str, state: PathState) -> None:
-        """Take what an in-neighbour says of its path variable; ticks below 0: where it starts."""
+        """Store the path state of an in-neighbour; ticks below 0: its start value."""
         if not self._admission.admits_path_state(robot, state):
             return
         self._awaited.discard(robot)
@@ -124,20 +125,20 @@ class Agent:
             self._path_states.setdefault(state.tick, {})[robot] = state
 
     def receive_leader_speed(self, speed: LeaderSpeed) -> None:
-        """Take the virtual leader's speed, now and to come."""
+        """Store the virtual leader's speed profile."""
         if self._admission.admits_leader_speed(speed):
             self._leader = speed
 
     def refusals(self) -> list[str]:
-        """What was not believed, in words."""
+        """Refused messages, in words."""
         return self._admission.refusals.lines()
 
     def notices(self) -> list[str]:
-        """What a report should say beside the numbers, in words."""
+        """Notices for the report, in words."""
         return [*self._guard.notices(), *self.refusals()]
 
     def missing_to_start(self) -> list[str]:
-        """Whom the robot has to hear before the run, and has not yet."""
+        """Senders whose first message is required for the start and has not arrived."""
         missing = [f"the path variable of {robot}" for robot in sorted(self._awaited)]
         if self._start_fix is None:
             missing.append("the localisation system")
@@ -146,7 +147,7 @@ class Agent:
         return missing
 
     def missing(self, tick: int) -> list[str]:
-        """What the schedule says is due at this tick and has not arrived."""
+        """Messages that are due at this tick by the schedule and have not arrived."""
         missing = []
         pose_tick = tick - self._pose_delay
         if self._schedule.localises(pose_tick) and pose_tick not in self._fixes:
@@ -159,7 +160,7 @@ class Agent:
     # --- one period --------------------------------------------------------------------------
 
     def share(self, tick: int) -> PathState:
-        """What the out-neighbours hear at this tick; known as soon as the tick before is done."""
+        """The path state for the out-neighbours at this tick; known after the tick before."""
         v_hat, _, s = self._coordination
         return PathState(tick, tick * self._schedule.period_ns, s, v_hat)
 
@@ -194,7 +195,7 @@ class Agent:
         return self._control(tick, motion)
 
     def _apply_due(self, tick: int, motion: RobotMotion) -> RobotMotion:
-        """Use what is due at this tick, in the order of names whatever the order of arrival."""
+        """Apply the messages due at this tick, in the order of names, not of arrival."""
         for robot, state in sorted(self._path_states.pop(tick, {}).items()):
             self._neighbours.receive(robot, state.t_ns, state.s, state.v_hat)
         fix = self._fixes.pop(tick - self._pose_delay, None)
@@ -203,7 +204,7 @@ class Agent:
         return self._apply_fix(tick, fix, self._pose_delay, motion)
 
     def _apply_newest_fix(self, tick: int, motion: RobotMotion) -> RobotMotion:
-        """In real time: use the newest fix, as old as it is, unless it is too old to place."""
+        """In real time: apply the newest fix at its own instant, unless its odometry is lost."""
         if not self._fixes:
             return motion
         fix = self._fixes[max(self._fixes)]
@@ -214,10 +215,10 @@ class Agent:
         return self._apply_fix(tick, fix, ago, motion)
 
     def _apply_fix(self, tick: int, fix: PoseFix, ago: int, carried: RobotMotion) -> RobotMotion:
-        """Use a fix of some ticks ago; `carried` is where the ones before have been carried on."""
+        """Apply a fix of some ticks ago; `carried` is the motion without it."""
         try:
             motion = self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad, ago)
-        except DIVERGED:  # it is not of this world: like none at all
+        except DIVERGED:  # beyond arithmetic: ignored
             return carried
         self._guard.note_pose(tick - ago)
         if self._pose_mismatch_m < inf:
@@ -241,7 +242,7 @@ class Agent:
         try:
             reference = self._path(s)
             out = self._law_step(self._law_state, motion, reference, along)
-        except Exception as error:  # whatever a law or a path raises ends this robot's motion only
+        except Exception as error:  # any error of a law or path stops this robot only
             reference, signals = _NO_REFERENCE, self._no_signals
             how, why = failure(error)
             frames = guard.command(tick, nan, nan, f"the law {how} at s = {s:.4g} m: {why}")
@@ -263,7 +264,7 @@ class Agent:
         return frames
 
     def _accept_path_variable(self, t_s: float, after: CoordinationState) -> None:
-        """Take the next path variable; one beyond reach is not taken, and the robot stops."""
+        """Accept the next path variable; one beyond reach is rejected, and the robot stops."""
         v_hat, mu, s = after
         far = self._reach.beyond(t_s, s, v_hat if isfinite(mu) else mu)
         if far is None:
@@ -274,5 +275,5 @@ class Agent:
             self._guard.note_fault("path variable", trouble)
 
     def shut_down(self) -> Sequence[Frame]:
-        """Disarm for good: told to stop before the closing tick."""
+        """Disarm for good, on a stop before the closing tick."""
         return self._guard.shut_down()

@@ -1,8 +1,8 @@
-"""The bus as the clock of a controller in lockstep: which tick is due at what it heard.
+"""The bus as the clock of a controller in lockstep: the tick that is due at each frame.
 
-A tick is due once both drives' encoder frames of it are here, that came at its bus time or later;
-and when its period passes without them, for a controller on a starved bus acts as well, on what it
-knows. Each tick is due once, in order.
+A tick is due once both drives' encoder frames have arrived at its bus time or later, or when its
+period ends without them: a controller on a starved bus acts on its last feedback. Each tick is due
+once, in order.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ class BusClock:
     """Counts the ticks of one controller.
 
     Args:
-        feedback_since: whether both encoder frames came after a bus time [ns].
+        feedback_since: whether both encoder frames were received after a bus time [ns].
     """
 
     __slots__ = ("_due_ns", "_feedback_since", "_next", "_period_ns")
@@ -26,13 +26,13 @@ class BusClock:
         self._due_ns = schedule.bus_time_ns(self._next)
 
     def due(self, now_ns: int) -> int | None:
-        """The tick to compute, a frame of bus time `now_ns` having been heard."""
+        """The tick to compute after a frame of bus time `now_ns`; None if none is due."""
         if now_ns >= self._due_ns and self._feedback_since(self._due_ns - 1):
             return self._advance()
         return None
 
     def due_without_frames(self) -> int:
-        """The tick to compute, its period having passed without its frames."""
+        """The tick to compute at the end of a period without its frames."""
         return self._advance()
 
     def _advance(self) -> int:

@@ -1,12 +1,12 @@
-"""How a controller bears the errors of its CAN interface in real time.
+"""Tolerance of a controller for errors of its CAN interface in real time.
 
-    error                                    on our interface      on any other
-    transmit queue full (ENOBUFS)            borne                 borne
-    any other, e.g. network down (ENETDOWN)  the bus is gone       borne for `bus_error_limit`
+    error                                    Fleetloop interface   any other interface
+    transmit queue full (ENOBUFS)            tolerated             tolerated
+    any other, e.g. network down (ENETDOWN)  the bus is lost       tolerated for `bus_error_limit`
 
-Borne means: the frames of that period are lost, the robot stops once sending has failed for
-`TOLERATED_NS`, and may arm again when it succeeds. A full queue alone is borne for ever: somebody
-may plug in the cable yet.
+Tolerated means: the frames of that period are lost, the robot stops once sending has failed for
+`TOLERATED_NS`, and may arm again when it succeeds. A full queue alone is tolerated without limit:
+the cable may still be plugged in.
 """
 
 import errno
@@ -16,11 +16,11 @@ import can
 from configs.errors import InfrastructureError, PeerLostError
 
 TOLERATED_NS = 50_000_000
-"""As long as a drive's encoder may be silent; half of the drives' watchdog."""
+"""Equal to the age limit of encoder frames; half of the drives' watchdog."""
 
 
 class BusHealth:
-    """What became of the last sends and receptions of one bus."""
+    """Errors of the sends and receptions of one bus."""
 
     __slots__ = ("_lasting_ns", "_limit_ns", "_robot", "errors", "since_ns", "text", "unsent")
 
@@ -32,14 +32,14 @@ class BusHealth:
         """Periods whose frames found the transmit queue full."""
         self.text = ""
         self.since_ns: int | None = None
-        """Since when nothing could be sent, None if all is well."""
+        """Monotonic time since which no send succeeded, None while sends succeed."""
         self._lasting_ns: int | None = None
 
     def failed(self, error: Exception, now_ns: int) -> None:
-        """Take an error of the bus.
+        """Count an error of the bus.
 
         Raises:
-            PeerLostError: our own bus closed.
+            PeerLostError: a Fleetloop bus closed.
             InfrastructureError: the bus has failed for longer than its limit.
         """
         if isinstance(error, can.CanError):
@@ -64,11 +64,11 @@ class BusHealth:
             ) from error
 
     def sent(self) -> None:
-        """All frames of a period were sent."""
+        """Reset after all frames of a period were sent."""
         self.since_ns = self._lasting_ns = None
 
     def fault(self, now_ns: int) -> str | None:
-        """Why the wheels can't be driven over this bus, None if they can."""
+        """The fault of this bus that forbids driving the wheels, None if there is none."""
         if self.since_ns is None or now_ns - self.since_ns < TOLERATED_NS:
             return None
         return self.text

@@ -1,13 +1,13 @@
-"""Coordination: speed estimate and path variable from what the neighbours say, eqs (38)-(48).
+"""Coordination: speed estimate and path variable from the neighbours' path states, eqs (38)-(48).
 
     v̂' = −Σ a_ij (v̂ − v̂_j) − h_i (v̂ − v_r)                                      (38)
     μ' = −p μ − q Σ a_ij (s − s_j)                                              (45)
     s' = μ + v̂                                                                  (40)
 
 With n = Σ a_ij neighbours, S = Σ a_ij s_j and V = Σ a_ij v̂_j held over a period, this is a constant
-linear system of three states; it is advanced by its matrix exponential, so the only error of the
-sampling is what happens to S and V within a period (see `agents.neighbours`). It doesn't depend on
-the robot's motion at all.
+linear system of three states; it is advanced by its matrix exponential, so the only sampling error
+is the change of S and V within a period (see `agents.neighbours`). The coordination does not depend
+on the robot's motion.
 
     v̂ [m/s]   μ [m/s]   s [m]   p [1/s]   q [1/s²]   h_i ∈ {0, 1}
 """
@@ -22,7 +22,7 @@ _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot 
 
 
 class CoordinationState(NamedTuple):
-    """What a robot knows of the common motion."""
+    """A robot's estimate of the common motion: v̂ [m/s], μ [m/s], s [m]."""
 
     v_hat: float
     mu: float
@@ -76,7 +76,7 @@ class Coordinator:
 def matrix_exponential(a: Matrix) -> Matrix:
     """exp(a) by scaling and squaring of its Taylor series; for small matrices.
 
-    Not a number anywhere if an entry of `a` isn't finite.
+    All entries are NaN if an entry of `a` isn't finite.
     """
     size = len(a)
     norm = max(sum(abs(x) for x in row) for row in a)

@@ -1,7 +1,7 @@
-"""Stands between the law and the drives: phases, faults, limits. The table is in `agents.agent`.
+"""Supervision between the law and the drives: phases, faults, limits; table in `agents.agent`.
 
-What the law asks for gets through whole, limited, or not at all; after arming again the law begins
-anew. Torque is sent in one place, while the phase is DRIVING and nothing is wrong in that tick.
+The law's torques are sent unchanged, limited, or withheld; after rearming the law restarts from its
+first tick. Torque is sent in one place only, in phase DRIVING and in a tick without a fault.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,7 +22,7 @@ MAX_EVENTS = 64
 
 
 class Phase(Enum):
-    """What a controller is about."""
+    """The phase of a controller; transitions are in `agents.agent`."""
 
     ARMING = auto()
     READY = auto()
@@ -33,12 +33,12 @@ class Phase(Enum):
 
 
 class TorqueOutcome(Enum):
-    """What became of the law's torques."""
+    """The outcome of the law's torques in one tick."""
 
     UNCHANGED = auto()
-    LIMITED = auto()  # what the law would learn from this tick is the limit
+    LIMITED = auto()  # adaptation would learn the limit
     WITHHELD = auto()
-    RESTARTED = auto()  # nothing, and the law begins again with the next tick
+    RESTARTED = auto()  # withheld, and the law restarts with the next tick
 
 
 UNCHANGED = TorqueOutcome.UNCHANGED
@@ -46,19 +46,19 @@ _DRIVING = Phase.DRIVING
 
 
 class Event(NamedTuple):
-    """A change of phase that wasn't the plan."""
+    """An unplanned change of phase."""
 
     when: str
     phase: Phase
     reason: str
 
     def __str__(self) -> str:
-        """For people."""
+        """One line for people."""
         return f"{self.when}: {self.phase.name}{': ' if self.reason else ''}{self.reason}"
 
 
 class Guard:
-    """Keeps one robot's drives. Told everything, asks nothing."""
+    """Supervises one robot's drives. Pure: no I/O, no clock."""
 
     def __init__(self, brief: AgentBrief) -> None:
         host, schedule = brief.host, brief.schedule
@@ -68,18 +68,18 @@ class Guard:
         self.begun = False
         """Whether tick 0 has come."""
         self.outcome = TorqueOutcome.WITHHELD
-        """What became of the torques that the law asked for in this tick."""
+        """The outcome of the law's torques in this tick."""
         self.stop_tick = 0
         self.stop_reason = ""
-        """Why the robot stands still now, "" if it doesn't."""
+        """The reason for the present stop, "" while the robot is not stopped."""
         self.events: list[Event] = []
         self.announce: Callable[[str], None] = lambda _: None
-        """Told of each event as it happens, in words; whoever runs the controller says to whom."""
+        """Callback for each event, in words; set by the controller process."""
         self._announced: list[str] = []
         self.stalled = ""
-        """Why the last ticks came late, "" if they didn't; see `note_stall`."""
+        """The reason for late ticks at present, "" if ticks are on time; see `note_stall`."""
         self.bus_fault: str | None = None
-        """Why nothing can be sent; whoever sends says so."""
+        """The fault of the bus, None if sends succeed; set by the loop."""
         self._brief = brief
         self._bus_time_ns = schedule.bus_time_ns
         self._when = schedule.when
@@ -89,32 +89,32 @@ class Guard:
         self._pose_age_ticks = -(-host.pose_age_limit_ns // schedule.period_ns)
         self._pose_until = self._pose_age_ticks if host.pose_age_limit_ns else schedule.ticks
         """The last tick that the newest fix is good for."""
-        self._noted_faults: dict[str, str] = {}  # by sensor: why it isn't to be believed
+        self._noted_faults: dict[str, str] = {}  # by source
         self._rearming = Rearming(host)
-        self._refusal: str | None = None  # came while READY, and is a person's to clear
+        self._refusal: str | None = None  # came while READY; only a person may clear it
 
-    # --- what is noticed elsewhere ---------------------------------------------------------------
+    # --- notes from the agent ---------------------------------------------------------------
 
     def note_pose(self, tick: int) -> None:
-        """The localisation system said where the robot was at this tick."""
+        """Note a pose of this tick from the localisation system."""
         if self._pose_age_ticks:
             self._pose_until = tick + self._pose_age_ticks
 
-    def note_fault(self, sensor: str, reason: str | None) -> None:
-        """Why a sensor isn't to be believed now, None if it is."""
+    def note_fault(self, source: str, reason: str | None) -> None:
+        """Note the fault of a source (a sensor, the path variable); None: no fault."""
         if reason is not None:
-            self._noted_faults[sensor] = reason
+            self._noted_faults[source] = reason
         elif self._noted_faults:
-            self._noted_faults.pop(sensor, None)
+            self._noted_faults.pop(source, None)
 
     def note_stall(self, tick: int, reason: str) -> None:
-        """Why ticks come late from this one on; set `stalled` to "" when that is over."""
+        """Note the reason for late ticks from this one on; set `stalled` to "" afterwards."""
         self.stalled = reason
         if len(self._announced) < 2 * MAX_EVENTS:
             self._announce(f"{self._when(tick)}: {reason}")
 
     def note_unsent(self, tick: int) -> None:
-        """The frames of this tick did not get onto the bus: arming has lost a step."""
+        """Note that the frames of this tick were not sent: arming has lost a step."""
         if not self.begun:
             self.phase = Phase.ARMING
             self.drives.disarm()
@@ -124,10 +124,10 @@ class Guard:
     # --- before tick 0 ---------------------------------------------------------------------------
 
     def arm(self, tick: int) -> Sequence[Frame]:
-        """On the way to closed loop, or waiting in it.
+        """The frames of a tick before tick 0: arming, or torque 0 once armed.
 
         Raises:
-            InfrastructureError: the drives were not heard when control had to start.
+            InfrastructureError: the drives were not armed when control had to start.
         """
         if tick >= 0:
             self.begin(tick)
@@ -144,7 +144,7 @@ class Guard:
         return drives.disarm()
 
     def begin(self, tick: int) -> None:
-        """Tick 0 has come.
+        """Start control at tick 0.
 
         Raises:
             InfrastructureError: the drives were not armed when control had to start.
@@ -166,9 +166,9 @@ class Guard:
     def command(
         self, tick: int, right_wheel_N_m: float, left_wheel_N_m: float, trouble: str = ""
     ) -> Sequence[Frame]:
-        """The frames of a tick at which the law asks for these torques [N·m]; see `outcome`.
+        """The frames of a tick for the law's torques; sets `outcome`.
 
-        `trouble` says why it asks for none that are finite, if more is known than that.
+        `trouble`: the reason for torques that are not finite, if it is known.
         """
         drives, now_ns = self.drives, self._bus_time_ns(tick)
         self.outcome = TorqueOutcome.WITHHELD
@@ -198,12 +198,12 @@ class Guard:
         return frames
 
     def notices(self) -> list[str]:
-        """What a report should say beside the numbers, in words."""
+        """Notices for the report, in words."""
         dry = ["dry run: nothing was sent to the drives"] if self._brief.host.dry_run else []
         return [*dry, *self._announced, *self.drives.notices]
 
     def _own_fault(self, tick: int) -> str | None:
-        """What is wrong beside the drives, None if nothing is."""
+        """The first fault beside those of the drives, None if there is none."""
         if self.bus_fault:
             return self.bus_fault
         if tick > self._pose_until:
@@ -222,7 +222,7 @@ class Guard:
         return self.drives.disarm()
 
     def _recover(self, tick: int, now_ns: int) -> Sequence[Frame]:
-        """Wait until nothing stands in the way; then the whole way of arming, to torque 0."""
+        """The frames of a stopped robot: wait for the end of obstacles, then arm, to torque 0."""
         drives, rearming = self.drives, self._rearming
         if self.phase is Phase.STOPPED:
             if rearming.exhausted or not rearming.may_begin(self._obstacle(tick, now_ns), now_ns):

@@ -1,13 +1,13 @@
-"""What a controller lets through of its law's torques, and of what it is told of the motion.
+"""Torque limits, and a plausibility check of the encoders.
 
     |τ| ≤ τ_max,   |τ_k − τ_{k−1}| ≤ τ'_max h                    at each wheel           (1)
     ε ← ε exp(−h/T) + (φ_k − φ_{k−1}) − h (ν_k + ν_{k−1})/2      encoder mismatch [rad]  (2)
 
 φ, ν angle [rad] and speed [rad/s] of a wheel   h control period [s]   T = `FORGET_S`
 
-(2) is near 0 for an encoder that is well: a jump of the angle, or a flipped sign, shows in it at
-once, a frozen angle or a wrong speed within T. Where the limit of (1) acts, the law is told so
-(`Law.hold`): what it would learn is the limit.
+(2) is near 0 for a sound encoder: a jump of the angle or a flipped sign shows in it at once, a
+frozen angle or a wrong speed within T. Where (1) acts, `Law.hold` is called, so that adaptation
+does not learn the limit.
 """
 
 from math import exp, inf
@@ -16,7 +16,7 @@ FORGET_S = 0.2
 
 
 class TorqueLimiter:
-    """Equation (1) for both wheels. Infinite limits let everything through unchanged."""
+    """Equation (1) for both wheels. Infinite limits change nothing."""
 
     __slots__ = ("_last", "_limit", "_step", "active")
 
@@ -25,16 +25,16 @@ class TorqueLimiter:
         self._step = slew_wheel_N_m_s * period_s
         self._last = (0.0, 0.0)
         self.active = limit_wheel_N_m < inf or slew_wheel_N_m_s < inf
-        """Whether there is any limit at all."""
+        """Whether any limit is finite."""
 
     def __call__(self, right: float, left: float) -> tuple[float, float]:
-        """The torques that may be sent [N·m]."""
+        """The limited torques [N·m], at the wheels."""
         before_right, before_left = self._last
         self._last = self._limited(right, before_right), self._limited(left, before_left)
         return self._last
 
     def reset(self) -> None:
-        """The wheels are without torque."""
+        """Start from torque 0."""
         self._last = (0.0, 0.0)
 
     def _limited(self, torque: float, before: float) -> float:
@@ -55,10 +55,10 @@ class EncoderCheck:
         self._last: tuple[float, float, float, float] | None = None
         self._right = self._left = 0.0
         self.active = limit_wheel_rad < inf
-        """Whether there is a limit."""
+        """Whether the limit is finite."""
 
     def __call__(self, motion: tuple[float, float, float, float]) -> str | None:
-        """Why the encoders aren't to be believed, None if they are; once per period."""
+        """The fault of an encoder, None if there is none; call once per period."""
         last, self._last = self._last, motion
         if last is None:
             return None

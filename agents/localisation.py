@@ -1,16 +1,16 @@
-"""Where the robot believes it is: from the localisation system, from wheel odometry, or both.
+"""The pose estimate: from the localisation system, from wheel odometry, or both.
 
     fused      the newest fix, carried on by odometry from its own instant
     external   the newest fix, held
-    odometry   the first fix, carried on by odometry for ever
+    odometry   the first fix, carried on by odometry alone
 
 Odometry over one period, from wheel angle increments δ_R, δ_L:
 
     d = r (δ_R + δ_L)/2,  φ = r (δ_R − δ_L)/(2 b)
     x += d cos(θ + φ/2),  y += d sin(θ + φ/2),  θ += φ
 
-A fix F of an instant at which odometry stood at O, and stands at P now, gives F ⊕ (P ⊖ O): a fix
-may be late by some periods, and nothing of the motion since is lost. Speeds always come from the
+A fix F of an instant with odometry O gives, with odometry P now, F ⊕ (P ⊖ O): a fix may be late by
+some periods without loss of the motion since. Speeds always come from the
 wheels: v = r (ν_R + ν_L)/2, ω = r (ν_R − ν_L)/(2 b), the inverse of (3). The heading isn't wrapped:
 a fix is taken as the nearest angle of its direction.
 """
@@ -25,7 +25,7 @@ _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot 
 
 
 class Localiser:
-    """Keeps the pose estimate of one robot. Wheels first, then a fix."""
+    """The pose estimator of one robot. Per period: `wheels` first, then `fix`."""
 
     __slots__ = (
         "_anchor",
@@ -58,7 +58,7 @@ class Localiser:
     def wheels(
         self, right_wheel_rad: float, left_wheel_rad: float, right_speed: float, left_speed: float
     ) -> RobotMotion:
-        """Take wheel angles [rad] and speeds [rad/s]; return the motion now."""
+        """Update by wheel angles [rad] and speeds [rad/s]; return the motion now."""
         if self._right is not None:
             x, y, theta = self._odometry
             right, left = right_wheel_rad - self._right, left_wheel_rad - self._left
@@ -79,7 +79,7 @@ class Localiser:
         return self._motion()
 
     def fix(self, x: float, y: float, theta: float, ticks_ago: int = 0) -> RobotMotion:
-        """Take a pose of now, or of some periods ago; return the motion now."""
+        """Update by a pose of now or of some periods ago; return the motion now."""
         if self._fixed and self._mode == "odometry":
             return self._motion()
         o_x, o_y, o_theta = self._past[-1 - ticks_ago]

@@ -1,9 +1,9 @@
-"""One controller in lockstep: the bus is the clock.
+"""The loop of one controller in lockstep: the bus is the clock.
 
-Both encoder frames of a tick are the tick; then come the pose and the in-neighbours' path states
-that the schedule says are due. The torque frames are the answer. A path state is said as
-soon as it is known, at the end of the tick before the one that it is due at: so it travels while
-others still compute, and a graph with cycles can't deadlock.
+Both encoder frames of a tick start it; the controller then waits for the pose and the path states
+that are due by the schedule, and answers with the torque frames. A path state is published as soon
+as it is known, at the end of the tick before the one at which it is due: it travels while other
+controllers compute, and a graph with cycles can't deadlock.
 """
 
 import errno
@@ -28,10 +28,10 @@ from bridge.process.lifecycle import Stop, launcher_stopped
 from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
 
 LISTEN_SHARE = 0.75
-"""Part of the tick deadline that a controller waits for messages: it names who is silent before the
-plant names the controller itself."""
+"""Part of the tick deadline for the wait for messages: a controller reports a silent peer before
+the plant reports the controller."""
 BUS_SHARE = 2.0
-"""Multiple of the tick deadline that a controller waits for its bus: the plant has its own word
+"""Multiple of the tick deadline for the wait for the bus: the plant reports its own faults
 first."""
 
 _KINDS_AND_SENDERS = {"pose": ("pose", LOCALISATION), "leader": ("speed", LEADER)}
@@ -39,21 +39,21 @@ _KINDS_AND_SENDERS = {"pose": ("pose", LOCALISATION), "leader": ("speed", LEADER
 
 @dataclass(slots=True)
 class LockstepCounters:
-    """Where a controller's time went [ns of wall time], and what arrived that nobody understood."""
+    """Wall time of a controller by activity [ns], unsent frames and undecodable messages."""
 
     ticks: int = 0
     bus_ns: int = 0
     listen_ns: int = 0
     compute_ns: int = 0
-    unsent: int = 0  # frames that found the transmit queue full
+    unsent: int = 0  # frames dropped by a full transmit queue
     undecodable: int = 0
 
     def durations_ns(self) -> dict[str, int]:
-        """Wall time by what it was spent on."""
+        """Wall time by activity [ns]."""
         return {"bus": self.bus_ns, "listen": self.listen_ns, "compute": self.compute_ns}
 
     def deadlines(self) -> None:
-        """Lockstep has none."""
+        """None: lockstep has no deadlines."""
 
 
 class LockstepLoop:
@@ -80,11 +80,11 @@ class LockstepLoop:
         self.counters = LockstepCounters()
 
     def on_arrival(self, arrival: Arrival) -> None:
-        """Give one message to the agent; what nobody understands is counted."""
+        """Deliver one message to the agent; count one that doesn't decode."""
         self.counters.undecodable += not deliver(self._agent, arrival)
 
     def await_first_frame(self, stop: Stop) -> can.Message | None:
-        """Say hello until the plant's first frame comes; None when told to stop."""
+        """Say hello until the plant's first frame; None on a stop."""
         clock = AwakeClock(held=launcher_stopped, clock=self._clock)
         deadline = clock.now() + self._schedule.start_deadline_s
         while not stop.requested:
@@ -97,7 +97,7 @@ class LockstepLoop:
         return None
 
     def run(self, first: can.Message, stop: Stop) -> None:
-        """Run from the first frame to the closing tick, or until told to stop.
+        """Run from the first frame to the closing tick, or to a stop.
 
         Raises:
             InfrastructureError: the bus was silent beyond the tick deadline.
@@ -150,12 +150,12 @@ class LockstepLoop:
                 self.counters.unsent += 1
 
     def _await_messages(self, tick: int, stop: Stop) -> None:
-        """Wait for what the schedule owes this tick, or for a stop."""
+        """Wait for the messages that are due at this tick, or for a stop."""
         agent = self._agent
         clock: AwakeClock | None = None
         left_s = within_s = LISTEN_SHARE * self._schedule.tick_deadline_s
         while (missing := agent.missing(tick)) and not stop.requested:
-            # Who is asked too late may find it waiting; who is flooded finds that there is no end.
+            # A late look may find the message in the queue; under a flood the queue never ends.
             arrival = self._link.receive(LOOK_S if left_s > 0.0 else 0.0)
             if clock is None:
                 clock = AwakeClock(held=launcher_stopped, clock=self._clock)
@@ -168,7 +168,7 @@ class LockstepLoop:
                 raise PeerSilentError(f"{self._robot}: tick {tick}: within {within_s:g} s {said}")
 
     def _await_frame(self, within_s: float) -> can.Message | None:
-        """The next frame of the bus; None when a bus without any has passed a tick."""
+        """The next frame of the bus; None at a tick of a starved bus."""
         message = self._receive(LOOK_S)
         if message is not None or self._bus.asked:
             return message
@@ -192,14 +192,14 @@ class LockstepLoop:
 
 
 def did_not_start(agent: Agent) -> InfrastructureError:
-    """The error of a controller that waited in vain for the run, with what it did not believe."""
+    """The error of a controller whose run did not start, with the messages that it refused."""
     waited_s = agent.brief.schedule.start_deadline_s
     said = (f"{agent.brief.robot}: the run did not start within {waited_s:g} s", *agent.refusals())
     return InfrastructureError("; ".join(said))
 
 
 def deliver(agent: Agent, arrival: Arrival) -> bool:
-    """Give one message to the agent, by its tag; return whether it was understood."""
+    """Deliver one message to the agent by its tag; return whether it decodes."""
     kind, _, robot = arrival.tag.partition("/")
     match kind:
         case "path" if (state := PathState.decode(arrival.payload)) is not None:

@@ -1,19 +1,19 @@
-"""What the in-neighbours last said, how old it is, and the sums that the coordination needs.
+"""The newest path states of the in-neighbours, and their sums for the coordination.
 
-Data carries its time, and the law uses what the neighbour's value will be in the middle of the
-coming period, t_k + h/2:
+Path states carry their time; the coordination uses the neighbour's predicted value in the middle of
+the coming period, t_k + h/2:
 
     s_j ← s_j + v̂_j (age + h/2),     age at most `age_limit_s`
     v̂_j ← v̂_j                        held as received
 
-The first removes the bias of old data (v_r per second of age and hop, if it were held). The second
-makes (38) an average at every share: robot i's next v̂ is a convex combination of its own, of what
-it heard and of v_r, with fixed positive weights. So where the leader reaches every robot, v̂ → v_r
-at any share period, with any delay, on any graph, also on one that changes. Carried on by its
-slope, it would diverge on graphs with cycles that share slowly.
+The first removes the bias of old data (v_r per second of age and hop, if s_j were held). The second
+makes (38) an average at every share: robot i's next v̂ is a convex combination of its own, of the
+received ones and of v_r, with fixed positive weights. So where the leader reaches every robot,
+v̂ → v_r at any share period, with any delay, on any graph, also on one that changes. Extrapolated by
+its slope, v̂_j would diverge on graphs with cycles and slow shares.
 
-A neighbour silent for longer than `silence_limit_s` leaves the sums, and counts again when it
-speaks. Sums run in the order of names, so they don't depend on the order of arrival.
+A neighbour silent for longer than `silence_limit_s` leaves the sums until its next path state. Sums
+run in the order of names, so they don't depend on the order of arrival.
 """
 
 from collections.abc import Iterable
@@ -26,7 +26,7 @@ _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot 
 
 
 class Sums(NamedTuple):
-    """n = Σ a_ij, Σ a_ij s_j, Σ a_ij v̂_j over the neighbours that count."""
+    """n = Σ a_ij, Σ a_ij s_j, Σ a_ij v̂_j over the neighbours that are not silent."""
 
     n: int
     s: float
@@ -60,7 +60,7 @@ class Neighbours:
         self._silence_limit_s = limits.silence_limit_s
 
     def receive(self, name: str, t_ns: int, s: float, v_hat: float) -> None:
-        """Take what `name` said of time `t_ns`; older than what is known, it is ignored."""
+        """Store the path state of `name` at time `t_ns`; one that is not newer is ignored."""
         neighbour = self._by_name[name]
         if neighbour.heard and t_ns <= neighbour.t_ns:
             return

@@ -1,4 +1,4 @@
-"""Reference paths: where a robot should be for a path variable s, equations (1), (10), (11).
+"""Reference paths: the desired pose at a path variable s, equations (1), (10), (11).
 
     Γ_i(s) = Γ_0(s) + R(θ_d0(s)) l_i(s)                                          (1)
     θ_d(s) = atan2(y', x')          in (−π, π]
@@ -7,8 +7,8 @@
 
 Γ_0 is the path of the formation's centre, l_i the robot's offset in axes that turn with it, and
 primes are derivatives by s. A shape gives a point and its first three derivatives (a `Jet`): an
-offset that turns with the path needs θ_d0''. A shape of one's own is
-a dataclass of parameters with a method `jet(s)` that gives x and y, an offset's ahead and left.
+offset that turns with the path needs θ_d0''. A user's own shape is a dataclass of parameters with a
+method `jet(s)` that returns the jets of x and y; for an offset, those of ahead and left.
 """
 
 from bisect import bisect_right

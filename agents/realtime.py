@@ -1,15 +1,14 @@
-"""One controller in real time: the wall clock is the clock, the newest data wins.
+"""The loop of one controller in real time: the wall clock is the clock, the newest data wins.
 
-    due time of tick k   epoch + k h + phase, absolute: lateness never adds up
-    until then           read the bus as frames come: feedback is seen at once, its round trip too
-    then                 take what the network brought, compute, send torques, share when due
+    due time of tick k   epoch + k h + phase, absolute: lateness does not accumulate
+    before it            receive frames at once, and measure the round trip of feedback
+    at it                receive messages, compute, send torques, share when due
 
-Controllers have different phases, so that they don't all wake at one instant. The controller never
-waits for feedback: a *miss* is a tick whose torques had no feedback when the next tick was due. A
-tick that could not be kept is computed late, without sending, so that the path variable keeps time.
-What the bus gathered while the controller waited for its run is dropped, and judged is what comes
-from then on. Its own frames, where the interface hands them back, are nobody else's.
-What an interface's errors do is in `agents.bus_health`.
+Controllers have different phases, so that they don't all wake at one instant. The controller does
+not wait for feedback: a *miss* is a tick whose torques had no feedback when the next tick was due.
+A tick later than a period is computed without sending, so that the path variable keeps time. Frames
+received before the start of the run are dropped. Echoes of the controller's own frames are ignored.
+Errors of the interface are handled in `agents.bus_health`.
 """
 
 from collections.abc import Sequence
@@ -36,33 +35,33 @@ from bridge.process.lifecycle import Stop
 from configs.roles import LAUNCHER
 
 ARRIVALS_PER_TICK = 64
-"""Messages that are looked at in one tick, and two more for every in-neighbour: the rest waits."""
+"""Most messages per tick, besides two for every in-neighbour: the rest waits."""
 BACKLOG_S = 1.0
-"""Longest time for dropping what the bus gathered; no interface keeps more than this takes."""
+"""Longest time for dropping the backlog of the bus; no interface queues more."""
 
 
 PROGRESS_PERIOD_S = 0.2
-"""How often a controller says that it lives."""
+"""Period of a controller's progress messages."""
 
 
 @dataclass(slots=True)
 class RealtimeCounters:
-    """How well the controller kept its time."""
+    """Ticks, deadlines missed and errors of a controller."""
 
     ticks: int = 0
     misses: int = 0  # no feedback of its torques before the next tick was due
     skipped: int = 0  # computed after the next tick was due, and not sent
     unsent: int = 0  # ticks whose frames found the transmit queue full
-    bus_errors: int = 0  # other errors of the bus that were borne
-    error_frames: int = 0  # that the bus's controller told of
+    bus_errors: int = 0  # other errors of the bus, tolerated
+    error_frames: int = 0  # reported by the CAN controller
     undecodable: int = 0
 
     def durations_ns(self) -> dict[str, int]:
-        """Nothing: by the wall clock what is left of a period is waited for."""
+        """Empty: in real time the rest of a period is waiting."""
         return {}
 
     def deadlines(self) -> Deadlines:
-        """What a report says of them."""
+        """Missed and skipped ticks, for the report."""
         return Deadlines(self.misses, self.skipped)
 
 
@@ -95,17 +94,17 @@ class RealtimeLoop:
         self._echoes = Echoes() if hands_back(agent.brief.bus) else None
         self._most_arrivals = ARRIVALS_PER_TICK + 2 * len(agent.brief.hears)
         self._power_up_ns = 0
-        self._sent_ns = 0  # when torques were sent that have no feedback yet; 0: there are none
+        self._sent_ns = 0  # send time of torques without feedback; 0: none
         self.counters = RealtimeCounters()
 
     def await_go(self, stop: Stop) -> int | None:
-        """Say hello until the launcher says when tick 0 is; None when told to stop."""
+        """Say hello until the launcher announces the time of tick 0; None on a stop."""
         deadline = self._clock.monotonic_s() + self._schedule.start_deadline_s
         while not stop.requested:
             self._drop_backlog()
             self._hellos.say()
             arrival = self._link.receive(0.02)
-            # Others say hello all the time: wait for nothing here, or ours would not be said.
+            # Peers say hello all the time: waiting here would delay this controller's hellos.
             for _ in range(self._most_arrivals):
                 if arrival is None:
                     break
@@ -119,9 +118,9 @@ class RealtimeLoop:
         return None
 
     def _epoch_ns(self, payload: bytes) -> int | None:
-        """When tick 0 is by this machine's monotonic clock, None if that can't be.
+        """Time of tick 0 by this machine's monotonic clock, None if it is implausible.
 
-        A run may end before its scenario: this controller then ends with it.
+        Sets the closing tick of a run that ends before its scenario.
         """
         refusals = self._agent.admission.refusals
         go = Go.decode(payload)
@@ -136,12 +135,12 @@ class RealtimeLoop:
         return epoch_ns
 
     def run(self, epoch_ns: int, stop: Stop) -> None:
-        """Run from the countdown to the closing tick, or until told to stop.
+        """Run from the countdown to the closing tick, or to a stop.
 
         Raises:
             InfrastructureError: the drives were not armed when control had to start, or the bus
                 failed for too long.
-            PeerLostError: our own bus closed.
+            PeerLostError: a Fleetloop bus closed.
         """
         schedule, agent = self._schedule, self._agent
         period_ns, phase_ns = schedule.period_ns, agent.brief.phase_ns
@@ -176,10 +175,10 @@ class RealtimeLoop:
             if schedule.shares(tick):
                 self._path.put(agent.share(tick).encode())
         with suppress(can.CanError, OSError):
-            self._bus.recv(0.0)  # what was gathered goes out
+            self._bus.recv(0.0)  # flushes batched frames
 
     def _name_stall(self, tick: int, late_s: float) -> None:
-        """What a robot stops for soon after it stood still, it may stop for because it did."""
+        """Note a stall: a fault soon after it may be its consequence."""
         text = f"this controller, or its machine, stalled for {late_s:.2f} s"
         if late_s > STALL_S:
             self._agent.guard.note_stall(tick, text)
@@ -187,9 +186,9 @@ class RealtimeLoop:
             self._agent.guard.stalled = text
 
     def _drop_backlog(self) -> None:
-        """Read what came while nobody read: taken for news, it would be a second drive's.
+        """Drop queued frames: processed late, they would look like those of a second drive.
 
-        A bus that fails says so again when it is used.
+        Errors are ignored here: a bus that fails does so again at its next use.
         """
         deadline = self._clock.monotonic_s() + BACKLOG_S
         with suppress(can.CanError, OSError):
@@ -197,7 +196,7 @@ class RealtimeLoop:
                 pass
 
     def _receive_messages(self) -> None:
-        """Take what the network brought; of a flood no more than a tick has room for."""
+        """Deliver waiting messages, at most as many as a tick has time for."""
         for arrival in waiting(self._link, self._most_arrivals):
             self.counters.undecodable += not deliver(self._agent, arrival)
 
@@ -218,14 +217,14 @@ class RealtimeLoop:
                 self._agent.guard.bus_fault = None
 
     def _on_bus_error(self, error: Exception) -> None:
-        """Count an error of the bus, stop the wheels if it lasts, raise if it is the end."""
+        """Count an error of the bus; stop the wheels if it lasts; raise if it is final."""
         health, now_ns = self._health, self._clock.monotonic_ns()
         health.failed(error, now_ns)
         self._agent.guard.bus_fault = health.fault(now_ns)
         self.counters.unsent, self.counters.bus_errors = health.unsent, health.errors
 
     def _read_until(self, due_ns: int) -> None:
-        """Take frames from the bus until the due time."""
+        """Receive frames until the due time."""
         agent = self._agent
         polled = False
         while True:
@@ -236,7 +235,7 @@ class RealtimeLoop:
                 message = self._bus.recv(max(left_ns, 0) * 1e-9)
             except (can.CanError, OSError) as error:
                 self._on_bus_error(error)
-                # An interface that is down may say so at once, again and again.
+                # An interface that is down may fail at once at every call.
                 self._clock.sleep(max(due_ns - self._clock.monotonic_ns(), 0) * 1e-9)
                 return
             polled = message is None

@@ -1,17 +1,17 @@
-"""When a robot that stopped itself may arm again.
+"""Conditions for rearming after a stop.
 
-    may_begin    nothing stood in the way for `rearm_after`, and attempts are left
-    late         not armed within `rearm_limit` after that
+    may_begin    no obstacle for `rearm_after`, and attempts are left
+    timed_out    not armed within `rearm_limit` after the begin
 
-Arming again is the whole way of the first time: disarm, torque 0, clear, arm, torque 0. What a
-person has to clear (an e-stop above all) stands in the way until it is cleared by somebody else.
+Rearming repeats the whole sequence: disarm, torque 0, clear, arm, torque 0. An error that only a
+person may clear (an e-stop above all) is an obstacle until another host clears it.
 """
 
 from configs.brief import HostLimits
 
 
 class Rearming:
-    """Counts the attempts of one run."""
+    """Rearming of one robot: attempts left and times."""
 
     __slots__ = ("_attempts_left", "_began_ns", "_limits", "_well_since_ns")
 
@@ -23,11 +23,11 @@ class Rearming:
 
     @property
     def exhausted(self) -> bool:
-        """Whether a stopped robot stays stopped whatever happens."""
+        """Whether no attempt is left: a stopped robot stays stopped."""
         return not self._attempts_left
 
     def may_begin(self, obstacle: str | None, now_ns: int) -> bool:
-        """Whether to begin now, told once per period what stands in the way."""
+        """Whether to begin now; call once per period with the present obstacle."""
         if obstacle is not None:
             self._well_since_ns = None
             return False
@@ -41,5 +41,5 @@ class Rearming:
         return True
 
     def timed_out(self, now_ns: int) -> bool:
-        """Whether closed loop should have been there by now."""
+        """Whether the attempt has exceeded `rearm_limit`."""
         return now_ns - self._began_ns > self._limits.rearm_limit_ns

@@ -1,8 +1,8 @@
-"""A drive client that only listens, for a robot whose wheels must not turn: a dry run.
+"""A drive client that sends nothing, for a dry run on a robot whose wheels must not turn.
 
-It hears and judges the drives like the client that it wraps, is `armed` once nothing is wrong with
-them, and sends no frame, so another controller may drive the robot meanwhile. `sent_wheel_N_m` is
-what the wrapped client would have sent.
+It receives and supervises the drives like the client that it wraps, is `armed` while they have no
+fault, and sends no frame, so another controller may drive the robot meanwhile. `sent_wheel_N_m` is
+the torque that the wrapped client would have sent.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +17,7 @@ _NOTHING: tuple[Frame, ...] = ()
 
 
 class DryRun:
-    """The controller's end of two drives, without a voice."""
+    """The controller's end of two drives, receive only."""
 
     def __init__(self, client: "DriveClient") -> None:
         self._client = client
@@ -36,16 +36,16 @@ class DryRun:
         return self._client.notices
 
     def arm(self, now_ns: int) -> Sequence[Frame]:
-        """Armed once nothing is wrong with the drives."""
+        """No frames; armed once the drives have no fault."""
         self.armed = self._client.fault(now_ns) is None
         return _NOTHING
 
     def missing(self, now_ns: int) -> str:
-        """What is wrong with the drives."""
+        """The fault of the drives, "" if there is none."""
         return self._client.fault(now_ns) or ""
 
     def torque(self, right_wheel_N_m: float, left_wheel_N_m: float) -> Sequence[Frame]:
-        """What would have been sent."""
+        """No frames; sets `sent_wheel_N_m` to the torque that would have been sent."""
         self._client.torque(right_wheel_N_m, left_wheel_N_m)
         self.sent_wheel_N_m = self._client.sent_wheel_N_m
         return _NOTHING

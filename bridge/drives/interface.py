@@ -39,19 +39,19 @@ class DriveClient(Protocol):
         """Commands of other hosts to the drives, in words."""
 
     def on_frame(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
-        """Take any frame from the bus."""
+        """Process any frame from the bus."""
 
     def feedback_since(self, bus_ns: int) -> bool:
-        """Whether both wheels' encoder frames came after this bus time."""
+        """Whether both wheels' encoder frames were received after this bus time [ns]."""
 
     def motion(self) -> Motion | None:
-        """The newest wheel angles and speeds, None before both wheels were heard."""
+        """The newest wheel angles and speeds, None before the first encoder frames of both."""
 
     def arm(self, now_ns: int) -> Sequence[Frame]:
-        """What to send next on the way to `armed`; call once per period."""
+        """The next frames of the arming sequence; call once per period."""
 
     def missing(self, now_ns: int) -> str:
-        """What of each drive keeps the robot from being armed, "" if nothing does."""
+        """The reasons why each drive is not armed, "" if there are none."""
 
     def obstacle(self, now_ns: int) -> str | None:
         """The reason not to begin arming now, None if there is none."""
@@ -60,13 +60,13 @@ class DriveClient(Protocol):
         """The fault that only a person may clear before the drives are armed again, or None."""
 
     def fault(self, now_ns: int) -> str | None:
-        """Why the wheels can't be driven now, None if they can."""
+        """The fault that keeps the wheels from being driven now, None if there is none."""
 
     def torque(self, right_wheel_N_m: float, left_wheel_N_m: float) -> Sequence[Frame]:
-        """Set-points for both wheels; `sent_wheel_N_m` is then what the bus carries."""
+        """Set-points for both wheels; `sent_wheel_N_m` is then their value on the bus."""
 
     def rest(self, now_ns: int) -> Sequence[Frame]:
-        """Torque 0 for both wheels, and whatever keeps them disarmed; call once per period."""
+        """Torque 0 for both wheels, and frames that keep them disarmed; call once per period."""
 
     def disarm(self) -> Sequence[Frame]:
         """Torque 0 and idle for both wheels; the way to `armed` begins anew."""
@@ -79,12 +79,12 @@ class DriveNode(Protocol):
     """The emulated drive of one wheel."""
 
     fed_ns: int
-    """When it last took a set-point, bus time."""
+    """Bus time of its last set-point: the last feed of the watchdog."""
     setpoint_id: int
-    """The identifier of the set-point that it takes at its address now; negative: it takes none."""
+    """The identifier of its set-points at its present address; negative: it accepts none."""
 
     def update_encoder(self, revolutions: float, rev_s: float) -> None:
-        """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
+        """Set the encoder's position [rev] and speed [rev/s] of the shaft."""
 
     def lose_estimate(self) -> None:
         """The encoder's estimate is gone for good: disarm with that error, which nothing clears."""
@@ -96,7 +96,7 @@ class DriveNode(Protocol):
         """The encoder frame out of its turn; the next cyclic one comes a period later."""
 
     def on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
-        """Take one frame from the bus; return the replies."""
+        """Process one frame from the bus; return the replies."""
 
     @property
     def input_torque_shaft(self) -> float:
@@ -104,10 +104,10 @@ class DriveNode(Protocol):
 
     @property
     def next_due_ns(self) -> int:
-        """The earliest bus time at which `due` has something to do; after its last call."""
+        """The earliest bus time at which `due` has an effect; valid after its last call."""
 
     def update_measurements(self, measurements: DriveMeasurements) -> None:
-        """Take the drive's measurements of its motor and supply."""
+        """Set the drive's measurements of its motor and supply."""
 
     def torque_demand_shaft(self, dt_s: float) -> float:
         """Torque asked of the motor for the next `dt_s`, at its shaft [N·m]; always finite."""
@@ -137,17 +137,17 @@ class Versions(NamedTuple):
 
 
 class VersionQuery(Protocol):
-    """Asks the first drive that is heard for its versions."""
+    """Requests the versions of the first drive on a bus."""
 
     versions: Versions | None
-    """The answer, None until it came."""
+    """The answer, None before it."""
 
     def on_frame(self, frame: Frame) -> Frame | None:
-        """Take a frame from the bus; return the request, once."""
+        """Process a frame from the bus; return the request, once."""
 
     @property
     def missing(self) -> str:
-        """What has not been heard yet, in words."""
+        """The frame that is still awaited, in words."""
 
 
 class EndpointFile(Protocol):

@@ -4,13 +4,13 @@
     CLEAR      both: Set_Axis_State IDLE, Clear_Errors, Set_Input_Torque 0
     SET        both: Set_Limits, Set_Controller_Mode torque / passthrough, Set_Input_Torque 0
     CLOSE      both: Set_Axis_State CLOSED_LOOP, again every `RETRY_NS`; then torque 0 every call
-    armed      both heartbeats said CLOSED_LOOP without errors after that
+    armed      both heartbeats report CLOSED_LOOP without errors after that
 
-It begins once both drives are there, and anew when one isn't any more, or when a passing error came
-up at CLOSE (`PASSING` of `remote_axis`). Torque 0 goes out before every arm: a drive keeps the last
-torque it was sent, and it acts on arming. `disarm` begins anew: nothing leads from a fault back to
-torque but these steps. A drive that drops out, falls silent, is stopped by another host, or whose
-identifiers two senders use, is a `fault` of the robot: the other wheel must not go on alone.
+The sequence begins once both drives are present, and anew when one is absent or reports a passing
+error in CLOSE (`PASSING` of `remote_axis`). Torque 0 goes out before every arm: a drive keeps the
+last torque that it received, which acts on arming. `disarm` begins anew: only these steps lead from
+a fault back to torque. A drive that drops out, falls silent, is stopped by another host, or whose
+identifiers have two senders, is a `fault` of the robot: the other wheel must not turn alone.
 
 Positive torque drives forward on both wheels. Revolutions of the shaft become radians of the wheel
 here, and torques at the wheel torques at the shaft, nowhere else.
@@ -29,7 +29,7 @@ from configs.brief import DriveLink
 
 RETRY_NS = 200_000_000
 REPEAT_NS = 50_000_000
-"""How often a drive that should be idle, and says that it isn't, is told again."""
+"""Period of IDLE requests to a drive that should be idle and reports another state."""
 FLOAT32_MAX = 3.4e38
 _FOREIGN = (
     Command.SET_AXIS_STATE,
@@ -72,13 +72,13 @@ class OdriveClient:
         self._closing_ns: int | None = None
         self._idled_ns = NEVER
         self._well_until_ns = NEVER
-        """Both drives are in closed loop without trouble; their heartbeats count until then."""
+        """Bus time until which the heartbeats of both drives, in closed loop and sound, count."""
         self.armed = False
         self.sent_wheel_N_m = (0.0, 0.0)
         """(right, left) torque last sent, at the wheels [N·m], as float32 carries it."""
 
     def on_frame(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
-        """Take any frame from the bus."""
+        """Process any frame from the bus."""
         axis = self._encoders.get(can_id)
         if axis is None:
             handler = self._others.get(can_id)
@@ -96,11 +96,11 @@ class OdriveClient:
             axis.on_request(Command.GET_ENCODER_ESTIMATES)
 
     def feedback_since(self, bus_ns: int) -> bool:
-        """Whether both wheels' encoder frames came after this bus time."""
+        """Whether both wheels' encoder frames were received after this bus time [ns]."""
         return self._right.encoder_ns > bus_ns and self._left.encoder_ns > bus_ns
 
     def motion(self) -> Motion | None:
-        """The newest wheel angles and speeds, None before both wheels were heard."""
+        """The newest wheel angles and speeds, None before the first encoder frames of both."""
         right, left = self._right, self._left
         if right.encoder_ns == NEVER or left.encoder_ns == NEVER:
             return None
@@ -114,10 +114,10 @@ class OdriveClient:
     # --- arming ----------------------------------------------------------------------------------
 
     def arm(self, now_ns: int) -> Sequence[Frame]:
-        """What to send next on the way to `armed`; call once per period."""
+        """The next frames of the arming sequence; call once per period."""
         zero = self.torque(0.0, 0.0)
         if any(axis.absence(now_ns, self._link) for axis in self._axes):
-            self._begin_anew()  # a drive that isn't there misses its steps
+            self._begin_anew()  # an absent drive misses its steps
             return zero
         match self._step:
             case _Step.CLEAR:
@@ -162,7 +162,7 @@ class OdriveClient:
                 ]
 
     def missing(self, now_ns: int) -> str:
-        """What of each drive keeps the robot from being armed, "" if nothing does."""
+        """The reasons why each drive is not armed, "" if there are none."""
         reasons = []
         for axis in self._axes:
             reason = axis.absence(now_ns, self._link)
@@ -174,10 +174,10 @@ class OdriveClient:
         return "; ".join(filter(None, reasons))
 
     def obstacle(self, now_ns: int) -> str | None:
-        """Why arming must not even be tried now, None if it may.
+        """The reason not to begin arming now, None if there is none.
 
-        Drives that are silent, and errors that are a person's to clear, are obstacles; what a host
-        may clear by itself is `bridge.drives.odrive.remote_axis.PASSING`.
+        Absent drives, and errors that only a person may clear, are obstacles; those that a host may
+        clear by itself are `bridge.drives.odrive.remote_axis.PASSING`.
         """
         for axis in self._axes:
             if reason := axis.absence(now_ns, self._link) or axis.obstacle():
@@ -185,11 +185,11 @@ class OdriveClient:
         return None
 
     def refusal(self) -> str | None:
-        """What a person has to mend before the drives may be armed again, None if nothing."""
+        """The fault that only a person may clear before the drives are armed again, or None."""
         return next(filter(None, (axis.obstacle() for axis in self._axes)), None)
 
     def fault(self, now_ns: int) -> str | None:
-        """Why the wheels can't be driven now, None if they can."""
+        """The fault that keeps the wheels from being driven now, None if there is none."""
         if now_ns <= self._well_until_ns:
             since_ns = now_ns - self._encoder_limit_ns
             if self._right.encoder_ns >= since_ns and self._left.encoder_ns >= since_ns:
@@ -242,7 +242,7 @@ class OdriveClient:
         return [*self.torque(0.0, 0.0), *self._idle(self._axes)]
 
     def rest(self, now_ns: int) -> Sequence[Frame]:
-        """Torque 0 for both wheels, and idle once more for a drive that isn't; once per period."""
+        """Torque 0 for both wheels, and IDLE to a drive in closed loop; call once per period."""
         zero = self.torque(0.0, 0.0)
         awake = [axis for axis in self._axes if axis.closed_loop]
         if not awake or now_ns - self._idled_ns < REPEAT_NS:
@@ -269,7 +269,7 @@ class OdriveClient:
         return {f.identifier(axis.node, command): axis for axis in self._axes}
 
     def _handlers_by_id(self) -> dict[int, _Handler]:
-        """What isn't an encoder frame: heartbeats, requests of others, commands of others."""
+        """Handlers of all but encoder frames: heartbeats, requests and commands of other hosts."""
         handlers: dict[int, _Handler] = {}
         for axis in self._axes:
             handlers[f.identifier(axis.node, Command.HEARTBEAT)] = partial(self._on_heartbeat, axis)

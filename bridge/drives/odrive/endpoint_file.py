@@ -1,4 +1,4 @@
-"""The vendor's `flat_endpoints.json`, for the versions that a drive says in Get_Version.
+"""The vendor's `flat_endpoints.json`, for the versions that a drive reports in Get_Version.
 
 Scripts that read or write parameters over CAN take the numbers of endpoints from that file, and
 refuse one whose versions aren't the drive's.
@@ -17,7 +17,7 @@ from configs.sections import Drive
 
 
 class FlatEndpoints:
-    """The file for an emulated firmware, or for the first drive that is heard on a bus."""
+    """The file for an emulated firmware, or for the first drive found on a bus."""
 
     def versions_of(self, firmware: str | None) -> Versions:
         """The versions of an emulated drive; None: of the firmware that drives have by default.
@@ -32,7 +32,7 @@ class FlatEndpoints:
         return Versions((major, minor, revision), HARDWARE)
 
     def query(self) -> VersionQuery:
-        """Get_Version of the first drive whose heartbeat is heard."""
+        """Get_Version of the first drive with a heartbeat."""
         return GetVersion()
 
     def contents(self, versions: Versions) -> Mapping[str, object]:

@@ -36,7 +36,7 @@ from configs.brief import DriveModel
 
 
 class LocalAxis:
-    """One axis. Told the time, never asks for it."""
+    """One axis. Pure: the time is an argument."""
 
     __slots__ = (
         "_conditions",
@@ -67,7 +67,7 @@ class LocalAxis:
     def __init__(self, model: DriveModel, serial: int) -> None:
         self.model = model
         self.serial = serial
-        self._lasting = AxisError(0)  # what nothing clears
+        self._lasting = AxisError(0)  # never cleared
 
     def power_up(self, parameters: Parameters) -> None:
         """Idle, without errors, with these parameters."""
@@ -87,7 +87,7 @@ class LocalAxis:
         self.apply()
 
     def apply(self) -> None:
-        """Let changed parameters act."""
+        """Apply changed parameters."""
         p = self.parameters
         armed = self.state is AxisState.CLOSED_LOOP_CONTROL
         limiters = self.model.torque_limiters
@@ -108,7 +108,7 @@ class LocalAxis:
     # --- the plant's end -------------------------------------------------------------------------
 
     def update_encoder(self, revolutions: float, rev_s: float) -> None:
-        """Take what the encoder says: position [rev] and speed [rev/s] of the shaft."""
+        """Set the encoder's position [rev] and speed [rev/s] of the shaft."""
         self.position = revolutions + self._offset
         self.velocity = rev_s
 
@@ -118,7 +118,7 @@ class LocalAxis:
         self.disarm(self._lasting)
 
     def update_measurements(self, measurements: DriveMeasurements) -> None:
-        """Take what the drive measures; derate, and disarm if that says so."""
+        """Set the drive's measurements; derate, and disarm at a condition of `health`."""
         self.measurements = measurements
         model = self.model
         limit_A = health.current_limit(measurements, self.parameters.current_limit, model)
@@ -154,7 +154,7 @@ class LocalAxis:
 
     @property
     def effective_torque_shaft(self) -> float:
-        """The torque that it asks for now, without going on [N·m]."""
+        """The present torque demand [N·m], without a step of the controller."""
         if self._plain and self.state is AxisState.CLOSED_LOOP_CONTROL:
             return self.input_torque_shaft
         return self.demand
@@ -162,7 +162,7 @@ class LocalAxis:
     # --- supervision -----------------------------------------------------------------------------
 
     def supervise(self, now_ns: int) -> None:
-        """Look at the watchdog, the procedure that runs, and the motion."""
+        """Check the watchdog, the running procedure and the motion."""
         if now_ns - self.fed_ns > self._silence_ns:
             self.disarm(AxisError.WATCHDOG_TIMER_EXPIRED)
         while now_ns >= self.calibration.ends_ns:
@@ -174,7 +174,7 @@ class LocalAxis:
             self._check_motion()
 
     def disarm(self, error: AxisError) -> None:
-        """Raise an error; stop whatever runs."""
+        """Raise an error and go to IDLE."""
         self.errors |= error
         if self.state is not AxisState.IDLE:
             self.disarm_reason = error
@@ -182,7 +182,7 @@ class LocalAxis:
             self._to_idle()
 
     def estop(self) -> None:
-        """Stop; whether arming then needs Clear_Errors is a setting."""
+        """Go to IDLE; `estop_blocks_arming` decides whether arming then needs Clear_Errors."""
         if self.model.estop_blocks_arming:
             self.errors |= AxisError.ESTOP_REQUESTED
         self.disarm_reason |= AxisError.ESTOP_REQUESTED
@@ -191,7 +191,7 @@ class LocalAxis:
             self._to_idle()
 
     def clear_errors(self) -> None:
-        """Forget errors but those whose cause is still measured."""
+        """Clear errors but those whose cause is still measured."""
         self.errors = AxisError(self._conditions) | self._lasting
         self.disarm_reason = AxisError(0)
 
@@ -203,10 +203,10 @@ class LocalAxis:
         elif model.torque_limiters and abs(self.velocity) > fastest:
             self.disarm(AxisError.VELOCITY_LIMIT_VIOLATION)
 
-    # --- what it is told -------------------------------------------------------------------------
+    # --- commands ----------------------------------------------------------------------------
 
     def set_torque(self, torque: float, now_ns: int) -> None:
-        """Take a torque input [N·m]. NaN disarms, and so does ∞ where nothing limits it."""
+        """Set the torque input [N·m]. NaN disarms, and so does ∞ where nothing limits it."""
         if torque != torque or not (self.model.torque_limiters or isfinite(torque)):
             self.input_torque_shaft = 0.0
             self.disarm(AxisError.BAD_CONFIG)
@@ -215,7 +215,7 @@ class LocalAxis:
         self.input_torque_shaft = min(max(torque, -FLOAT32_MAX), FLOAT32_MAX)
 
     def set_velocity(self, velocity: float, torque: float, now_ns: int) -> None:
-        """Take a velocity input [rev/s] and its feed-forward, the torque input from now on."""
+        """Set the velocity input [rev/s] and its feed-forward, the torque input."""
         if velocity != velocity:
             torque = velocity
         else:
@@ -223,7 +223,7 @@ class LocalAxis:
         self.set_torque(torque, now_ns)
 
     def set_position(self, position: float, velocity: float, torque: float, now_ns: int) -> None:
-        """Take a position input [rev] and feed-forwards, the other inputs from now on."""
+        """Set the position input [rev] and its feed-forwards, the other inputs."""
         if position != position:
             torque = position
         else:
@@ -231,7 +231,7 @@ class LocalAxis:
         self.set_velocity(velocity, torque, now_ns)
 
     def set_modes(self, control_mode: int, input_mode: int) -> None:
-        """Choose control and input mode. Those that don't exist disarm: now, or on arming."""
+        """Set control and input mode. Unknown modes disarm: at once, or on arming."""
         p = self.parameters
         if (control_mode, input_mode) != (p.control_mode, p.input_mode):
             p.control_mode, p.input_mode = control_mode, input_mode
@@ -239,7 +239,7 @@ class LocalAxis:
             self.apply()
 
     def move_origin(self, position: float) -> bool:
-        """Call the present position `position` [rev]; False if that is no number."""
+        """Set the present position to `position` [rev]; False if either is not finite."""
         if not isfinite(position) or not isfinite(self.position):
             return False
         self._offset += position - self.position
@@ -247,7 +247,7 @@ class LocalAxis:
         return True
 
     def request(self, asked: int, now_ns: int) -> None:
-        """Change the state, if that can be."""
+        """Request a state; see the table above."""
         if asked == AxisState.UNDEFINED:
             return
         if asked == AxisState.CLOSED_LOOP_CONTROL == self.state:

@@ -13,8 +13,9 @@
                     1 saves the present ones first, 2 the vendor's
     Reboot 3, DFU   only in IDLE: gone from the bus for good
 
-A drive at 0x3F is unaddressed: it sends nothing cyclic, hears nothing but Address, and answers that
-after a random delay, as all its like do with the same identifier. Address is heard at 0x3F by all.
+A drive at 0x3F is unaddressed: it sends no cyclic messages, processes only Address, and answers it
+after a random delay, because all unaddressed drives answer with the same identifier. Every drive
+processes Address at 0x3F.
 Frames of other nodes, 29-bit and error frames, unknown commands and the drive's own messages are
 ignored; none of these, no request and no endpoint feeds the watchdog.
 
@@ -36,7 +37,7 @@ from bridge.frame import EFF, ERR, RTR, Frame
 from configs.brief import DriveModel
 
 ANSWER_WITHIN_NS = 20_000_000
-"""An unaddressed drive answers Address after up to this."""
+"""Longest delay of an unaddressed drive's answer to Address."""
 _NONE: Sequence[Frame] = ()
 _UNPACK_FLOAT = f.ONE_FLOAT.unpack
 _PACK_TWO = f.TWO_FLOATS.pack
@@ -70,7 +71,7 @@ class OdriveNode(LocalAxis):
         self._boot(0)
 
     def _boot(self, now_ns: int) -> None:
-        """Power up; everything cyclic is due at once."""
+        """Power up; all cyclic messages are due at once."""
         self.power_up(self._saved.copy())
         self._boots_ns = self._answers_ns = NEVER
         self._cyclic_ns = dict.fromkeys(self.parameters.period_ns, now_ns)
@@ -84,7 +85,7 @@ class OdriveNode(LocalAxis):
     # --- the hot path ----------------------------------------------------------------------------
 
     def on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
-        """Take one frame from the bus; return the replies."""
+        """Process one frame from the bus; return the replies."""
         can_id, data = frame
         if can_id == self.setpoint_id and len(data) == 4:
             if now_ns - self.fed_ns > self._silence_ns:
@@ -103,7 +104,7 @@ class OdriveNode(LocalAxis):
         return self._on_frame(frame, now_ns)
 
     def due(self, now_ns: int) -> Sequence[Frame]:
-        """Frames due until this instant; the watchdog is looked at first."""
+        """Frames due until this instant; the watchdog is checked first."""
         if not self._plain or now_ns - self.fed_ns > self._silence_ns:
             self.supervise(now_ns)
         encoder = now_ns >= self._next_encoder_ns
@@ -117,7 +118,7 @@ class OdriveNode(LocalAxis):
 
     @property
     def next_due_ns(self) -> int:
-        """The earliest bus time at which `due` has something to do."""
+        """The earliest bus time at which `due` has an effect."""
         next_ns = min(self._next_encoder_ns, self._next_other_ns)
         return min(next_ns, self.fed_ns + self._silence_ns + 1)
 
@@ -135,10 +136,10 @@ class OdriveNode(LocalAxis):
             data = floats(self.position, self.velocity)
         return _new(Frame, (self._encoder_id, data))
 
-    # --- what is due -----------------------------------------------------------------------------
+    # --- transmission ----------------------------------------------------------------------------
 
     def _due(self, now_ns: int) -> Sequence[Frame]:
-        """Everything but an encoder frame alone."""
+        """All due frames, in the general case."""
         if now_ns >= self._boots_ns:
             self._boot(now_ns)
         self.supervise(now_ns)
@@ -160,7 +161,7 @@ class OdriveNode(LocalAxis):
         return self._boots_ns == NEVER and self.parameters.node_id != f.UNADDRESSED
 
     def _plan(self) -> None:
-        """Note what the present address and periods mean for the hot path."""
+        """Derive the hot path's due times and identifiers from address and periods."""
         node, next_ns, encoder_ns = self.parameters.node_id, NEVER, NEVER
         if self._speaks:
             for command, period_ns in self.parameters.period_ns.items():
@@ -177,7 +178,7 @@ class OdriveNode(LocalAxis):
             next_ns, self._boots_ns, self._answers_ns, self.calibration.ends_ns
         )
 
-    # --- what it hears ---------------------------------------------------------------------------
+    # --- reception -------------------------------------------------------------------------------
 
     def _on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         can_id, data = frame
@@ -230,7 +231,7 @@ class OdriveNode(LocalAxis):
         return (self._frame(Command.TX_SDO, said),)
 
     def _answer(self, data: bytes, now_ns: int) -> bytes | None:
-        """What TxSdo says to an RxSdo; None if nothing."""
+        """The data of TxSdo in answer to an RxSdo; None for no answer."""
         if len(data) < f.SDO.size:
             return None
         if f.SDO.unpack_from(data)[1] in functions.FUNCTIONS:
@@ -243,7 +244,7 @@ class OdriveNode(LocalAxis):
         self.ignored += not self.restart(action, now_ns)
 
     def restart(self, action: int, now_ns: int) -> bool:
-        """What a `RebootAction` does; False if it does nothing, as while the axis isn't idle."""
+        """Do a `RebootAction`; False if it has no effect, as while the axis isn't idle."""
         if self.state is not AxisState.IDLE or action > RebootAction.ENTER_DFU_MODE:
             return False
         match action:

@@ -1,11 +1,12 @@
-"""The host's picture of one ODrive axis, from its frames alone.
+"""The host's model of one ODrive axis, from its frames alone.
 
     angle, speed    of the wheel, from the newest encoder frame whose numbers are finite
-    trouble         why its wheel must not be driven: errors, an e-stop seen on its way to it, two
-                    senders of its telemetry
-    heartbeat_ns        bus time of its newest heartbeat, encoder_ns of its newest encoder frame
+    trouble         reason not to drive its wheel: errors, an e-stop frame to it, two senders of its
+                    telemetry
+    heartbeat_ns    bus time of its newest heartbeat
+    encoder_ns      bus time of its newest encoder frame
 
-Answers to requests of other hosts are told from a second sender by counting the requests.
+Requests of other hosts are counted, so that their answers don't count as those of a second sender.
 """
 
 from math import pi
@@ -18,8 +19,8 @@ from configs.brief import DriveLink
 
 NEVER = -(1 << 62)
 PASSING = AxisError.WATCHDOG_TIMER_EXPIRED | AxisError.INITIALIZING
-"""Errors that say no more than that drive and host had lost each other: a host may clear them by
-itself. All others, an e-stop above all, are a person's to clear."""
+"""Errors of a lost connection between drive and host, which a host may clear by itself. All others,
+an e-stop above all, only a person may clear."""
 
 
 class RemoteAxis:
@@ -66,9 +67,9 @@ class RemoteAxis:
         self.errors = AxisError(0)
         self.trouble = ""
         self.commanded = 0
-        """Set-points and modes that other hosts sent to it."""
+        """Set-points and modes sent to it by other hosts."""
         self.encoder_frames = 0
-        """Less those that were requested."""
+        """Encoder frames received, less those requested."""
         self._heartbeats = 0
         self._doubled = ""
         self._encoder_cadence = Cadence(link.encoder_period_ns)
@@ -78,10 +79,10 @@ class RemoteAxis:
         """A frame for this drive."""
         return Frame(f.identifier(self.node, command), data)
 
-    # --- what is heard ---------------------------------------------------------------------------
+    # --- reception -----------------------------------------------------------------------------
 
     def on_heartbeat(self, data: bytes | bytearray, now_ns: int) -> bool:
-        """Take a heartbeat; False if it is a request for one, or none at all."""
+        """Process a heartbeat; False if it is a request for one, or malformed."""
         if len(data) != f.HEARTBEAT.size:
             self._heartbeats -= not data
             return False
@@ -96,14 +97,14 @@ class RemoteAxis:
         return True
 
     def on_request(self, command: Command) -> None:
-        """Somebody asked for a frame out of its turn: it is no sign of a second sender."""
+        """Discount the answer to a request: it is no sign of a second sender."""
         if command is Command.HEARTBEAT:
             self._heartbeats -= 1
         else:
             self.encoder_frames -= 1
 
     def on_estop(self) -> None:
-        """Somebody stopped it: known before its next heartbeat says so."""
+        """Note an e-stop by any host, before the next heartbeat reports it."""
         self.errors |= AxisError.ESTOP_REQUESTED
         self.closed_loop = False
         self._note_trouble()
@@ -131,10 +132,10 @@ class RemoteAxis:
         else:
             self.trouble = ""
 
-    # --- what follows ----------------------------------------------------------------------------
+    # --- conclusions --------------------------------------------------------------------------
 
     def ready_since(self, since_ns: int) -> bool:
-        """Whether it said after `since_ns` that it is in closed loop, and nothing is wrong."""
+        """Whether a heartbeat after `since_ns` reported closed loop, without trouble."""
         heartbeat_ns = self.heartbeat_ns
         return (
             heartbeat_ns is not None
@@ -144,7 +145,7 @@ class RemoteAxis:
         )
 
     def absence(self, now_ns: int, link: DriveLink) -> str:
-        """Why it isn't there, "" if it is."""
+        """The reason why it counts as absent, "" if it is present."""
         if self.heartbeat_ns is None:
             return f"{self.name}: no heartbeat heard yet"
         if now_ns - self.heartbeat_ns > link.heartbeat_age_limit_ns:
@@ -156,13 +157,13 @@ class RemoteAxis:
         return ""
 
     def obstacle(self) -> str:
-        """What a person has to mend before it may be armed, "" if there is nothing."""
+        """The fault that a person must clear before arming, "" if there is none."""
         if self.trouble and not (self.errors and not self.errors & ~PASSING):
             return f"{self.name}{self.trouble}"
         return ""
 
     def why_not_closed(self) -> str:
-        """What it said of itself instead of closed loop."""
+        """Its reported state and last result, while closed loop is missing."""
         state = f.name_of(AxisState, self.state)
         result = f.name_of(ProcedureResult, self.result)
         return f"{self.name}: no closed loop reported yet; it is {state}, last result {result}"
