@@ -213,7 +213,7 @@ class Guard:
         return next(iter(self._noted_faults.values()), None)
 
     def _stop(self, tick: int, reason: str) -> Sequence[Frame]:
-        """Take the torque from both wheels."""
+        """Stop: torque 0 and idle for both wheels."""
         if self.stalled:
             reason = f"{self.stalled}: {reason}"
         self.stop_tick = tick

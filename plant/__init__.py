@@ -1,1 +1,1 @@
-"""What reality replaces: bodies, motors, encoders, localisation."""
+"""The emulated hardware: bodies, motors, encoders, localisation."""

@@ -17,7 +17,7 @@ FARTHEST = 1e9
 
 
 class Divergence(NamedTuple):
-    """When the motion of a body left its bounds, and what it was doing before."""
+    """Time at which the motion of a body left its bounds, and its state before."""
 
     t_s: float  # scenario time
     v: float  # [m/s]

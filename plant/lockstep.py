@@ -44,7 +44,7 @@ silent peer; after it, the launcher names the plant."""
 
 @dataclass(slots=True)
 class PlantCounters:
-    """What the run cost, for the summary."""
+    """The cost of the run, for the summary."""
 
     ticks: int = 0
     wall_ns: int = 0
@@ -69,7 +69,7 @@ class _Lane:
 
 
 class _Ends(NamedTuple):
-    """Where a robot's pose and truth go."""
+    """The outputs of a robot's pose and truth."""
 
     pose: Publisher
     rows: RowBuffer
@@ -147,7 +147,7 @@ class LockstepLoop:
             self.counters.frames[bus] = lane.bus.crossed
 
     def progress(self) -> Progress:
-        """How far the slowest robot is."""
+        """The progress of the slowest robot."""
         tick = self._slowest
         self.counters.ticks = max(tick, 0)
         return Progress(
@@ -167,7 +167,7 @@ class LockstepLoop:
                 ends.pose.put(PoseFix(tick, t_ns, state.x, state.y, state.theta).encode())
 
     def _go_on(self, lane: _Lane, now_ns: int) -> None:
-        """Take a bus to its next question, or through the end of its tick."""
+        """Advance a bus to its next question, or through the end of its tick."""
         asked = next(lane.steps)
         if asked is None:
             self._take_on(lane, now_ns)

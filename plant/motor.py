@@ -44,7 +44,7 @@ FASTEST_SHAFT_RAD_S = 1e12
 
 
 class MotorFault(Enum):
-    """What can be wrong with a motor or its power stage; the value is its name in scenarios."""
+    """A fault of a motor or its power stage; the value is its name in scenarios."""
 
     TORQUE_STUCK = "torque_stuck"
     TORQUE_HALF = "torque_half"
@@ -116,7 +116,7 @@ class Motor:
         self.power_W = 0.0
         """P of (3), mean of the last step; negative while it feeds the bus."""
         self.fet_C = self.motor_C = model.ambient_C
-        """What the thermistors say."""
+        """The readings of the thermistors."""
 
     def step(self, demand_shaft_N_m: float, speed_shaft_rad_s: float, dt_s: float) -> float:
         """Mean torque at the shaft [N·m] over `dt_s`, for a demand and a speed at its start."""

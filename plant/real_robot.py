@@ -24,7 +24,7 @@ class RealRobot:
         self._pose = start.x_m, start.y_m, start.theta_rad
 
     def receive_pose(self, fix: PoseFix | None) -> None:
-        """Take a pose from the localisation system; one that is not of this world is counted."""
+        """Store a pose of the localisation system; count one beyond the world."""
         if fix is None or not within_world(fix.x_m, fix.y_m, fix.theta_rad):
             self.refused += 1
             return

@@ -26,7 +26,7 @@ from plant.lockstep import REPORT_EVERY_NS, PlantCounters
 from plant.robot import EmulatedRobot
 
 FAREWELL_S = 0.5
-"""How long the plant stays for controllers that act after its last tick."""
+"""Time for which the plant outlasts its last tick, for controllers that act later."""
 
 
 class RealtimeLoop:
@@ -67,7 +67,7 @@ class RealtimeLoop:
         self.lateness = Lateness(brief.schedule.period_s)
 
     def progress(self) -> Progress:
-        """How far the plant is."""
+        """The progress of the plant."""
         tick = self._tick
         self.counters.ticks = max(tick, 0)
         wall_ns = max(self._clock.monotonic_ns() - self._epoch_ns, 0)

@@ -24,7 +24,7 @@ from plant.integrate import rk4
 from plant.powertrain import powertrain
 
 MEASURE_EVERY_S = 0.001
-"""How often a drive's firmware reads its thermistors and currents, at most."""
+"""Shortest period at which a drive's firmware reads its thermistors and currents."""
 
 
 class EmulatedRobot:
@@ -56,7 +56,7 @@ class EmulatedRobot:
         self._left = node(brief.drive, brief.left_node, brief.drive.serial_number + 1)
         self.drives: tuple[DriveNode, DriveNode] = (self._right, self._left)
         self.divergence: Divergence | None = None
-        """Why the body stands still for good, None if it doesn't."""
+        """The reason why the body is held for good, None if it moves."""
         self.moved_ns = 0
         """Bus time up to which the body has moved, where it moves from event to event."""
         mounting = brief.mounting
@@ -87,7 +87,7 @@ class EmulatedRobot:
         return self._right.feedback(now_ns), self._left.feedback(now_ns)
 
     def frames_due(self, now_ns: int) -> list[Frame]:
-        """What both drives send at this instant, in order of arbitration."""
+        """The frames that both drives send at this instant, in order of arbitration."""
         self.update_encoders()
         frames = [*self._right.due(now_ns), *self._left.due(now_ns)]
         if len(frames) > 1:
@@ -172,7 +172,7 @@ class RealisticRobot(EmulatedRobot):
         self._unmeasured_s = 0.0
 
     def _shaft_inertia(self, gear_ratio: float) -> float:
-        """What a motor turns at least, seen at its shaft [kg·m²]."""
+        """The least inertia that a motor turns, at its shaft [kg·m²]."""
         return min(self._body.mbar_1, self._body.mbar_2) / (gear_ratio * gear_ratio)
 
     def update_encoders(self) -> None:

@@ -31,7 +31,7 @@ from configs import powertrain
 
 
 class SupplyFault(Enum):
-    """What can be wrong with a supply; the value is its name in scenarios."""
+    """A fault of a supply; the value is its name in scenarios."""
 
     UNDER_VOLTAGE = "under_voltage"
     OVER_VOLTAGE = "over_voltage"
@@ -56,7 +56,7 @@ class Supply:
         """Power that the drives asked for and didn't get; 0 below the limit of the source."""
 
     def step(self, right_W: float, left_W: float, dt_s: float) -> None:
-        """Take the electrical power of both motors, held over `dt_s`; finite."""
+        """Set the electrical power of both motors, held over `dt_s`; finite."""
         model = self._model
         right_W += model.standby_W
         left_W += model.standby_W

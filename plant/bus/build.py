@@ -13,7 +13,7 @@ from plant.robot import EmulatedRobot
 Ports = Callable[[str, Sequence[EmulatedRobot]], Port]
 """The port of a bus, by its name and the robots on it."""
 Begins = Callable[[Sequence[EmulatedRobot]], Begin]
-"""What is told each tick, for the robots of a bus."""
+"""Callback of each tick, for the robots of a bus."""
 
 
 def no_begin(_: Sequence[EmulatedRobot]) -> Begin:

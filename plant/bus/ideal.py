@@ -98,7 +98,7 @@ class IdealBus:
         return min(drive.next_due_ns for drive in self._drives)
 
     def react(self, now_ns: int) -> None:
-        """Take what clients sent, and answer."""
+        """Process the clients' frames, and answer."""
         self.move(now_ns)
         received = self._port.receive()
         self._tap(now_ns, received, 0)

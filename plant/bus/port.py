@@ -27,13 +27,13 @@ class Port(Protocol):
         """Give frames of the drives, all of one bus time, to all clients."""
 
     def receive(self) -> Sequence[Frame]:
-        """What clients sent since the last call, in order."""
+        """The frames that clients sent since the last call, in order."""
 
     def forward(self, stamp_ns: int, ended: Sequence[Transmitted], asked: str | None) -> None:
         """Give what ended on the wire until `stamp_ns` to all clients; `asked` has to answer."""
 
     def submitted(self) -> Sequence[Submitted]:
-        """What clients handed to their transmit queues since the last call, in order."""
+        """The frames added to the transmit queues of clients since the last call, in order."""
 
     def departed(self) -> Sequence[Key]:
         """Clients that left since the last call."""
@@ -58,7 +58,7 @@ class Bus(Protocol):
         """The next bus time at which something happens."""
 
     def react(self, now_ns: int) -> None:
-        """Take what clients sent, and answer."""
+        """Process the clients' frames, and answer."""
 
     def advance(self, now_ns: int) -> None:
         """Let everything happen that is due until this instant."""

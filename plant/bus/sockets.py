@@ -23,7 +23,7 @@ class SocketPort:
         self._end.deliver(self._name, stamp_ns, frames)
 
     def receive(self) -> list[Frame]:
-        """What clients sent since the last call."""
+        """The frames that clients sent since the last call."""
         return self._end.receive(self._name)
 
     def forward(self, stamp_ns: int, ended: Sequence[Transmitted], asked: str | None) -> None:
@@ -31,7 +31,7 @@ class SocketPort:
         self._hub.forward(self._name, stamp_ns, ended, asked)
 
     def submitted(self) -> list[Submitted]:
-        """What clients handed to their transmit queues since the last call."""
+        """The frames that clients submitted to their transmit queues since the last call."""
         return self._hub.submitted(self._name)
 
     def departed(self) -> list[Key]:

@@ -150,7 +150,7 @@ class TimedBus:
         return self._next_ns()
 
     def react(self, now_ns: int) -> None:
-        """Take what clients want to send."""
+        """Submit the clients' frames to the wire."""
         self.advance(now_ns)
         self._take_answer()
 

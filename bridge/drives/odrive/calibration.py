@@ -37,7 +37,7 @@ class Calibration:
         """Stop whatever runs."""
         self._procedures: tuple[AxisState, ...] = ()
         self.ends_ns = NEVER
-        """When the procedure that runs is over."""
+        """Bus time of the end of the running procedure."""
 
     @property
     def runs(self) -> bool:
@@ -46,7 +46,7 @@ class Calibration:
 
     @property
     def state(self) -> AxisState:
-        """What the axis says of itself."""
+        """The reported state of the axis."""
         return self._procedures[0] if self._procedures else AxisState.IDLE
 
     def begin(self, asked: int, parameters: Parameters, now_ns: int) -> bool:

@@ -28,7 +28,7 @@ from bridge.drives.odrive.trapezoid import Trapezoid, plan
 
 _LOOP_HZ = 8000.0
 _INTEGRATOR_KEEP = 0.99
-"""What a loop period leaves of z while τ is limited."""
+"""Factor on z per loop period while τ is limited."""
 _CONTROL_MODES = frozenset((ControlMode.TORQUE, ControlMode.VELOCITY, ControlMode.POSITION))
 _INPUT_MODES = frozenset(InputMode) - {InputMode.MIRROR, InputMode.TUNING}
 
@@ -72,7 +72,7 @@ class Controller:
         self._trajectory_s = 0.0
 
     def move_to(self, position: float) -> None:
-        """Take a position input; TRAP_TRAJ plans a move to it."""
+        """Set the position input; TRAP_TRAJ plans a move to it."""
         self.input_position = position
         if self._parameters.input_mode == InputMode.TRAP_TRAJ:
             self._goal = position

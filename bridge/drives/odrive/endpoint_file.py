@@ -48,7 +48,7 @@ class GetVersion:
         self._node: int | None = None
 
     def on_frame(self, frame: Frame) -> Frame | None:
-        """Take a frame from the bus; return the request at the first heartbeat."""
+        """Process a frame from the bus; return the request at the first heartbeat."""
         can_id, data = frame
         if self._node is None:
             command = can_id & ((1 << f.BITS) - 1)
@@ -64,7 +64,7 @@ class GetVersion:
 
     @property
     def missing(self) -> str:
-        """What has not been heard yet, in words."""
+        """The frame that is still awaited, in words."""
         if self._node is None:
             return "no drive's heartbeat"
         return f"no Get_Version of node {self._node}"

@@ -189,7 +189,7 @@ ENDPOINTS: Mapping[int, Endpoint] = {n: Endpoint(n, *row) for n, row in enumerat
 
 
 def answer(axis: LocalAxis, data: bytes, now_ns: int) -> bytes | None:
-    """What TxSdo says to an RxSdo with a number; None if nothing."""
+    """The data of TxSdo in answer to an RxSdo with a number; None for no answer."""
     opcode, number, _ = f.SDO.unpack_from(data)
     endpoint = ENDPOINTS.get(number)
     if endpoint is None:

@@ -52,7 +52,7 @@ class Command(IntEnum):
 
 
 class AxisState(IntEnum):
-    """What an axis is doing."""
+    """The state of an axis."""
 
     UNDEFINED = 0
     IDLE = 1
@@ -72,7 +72,7 @@ class AxisState(IntEnum):
 
 
 class ControlMode(IntEnum):
-    """What the controller of an axis controls."""
+    """The controlled quantity of an axis."""
 
     VOLTAGE = 0
     TORQUE = 1
@@ -81,7 +81,7 @@ class ControlMode(IntEnum):
 
 
 class InputMode(IntEnum):
-    """How a set-point becomes the controller's input."""
+    """The filter between a set-point and the controller's input."""
 
     INACTIVE = 0
     PASSTHROUGH = 1
@@ -94,7 +94,7 @@ class InputMode(IntEnum):
 
 
 class ProcedureResult(IntEnum):
-    """How the last change of state ended."""
+    """The result of the last change of state."""
 
     SUCCESS = 0
     BUSY = 1
@@ -161,7 +161,7 @@ INPUT_POS = struct.Struct("<fhh")  # rev, 0.001 rev/s, 0.001 N·m
 
 
 class Heartbeat(NamedTuple):
-    """What a drive says of itself, cyclically."""
+    """The state of a drive, sent cyclically."""
 
     errors: AxisError
     state: int

@@ -73,7 +73,7 @@ FUNCTIONS: Mapping[int, Function] = dict(
 
 
 def answer(node: "OdriveNode", data: bytes, now_ns: int, *, confirms: bool) -> bytes | None:
-    """What TxSdo says to an RxSdo that calls; None if nothing.
+    """The data of TxSdo in answer to an RxSdo that calls; None for no answer.
 
     `confirms`: calls without a result are answered too.
     """

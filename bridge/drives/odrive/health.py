@@ -40,7 +40,7 @@ def current_limit(measurements: DriveMeasurements, limit_A: float, model: DriveM
 
 
 def conditions(measurements: DriveMeasurements, limit_in_force_A: float, model: DriveModel) -> int:
-    """What must disarm the drive now, as bits of `AxisError`."""
+    """The conditions that disarm the drive now, as bits of `AxisError`."""
     hottest_C = model.derate_to_C + TRIP_K
     bits = 0
     if measurements.fet_C != measurements.fet_C:
@@ -72,7 +72,7 @@ class SpinoutDetector:
         self._electrical_W = self._mechanical_W = 0.0
 
     def detects(self, measurements: DriveMeasurements, velocity_rev_s: float, dt_s: float) -> bool:
-        """Take what was measured over `dt_s`."""
+        """Update by the measurements over `dt_s`."""
         keep = exp(-_POWER_BANDWIDTH_RAD_S * dt_s)
         mechanical = measurements.torque_shaft_N_m * velocity_rev_s * 2.0 * pi
         electrical = measurements.bus_V * measurements.bus_A

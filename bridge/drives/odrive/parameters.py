@@ -42,7 +42,7 @@ class Parameters:
 
     @classmethod
     def of(cls, model: DriveModel, node_id: int) -> Self:
-        """What a drive has when it is delivered."""
+        """The parameters of a drive as delivered."""
         return cls(
             node_id=node_id,
             period_ns={

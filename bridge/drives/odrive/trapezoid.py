@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 
 class Point(NamedTuple):
-    """Where a trajectory is."""
+    """A point of a trajectory."""
 
     position: float  # [rev]
     velocity: float  # [rev/s]
