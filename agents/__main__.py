@@ -200,7 +200,7 @@ def _realtime(connections: _Connections, stop: Stop) -> str:
         connections.hellos,
         progress,
     )
-    connections.await_peers(lambda arrival: (deliver(connections.agent, arrival), None)[1], stop)
+    connections.await_peers(partial(deliver, connections.agent), stop)
     settle_memory()
     missing = go_realtime(CONTROLLER_PRIORITY)
     epoch_ns = loop.await_go(stop)

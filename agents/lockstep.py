@@ -39,14 +39,13 @@ _KINDS_AND_SENDERS = {"pose": ("pose", LOCALISATION), "leader": ("speed", LEADER
 
 @dataclass(slots=True)
 class LockstepCounters:
-    """Wall time of a controller by activity [ns], unsent frames and undecodable messages."""
+    """Wall time of a controller by activity [ns], and unsent frames."""
 
     ticks: int = 0
     bus_ns: int = 0
     listen_ns: int = 0
     compute_ns: int = 0
     unsent: int = 0  # frames dropped by a full transmit queue
-    undecodable: int = 0
 
     def durations_ns(self) -> dict[str, int]:
         """Wall time by activity [ns]."""
@@ -80,8 +79,8 @@ class LockstepLoop:
         self.counters = LockstepCounters()
 
     def on_arrival(self, arrival: Arrival) -> None:
-        """Deliver one message to the agent; count one that doesn't decode."""
-        self.counters.undecodable += not deliver(self._agent, arrival)
+        """Deliver one message to the agent."""
+        deliver(self._agent, arrival)
 
     def await_first_frame(self, stop: Stop) -> can.Message | None:
         """Say hello until the plant's first frame; None on a stop."""
@@ -198,8 +197,8 @@ def did_not_start(agent: Agent) -> InfrastructureError:
     return InfrastructureError("; ".join(said))
 
 
-def deliver(agent: Agent, arrival: Arrival) -> bool:
-    """Deliver one message to the agent by its tag; return whether it decodes."""
+def deliver(agent: Agent, arrival: Arrival) -> None:
+    """Deliver one message to the agent by its tag; its admission counts one that doesn't decode."""
     kind, _, robot = arrival.tag.partition("/")
     match kind:
         case "path" if (state := PathState.decode(arrival.payload)) is not None:
@@ -213,5 +212,3 @@ def deliver(agent: Agent, arrival: Arrival) -> bool:
         case _:
             what, sender = _KINDS_AND_SENDERS.get(kind, ("path state", robot))
             agent.admission.malformed(what, sender)
-            return False
-    return True

@@ -52,9 +52,7 @@ class RealtimeCounters:
     misses: int = 0  # no feedback of its torques before the next tick was due
     skipped: int = 0  # computed after the next tick was due, and not sent
     unsent: int = 0  # ticks whose frames found the transmit queue full
-    bus_errors: int = 0  # other errors of the bus, tolerated
     error_frames: int = 0  # reported by the CAN controller
-    undecodable: int = 0
 
     def durations_ns(self) -> dict[str, int]:
         """Empty: in real time the rest of a period is waiting."""
@@ -109,7 +107,7 @@ class RealtimeLoop:
                 if arrival is None:
                     break
                 if arrival.tag != "go":
-                    self.counters.undecodable += not deliver(self._agent, arrival)
+                    deliver(self._agent, arrival)
                 elif (epoch_ns := self._epoch_ns(arrival.payload)) is not None:
                     return epoch_ns
                 arrival = self._link.receive(0.0)
@@ -198,7 +196,7 @@ class RealtimeLoop:
     def _receive_messages(self) -> None:
         """Deliver waiting messages, at most as many as a tick has time for."""
         for arrival in waiting(self._link, self._most_arrivals):
-            self.counters.undecodable += not deliver(self._agent, arrival)
+            deliver(self._agent, arrival)
 
     def _send(self, frames: Sequence[Frame], tick: int) -> None:
         send, health = self._bus.send, self._health
@@ -221,7 +219,7 @@ class RealtimeLoop:
         health, now_ns = self._health, self._clock.monotonic_ns()
         health.failed(error, now_ns)
         self._agent.guard.bus_fault = health.fault(now_ns)
-        self.counters.unsent, self.counters.bus_errors = health.unsent, health.errors
+        self.counters.unsent = health.unsent
 
     def _read_until(self, due_ns: int) -> None:
         """Receive frames until the due time."""

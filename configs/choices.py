@@ -85,7 +85,7 @@ class Chooser(NamedTuple):
         )
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: "GetJsonSchemaHandler") -> Any:
-        """The keys of what is shipped by name; of anything else all keys."""
+        """The keys of a shipped choice; all keys of any other."""
         about = f'a shipped {self.kind.word}, or "module:Class" of your own'
         names = [*self.shipped]
         key: dict[str, Any] = {"type": "string", "description": about, "examples": names}

@@ -15,7 +15,7 @@ from configs.scenario import Scenario
 from configs.wording import MISSING, remedy_of
 
 _NOTHING = object()
-_KEY = "[key]"  # pydantic's mark for what is wrong with a key rather than its value
+_KEY = "[key]"  # pydantic's mark of an error in a key rather than in its value
 
 _UNKNOWN_KEY = {"extra_forbidden", "unexpected_keyword_argument"}
 _ROUNDS = 8
@@ -71,7 +71,7 @@ class Salvage(NamedTuple):
 def salvage(
     error: ValidationError, data: dict[str, Any], context: dict[str, Any]
 ) -> Salvage | None:
-    """The scenario without what is wrong in it, read in this context; None if too much is."""
+    """The scenario without its errors, read in this context; None if too many."""
     rest = copy.deepcopy(data)
     lost: set[str] = set()
     found: ValidationError | None = error
@@ -89,7 +89,7 @@ def salvage(
 
 
 def _errors(error: ValidationError) -> list[dict[str, Any]]:
-    """Without lists that are called too short only because of what is wrong in their entries."""
+    """Without lists that are too short only because of errors in their entries."""
     return [
         dict(item)
         for item in error.errors(include_url=False)
@@ -98,7 +98,7 @@ def _errors(error: ValidationError) -> list[dict[str, Any]]:
 
 
 def _repair(data: dict[str, Any], item: Mapping[str, Any]) -> set[str]:
-    """Drop or replace what one error is about; return the keys whose meaning is lost."""
+    """Drop or replace the place of one error; return the keys whose meaning is lost."""
     loc = item["loc"]
     holders: list[Any] = [data]
     keys: list[int | str] = []

@@ -35,7 +35,7 @@ class Override(NamedTuple):
     def apply(self, data: dict[str, Any]) -> "Override | Complaint":
         """Set the key in parsed TOML; return this with its members of lists by name.
 
-        What is wrong, if there is no such place.
+        The error, if there is no such place.
         """
         *path, last = self.key.split(".")
         holder: Any = data

@@ -102,7 +102,7 @@ def load(plugin: Plugin) -> Any:
     """The class of a plugin.
 
     Raises:
-        PluginError: there is no such module or class, it fails, or it isn't what it should be.
+        PluginError: there is no such module or class, it fails, or it has the wrong type.
     """
     module_name, _, path = plugin.target.partition(":")
     if not module_name or not path:
@@ -181,7 +181,7 @@ def _loaded(file: Path, name: str) -> ModuleType:
 
 
 def _raised(error: BaseException) -> str:
-    """An error of somebody else's code with the place that raised it."""
+    """An error of a plug-in's code with the place that raised it."""
     if isinstance(error, SyntaxError):
         return f"{error.filename}, line {error.lineno}: {error.msg}"
     frames = traceback.extract_tb(error.__traceback__)

@@ -99,7 +99,7 @@ def agent_brief(
 
 
 def signals_of(scenario: Scenario, robot: sections.Robot) -> tuple[Signal, ...]:
-    """What is recorded of a robot's controller at every tick."""
+    """The recorded signals of a robot's controller, one row per tick."""
     return controller_signals(scenario.control_of(robot).load().SIGNALS)
 
 

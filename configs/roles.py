@@ -1,4 +1,4 @@
-"""The roles of a run, one row each: name, process, brief, rights on the network, whom it follows.
+"""The roles of a run, one row each: name, process, brief, rights on the network, roles it follows.
 
     role          processes                              started by
     plant         one                                    `fleetloop run` or `plant --join`
@@ -42,7 +42,7 @@ class Role:
     module: str = ""
     """Runs it with `python -m`; empty for a role that no run starts."""
     brief: type | None = None
-    """What it is given on standard input."""
+    """The type of its brief, given on standard input."""
     per_robot: bool = False
     forked: bool = False
     """Forked from a process that imported it; others get an interpreter of their own."""

@@ -48,8 +48,8 @@ def run(
         bool,
         typer.Option(
             "--in-process",
-            help="The reference: everything in this process, no network, no bus. Leaves the same"
-            " record, bit for bit.",
+            help="Reference run: all roles in this process, without network and buses. The record"
+            " is the same, bit for bit.",
         ),
     ] = False,
     speed: Annotated[
@@ -63,7 +63,7 @@ def run(
     clock: ClockOption = None,
     duration: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", help="Scenario time to run, instead of the file's."),
+        typer.Option(metavar="SECONDS", help="Scenario time at which the run ends."),
     ] = None,
     seed: SeedOption = None,
     overrides: SetOption = None,
@@ -72,7 +72,7 @@ def run(
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="The run's folder, new or empty. Else runs/<time>-<scenario>.",
+            help="Folder of the run, new or empty. Default: runs/<time>-<scenario>.",
         ),
     ] = None,
     as_json: Annotated[
@@ -81,7 +81,7 @@ def run(
     profile: Annotated[
         bool,
         typer.Option(
-            "--profile", help="Sample where the processor time of a tick goes, and print it."
+            "--profile", help="Sample and print the processor time of each part of a tick."
         ),
     ] = False,
     figures: Annotated[
@@ -91,13 +91,13 @@ def run(
         bool,
         typer.Option(
             "--allow-unchecked",
-            help="Exit with 0 also if expectations were not reached, as with a --duration that ends"
-            " before their time.",
+            help="Exit with status 0 even if the run ended before the time of an expectation, for"
+            " example with --duration.",
         ),
     ] = False,
     force: Annotated[
         bool,
-        typer.Option("--force", help="Run also what `fleetloop check` calls an error."),
+        typer.Option("--force", help="Run despite errors that `fleetloop check` finds."),
     ] = False,
 ) -> None:
     """Run a scenario, record everything, check its expectations, print and save the results."""
@@ -121,16 +121,18 @@ def run(
 @app.command()
 def agent(
     scenario: ScenarioArg,
-    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Its name in the scenario.")],
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="Name of the robot in the scenario.")
+    ],
     deployment: Annotated[
         Path,
-        typer.Option("--deployment", metavar="FILE", help="Its CAN bus, the router, credentials."),
+        typer.Option("--deployment", metavar="FILE", help="CAN bus, router, credentials."),
     ],
     clock: ClockOption = None,
     seed: SeedOption = None,
     overrides: SetOption = None,
 ) -> None:
-    """Run one robot's controller on its own, as on the robot: its CAN bus, a router elsewhere."""
+    """Run the controller of one robot alone, as on the robot: own CAN bus, remote router."""
     from fleetloop.launch.agent import run_agent
 
     refuse_lockstep(clock)
@@ -143,14 +145,14 @@ def plant(
     scenario: ScenarioArg,
     robots: Annotated[
         str | None,
-        typer.Option(metavar="R1,R2", help="Only these robots; else all that are emulated."),
+        typer.Option(metavar="R1,R2", help="Only these robots. Default: all emulated robots."),
     ] = None,
     duration: Annotated[
         float | None,
         typer.Option(
             callback=numbers.between(0.0, numbers.LONGEST_S),
             metavar="SECONDS",
-            help="End after this time; else with Ctrl-C.",
+            help="End after this time. Default: run until Ctrl-C.",
         ),
     ] = None,
     clock: ClockOption = None,
@@ -159,17 +161,19 @@ def plant(
     deployment: DeploymentOption = None,
     as_json: Annotated[
         bool,
-        typer.Option("--json", help="Say on one line, when ready, what to give to can.Bus(**...)."),
+        typer.Option(
+            "--json", help="When ready, print the arguments of can.Bus(**...) on one line."
+        ),
     ] = False,
     stdin: Annotated[
         bool,
         typer.Option(
-            "--stdin", help="Answer requests on standard input (poses), and end when it ends."
+            "--stdin", help="Answer requests for poses on standard input; end when it closes."
         ),
     ] = False,
     join: Annotated[
         bool,
-        typer.Option("--join", help="Be the plant of the deployment's run; its launcher waits."),
+        typer.Option("--join", help="Join the run of the deployment as its plant."),
     ] = False,
 ) -> None:
     """Emulate drives and physics alone, in real time, for your own CAN host code."""
@@ -194,7 +198,7 @@ def check(
         str | None,
         typer.Argument(
             metavar="[SCENARIO]",
-            help="A scenario file or the name of a shipped one; none: list them.",
+            help="A scenario file or the name of a shipped one. Default: list the shipped ones.",
         ),
     ] = None,
     clock: ClockOption = None,
@@ -220,7 +224,7 @@ def check(
 
 @app.command()
 def report(run: RunArg, partial: PartialOption = False) -> None:
-    """Make report.html and the figures of a run again from its record."""
+    """Rebuild report.html and the figures of a run from its record."""
     from fleetloop.results.report import write_report
     from fleetloop.results.run_folder import read_record
     from fleetloop.results.tables import print_report
@@ -232,18 +236,21 @@ def report(run: RunArg, partial: PartialOption = False) -> None:
 def export(
     run: RunArg,
     target: Annotated[
-        Path, typer.Argument(metavar="FILE.csv|FILE.npz", help="What to write; the ending decides.")
+        Path,
+        typer.Argument(
+            metavar="FILE.csv|FILE.npz", help="File to write; its extension selects the format."
+        ),
     ],
     signals: Annotated[
         str | None,
         typer.Option(
             metavar="NAME,NAME",
             help="Only these signals, in this order, after t_s and robot; 'all' for every recorded"
-            " one. Else truth, path variable, errors, torques.",
+            " one. Default: truth, path variable, errors, torques.",
         ),
     ] = None,
     robots: Annotated[
-        str | None, typer.Option(metavar="R1,R2", help="Only these robots; else all.")
+        str | None, typer.Option(metavar="R1,R2", help="Only these robots. Default: all.")
     ] = None,
     from_s: Annotated[
         float | None,
@@ -251,7 +258,7 @@ def export(
             "--from",
             callback=numbers.finite,
             metavar="SECONDS",
-            help="From this scenario time on, in seconds.",
+            help="First scenario time, in seconds.",
         ),
     ] = None,
     to_s: Annotated[
@@ -260,13 +267,13 @@ def export(
             "--to",
             callback=numbers.finite,
             metavar="SECONDS",
-            help="Up to and with this scenario time, in seconds.",
+            help="Last scenario time, included, in seconds.",
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite FILE if it exists.")] = False,
     partial: PartialOption = False,
 ) -> None:
-    """Write one row per tick and robot, each robot up to its own end."""
+    """Export one row per tick and robot, each robot up to its own end."""
     from fleetloop.results.export import Selection
     from fleetloop.results.export import export as export_run
     from fleetloop.terminal import say
@@ -284,7 +291,7 @@ def export(
 @app.command()
 def diff(
     a: Annotated[Path, typer.Argument(metavar="A", help="A run's folder, or its record.mcap.")],
-    b: Annotated[Path, typer.Argument(metavar="B", help="The other one.")],
+    b: Annotated[Path, typer.Argument(metavar="B", help="The other run.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     partial: PartialOption = False,
 ) -> None:
@@ -330,7 +337,7 @@ def _common(
 
 
 def main() -> None:
-    """Run the command line; every error that a user can cause is one line and an exit status."""
+    """Run the command line; an error that a user can cause is one line and an exit status."""
     status: str | int | None = ExitStatus.OK
     try:
         app()

@@ -109,7 +109,7 @@ class _Controllers:
         return ()
 
     def return_credit(self, key: Key, count: int) -> None:
-        """Nobody counts: a controller sends less in a tick than a queue holds."""
+        """Not counted: a controller sends less in a tick than a queue holds."""
 
 
 class InProcessRun:

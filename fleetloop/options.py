@@ -1,4 +1,4 @@
-"""Arguments and options that several verbs share, and what they mean for a scenario."""
+"""Arguments and options that several verbs share, and their overrides of a scenario."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def _shipped(incomplete: str) -> list[str]:
-    """Names of shipped scenarios that begin so, for the shell; files it completes itself."""
+    """Completions: names of shipped scenarios with this prefix; the shell completes file names."""
     from configs.loading import shipped
 
     return [name for name in shipped() if name.startswith(incomplete)]
@@ -30,18 +30,18 @@ ClockOption = Annotated[
     str | None,
     typer.Option(
         metavar="lockstep|realtime",
-        help="Instead of the file's clock.mode: fast and the same bit for bit, or by the wall"
-        " clock.",
+        help="Override clock.mode: lockstep runs fast and repeats bit for bit, realtime keeps the"
+        " wall clock.",
     ),
 ]
-SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Seed, instead of the file's.")]
+SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Override the seed.")]
 RunArg = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its record.mcap.")]
 PartialOption = Annotated[
     bool,
     typer.Option(
         "--partial",
-        help="Take what there is of a record that is cut or damaged, up to there, with exit status"
-        " 0. Else such a record is refused: 1 if it is cut, 2 if it is damaged.",
+        help="Read a cut or damaged record up to its first gap, with exit status 0. Default: refuse"
+        " it, with 1 if it is cut, 2 if it is damaged.",
     ),
 ]
 SetOption = Annotated[
@@ -58,13 +58,13 @@ DeploymentOption = Annotated[
     typer.Option(
         "--deployment",
         metavar="FILE",
-        help="Where everything is: CAN interfaces, router, roles on other machines. Else all here.",
+        help="CAN interfaces, router and roles on other machines. Default: all on this machine.",
     ),
 ]
 
 
 def listed(option: str, text: str | None) -> tuple[str, ...]:
-    """Names with commas between; none if the option wasn't given."""
+    """Split a comma-separated list of names; empty if the option is absent."""
     names = tuple(filter(None, map(str.strip, (text or "").split(","))))
     if text is not None and not names:
         raise ScenarioError(f"{option} {text!r}: names nothing; leave it out for all")
@@ -78,7 +78,7 @@ def overrides_of(
     seed: int | None = None,
     duration: float | None = None,
 ) -> "Overrides":
-    """What options say differently from the file; each is to blame for what it says."""
+    """Overrides from the options; errors in them name the option."""
     from configs.overrides import Override
 
     said = (
@@ -95,7 +95,7 @@ def overrides_of(
 
 
 def refuse_lockstep(clock: str | None) -> None:
-    """For what runs on its own, beside somebody else's clock."""
+    """Refuse lockstep for a role that runs without its launcher."""
     if clock not in (None, "realtime"):
         raise ScenarioError(
             f"--clock {clock}: what runs on its own keeps the wall clock; it must be realtime"

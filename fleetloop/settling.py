@@ -10,7 +10,7 @@ SETTLE_BAND = 0.05
 LOST_M = 0.5
 """A robot or a path variable that ends farther off than this, and started closer, is lost."""
 FINAL_S = 5.0
-"""The end of a run: what is called final is the greatest error of this last part of its rows."""
+"""End of a run [s]: a final error is the greatest in this last part of its rows."""
 
 
 def settled_from(values: np.ndarray, band: float = SETTLE_BAND) -> int:

@@ -1,7 +1,7 @@
 """The standard streams in any state: closed, not in UTF-8, or without a reader.
 
 A run outlives its terminal: what can't be said on standard error is lost, and nothing else. Results
-that can't be written are an error, unless somebody only wanted the first lines (`| head`).
+that can't be written are an error, unless the reader closed the pipe (`| head`).
 """
 
 import codecs
@@ -56,14 +56,14 @@ def register() -> None:
 
 
 def spelled_for(stream: IO[str], text: str) -> str:
-    """The text as the stream will show it, for who lays it out in columns."""
+    """The text as the stream will show it, for layout in columns."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     errors = getattr(stream, "errors", None) or "replace"
     return text.encode(encoding, errors).decode(encoding)
 
 
 def forget_output() -> None:
-    """Nobody reads: what is still buffered must not raise when the interpreter ends."""
+    """Drop the buffer of a closed pipe, so that it raises nothing when the interpreter ends."""
     with contextlib.suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
@@ -71,7 +71,7 @@ def forget_output() -> None:
 
 
 class _Results(io.TextIOWrapper):
-    """Standard output: `BrokenPipeError` when nobody reads, else what failed in a user's words."""
+    """Standard output: `BrokenPipeError` on a closed pipe, else an error that names the cause."""
 
     def write(self, text: str, /) -> int:
         """Write as any stream does."""

@@ -22,7 +22,7 @@ PLAIN_EVERY_S = 5.0
 
 
 def say(text: str) -> None:
-    """Print a result; that nobody reads it any more is no failure."""
+    """Print a result; a closed reader is no failure."""
     try:
         sys.stdout.write(text + "\n")
         sys.stdout.flush()
@@ -37,7 +37,7 @@ def say_json(value: object) -> None:
 
 
 class ResultConsole(Console):
-    """Standard output for tables; that nobody reads it any more is no failure."""
+    """Standard output for tables; a closed reader is no failure."""
 
     def render_str(self, text: str, **options: Any) -> Text:
         """As the stream will show it."""

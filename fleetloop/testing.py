@@ -30,7 +30,7 @@ END_S = 5.0
 
 
 class PlantError(RuntimeError):
-    """The plant did not start, did not answer or has ended; the text is what it said."""
+    """The plant did not start, did not answer or has ended; the text is its output."""
 
 
 class RobotState(NamedTuple):
@@ -108,7 +108,7 @@ class EmulatedPlant:
         return float(self._ask("poses")["t_s"])
 
     def stop(self) -> str:
-        """End the plant; return what it said on standard error. Idempotent."""
+        """End the plant; return its standard error. Idempotent."""
         stdin, stdout, stderr = self._pipes()
         stdin.close()
         try:

@@ -10,7 +10,7 @@
     0 ≤ P ≤ V_0²/(4R)               (2), between V_0/2 and V_0
     P > V_0²/(4R) = P_max           no operating point exists: the bus collapses along the source's
                                     line to V_0/2 · P_max/P, which drives answer with an
-                                    under-voltage trip; `shortage_W` is what they didn't get
+                                    under-voltage trip
     P < 0, the source absorbs       (2), above V_0: a battery
     P < 0, it doesn't               all of it charges the bus capacitor, C V dV/dt = −P, and the
                                     source is cut off until the drives have drawn that energy
@@ -43,7 +43,7 @@ _DEFAULTS = {SupplyFault.UNDER_VOLTAGE: 9.0, SupplyFault.OVER_VOLTAGE: 31.0}
 class Supply:
     """One source and its bus."""
 
-    __slots__ = ("_model", "_open_circuit_V", "bus_V", "left_A", "right_A", "shortage_W")
+    __slots__ = ("_model", "_open_circuit_V", "bus_V", "left_A", "right_A")
 
     def __init__(self, model: powertrain.Supply) -> None:
         self._model = model
@@ -52,8 +52,6 @@ class Supply:
         """Voltage at both drives [V], never negative."""
         self.right_A = self.left_A = 0.0
         """Current that each drive takes from the bus [A]; negative while it feeds it."""
-        self.shortage_W = 0.0
-        """Power that the drives asked for and didn't get; 0 below the limit of the source."""
 
     def step(self, right_W: float, left_W: float, dt_s: float) -> None:
         """Set the electrical power of both motors, held over `dt_s`; finite."""
@@ -62,7 +60,6 @@ class Supply:
         left_W += model.standby_W
         power = right_W + left_W
         source = self._open_circuit_V
-        self.shortage_W = 0.0
         if not model.absorbs and (power < 0.0 or self.bus_V > source):
             bus = self._float(power, dt_s)
         else:
@@ -99,6 +96,4 @@ class Supply:
 
     def _collapse(self, power: float) -> float:
         most = self._open_circuit_V * self._open_circuit_V / (4.0 * self._model.resistance_ohm)
-        fall = most / power
-        self.shortage_W = power - most * fall * (2.0 - fall)
-        return 0.5 * self._open_circuit_V * fall
+        return 0.5 * self._open_circuit_V * (most / power)

@@ -1,4 +1,4 @@
-"""Transmit queues and receive FIFO of a node.
+"""Transmit queues of a node.
 
     queue       of                   next on the bus        when full
     Fifo        a host: SocketCAN's  the oldest             refused: the caller gets ENOBUFS
@@ -21,7 +21,6 @@ from bridge.wire.bits import arbitration_key, frame_bits
 
 HOST_QUEUE = 10
 DRIVE_MAILBOXES = 3
-RECEIVE_DEPTH = 3
 ERROR_KEY = -1
 """Key of an injected error flag: it takes part in no arbitration, it ends one."""
 
@@ -116,32 +115,3 @@ class Endless(Queue):
         """Stop for good; nothing that was submitted is lost."""
         self.entries.clear()
         return 0
-
-
-class ReceiveFifo:
-    """Received frames that firmware has not read: bxCAN's three, `ReceiveFifoLocked` off.
-
-    When full, the newest frame overwrites the one before it and `overruns` counts the loss.
-    """
-
-    __slots__ = ("_depth", "_frames", "overruns")
-
-    def __init__(self, depth: int = RECEIVE_DEPTH) -> None:
-        if depth < 1:
-            raise ValueError(f"a receive FIFO of {depth} frames: it needs 1 or more")
-        self._depth = depth
-        self._frames: list[Frame] = []
-        self.overruns = 0
-
-    def put(self, frame: Frame) -> None:
-        """Take a frame off the bus."""
-        if len(self._frames) == self._depth:
-            self._frames[-1] = frame
-            self.overruns += 1
-        else:
-            self._frames.append(frame)
-
-    def take(self) -> list[Frame]:
-        """Read all, oldest first."""
-        frames, self._frames = self._frames, []
-        return frames

@@ -32,7 +32,7 @@ def open_bus(channel: str, *, batched: bool = False) -> FleetloopBus:
 
     Args:
         channel: bus, run/bus or the path of its socket.
-        batched: for who only listens; spares the bus work.
+        batched: for pure listeners; saves the bus work.
 
     Raises:
         InfrastructureError: no such bus, or it doesn't answer in `CONNECT_S`.
@@ -50,7 +50,7 @@ class Listener:
 
     Args:
         buses: open buses by the name under which their frames are handed out.
-        reader_fd: the descriptor of who reads the result; when its other end closes, `abandoned`.
+        reader_fd: the descriptor of the result's reader; when its other end closes, `abandoned`.
     """
 
     def __init__(self, buses: Mapping[str, FleetloopBus], reader_fd: int | None = None) -> None:
@@ -76,7 +76,7 @@ class Listener:
 
     @property
     def over(self) -> bool:
-        """Whether nothing more can come, or nobody wants it."""
+        """Whether no frame can follow, or its reader has closed."""
         return self.abandoned or not self._names
 
     def listen(self, timeout_s: float | None) -> list[Heard]:

@@ -4,7 +4,7 @@
     log (-L)   (0000000012.345678) r1 009#0000803F00000000
 
 Times are bus time: seconds since the bus was powered up. Ends with the run, after `count` frames or
-a silence, when nobody reads any more, or by a signal (exit status 130).
+a silence, when the reader closes, or by a signal (exit status 130).
 """
 
 import contextlib

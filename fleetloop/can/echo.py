@@ -19,7 +19,7 @@ SHARE = 0.8
 
 
 class EchoGuard:
-    """Remembers what was sent to one bus; told the time, never asks for it."""
+    """Memory of the frames sent to one bus; the time is an argument."""
 
     __slots__ = ("_came", "_echoes", "_familiar", "_order", "_sent", "_window_s", "storm")
 

@@ -153,7 +153,7 @@ class Gateway:
                 if self.guard.storm:
                     self.far_gone = (
                         "what goes out to it comes back: another gateway joins the same two buses,"
-                        " or the interface hands back what is sent (then: --echo yes)"
+                        " or the interface echoes sent frames (then: --echo yes)"
                     )
                     return
         except can.CanError as error:

@@ -23,7 +23,7 @@ _CONNECTED = "03"
 
 @dataclass(frozen=True, slots=True)
 class BusReport:
-    """What is known of one bus; None: unknown."""
+    """Observations of one bus; None: unknown."""
 
     run: str
     bus: str
@@ -60,7 +60,7 @@ def list_buses(*, seconds: float, bit_rate: int, as_json: bool) -> int:
 
 def survey(seconds: float, bit_rate: int) -> list[BusReport]:
     """Listen to all buses at once; one that doesn't answer costs a little more time."""
-    clients = connections(Path("/proc/net/unix"))  # before we are one, or look who answers
+    clients = connections(Path("/proc/net/unix"))  # before this process adds its own
     paths = sockets.live_buses()
     problems: dict[str, str] = {}
     with contextlib.ExitStack() as opened:

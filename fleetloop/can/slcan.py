@@ -1,6 +1,6 @@
 """`fleetloop can slcan`: a bus as a pseudo-terminal that slcan software opens like an adapter.
 
-    bus ──► lines, kept up to `KEPT_BYTES` while nobody reads, then dropped and counted ──► terminal
+    bus ──► lines, kept up to `KEPT_BYTES` without a reader, then dropped and counted ──► terminal
     bus ◄── frames of complete lines                                                    ◄── terminal
 
 Nothing here waits for the software: it may be slow, stop reading or be killed; when the last one
@@ -55,7 +55,7 @@ class Port:
         os.set_blocking(self._master, False)
         self._poll = select.epoll()
         self._poll.register(bus.fileno(), select.EPOLLIN)
-        # Edge-triggered: a device that nobody has open stays in the state "hung up".
+        # Edge-triggered: a device that no program has open stays in the state "hung up".
         self._poll.register(self._master, select.EPOLLIN | select.EPOLLOUT | select.EPOLLET)
 
     def close(self) -> None:
@@ -102,7 +102,7 @@ class Port:
             try:
                 data = os.read(self._master, _READ_BYTES)
             except OSError:
-                # EAGAIN: all read. EIO: nobody has the device open, which comes as an event too.
+                # EAGAIN: all read. EIO: no program has the device open, which is an event too.
                 return
             reply, frames = self._adapter.hear(data)
             self._kept += reply[: max(2 * KEPT_BYTES - len(self._kept), 0)]

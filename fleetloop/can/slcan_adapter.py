@@ -17,7 +17,7 @@ r"""The slcan (LAWICEL) protocol, adapter's end: lines in, replies and frames ou
 
 Everything else, or at another time, is answered with BELL. Received frames are `t` `T` `r` `R`
 lines with, on request, four hex digits of time [ms], modulo 60 000. Status flags: bit 3 data
-overrun (frames were dropped because nobody read), bit 7 bus error (an error frame was on the bus).
+overrun (frames were dropped without a reader), bit 7 bus error (an error frame was on the bus).
 A line ends with CR; line feeds are ignored.
 
 Where adapters differ this one is lenient: C while closed, Z while open, F while closed are all
@@ -100,7 +100,7 @@ class Adapter:
         self._flags |= OVERRUN
 
     def hang_up(self) -> None:
-        """Nobody holds the device any more: closed, as after a C."""
+        """Close the channel, as after a C: no program holds the device any more."""
         self.opened = self._listening = self._stamped = False
         self._flags = 0
         self._line.clear()

@@ -31,7 +31,7 @@ def check_scenario(
 ) -> int:
     """Check a scenario, print the findings; exit status 1 if one of them is an error.
 
-    With `as_json` what is wrong with the file itself is JSON as well; the exit status is then 2.
+    With `as_json`, errors in the file itself are JSON as well; the exit status is then 2.
 
     Raises:
         ScenarioError: the file itself is wrong, or its deployment.
@@ -53,7 +53,7 @@ def check_scenario(
 
 
 def _table(scenario: Scenario, findings: Sequence[Finding]) -> Table:
-    """A row for each; what is well differs in numbers only, so there one robot stands for all."""
+    """A row for each finding; those that are ok share the row of the first robot."""
     graph = scenario.topology
     table = Table(
         title=f"{scenario.name}: robots {len(graph.robots)}, edges {len(graph.edges)}",
@@ -95,7 +95,7 @@ def _find(
 
 
 def _problems(error: ScenarioError) -> list[dict[str, object]]:
-    """What is wrong with a file or an option, for machines."""
+    """Errors in a file or an option, for machines."""
     if error.complaints:
         return [
             {**complaint._asdict(), "value": _json_value(complaint.value)}

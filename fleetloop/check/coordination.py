@@ -8,7 +8,7 @@ these by the graph:
     ρ(v̂)     spectral radius of the speed estimates' map: below 1, v̂ → v_r
     ρ(s, μ)   the same of the path variables', without the eigenvalue 1 of all s together
 
-Delay of what is heard, the own value fresh: with D the in-degrees, a root ±jω of
+Delay of received values, the own value fresh: with D the in-degrees, a root ±jω of
 det(λ² + p λ + q D − q A e^(−λT)) = 0 gives the smallest T at which (45) oscillates.
 """
 

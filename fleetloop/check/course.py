@@ -73,7 +73,7 @@ def path_of(scenario: Scenario, robot: Robot) -> RobotPath:
 
 
 def _named(path: RobotPath, robot: str, own: Sequence[Choice]) -> RobotPath:
-    """A path whose errors name whose code it is."""
+    """A path whose errors name the origin of its code."""
 
     def at(s: float) -> Reference:
         try:

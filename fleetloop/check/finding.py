@@ -21,7 +21,7 @@ class Finding:
 
 
 def likewise(findings: Iterable[Finding]) -> list[Finding]:
-    """One of each kind: of those that differ in their numbers, the first, and who else has it."""
+    """The first of findings that differ in numbers only, with the names of the other robots."""
     kinds: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         kinds.setdefault((finding.level, finding.title), []).append(finding)

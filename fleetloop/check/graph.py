@@ -112,7 +112,7 @@ def _sharing(scenario: Scenario, ahead: Forecast) -> Finding:
     title = f"shared every {period_s:g} s"
     graph, key = scenario.topology, "clock.share_period_s"
     if not graph.edges:
-        return Finding("ok", title, "nobody hears anybody")
+        return Finding("ok", title, "the graph has no edges")
     if period_s <= gains.age_limit_s and _positive(graph, gains.p, gains.q):
         return Finding("ok", title, "p² ≥ 4 q d_max: averages, which converge at any period")
     if len(graph.robots) > LARGE_FLEET:

@@ -53,7 +53,7 @@ class _Notebook:
 
 
 def rehearse(scenario: Scenario) -> list[Finding]:
-    """Run the beginning of a scenario; what came of it."""
+    """Run the beginning of a scenario; return its findings."""
     if scenario.host.dry_run:
         return [Finding("ok", _TITLE, "none: host.dry_run")]
     until_s = _affordable_s(scenario)
@@ -108,7 +108,7 @@ def _part(scenario: Scenario, until_s: float) -> Scenario:
 
 
 def _errors(scenario: Scenario, notebook: _Notebook, said: str, *, whole: bool) -> list[Finding]:
-    """Robots that are off their paths, or apart, at the end of what was rehearsed."""
+    """Robots that are off their paths, or apart, at the end of the rehearsal."""
     rows = {
         robot.name: notebook.rows(robot.name, signals_of(scenario, robot))
         for robot in scenario.robot

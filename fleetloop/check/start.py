@@ -38,9 +38,8 @@ _STEP_S = 0.005
 
 @dataclass(slots=True)
 class _Start:
-    """What was seen of one robot's first second."""
+    """Observations of one robot's first second."""
 
-    first_wheel_N_m: float = 0.0
     asked_wheel_N_m: float = 0.0
     asked_at_s: float = 0.0
     ratio: float = 0.0  # h Σ k_5 F² / k_4
@@ -87,8 +86,6 @@ def _start(scenario: Scenario, robot: Robot, ahead: Forecast, number: int, ticks
             seen.diverged_at_s, seen.failed = tick * h, f"{how}: {why}"
             return seen
         asked = max(abs(out.tau_right), abs(out.tau_left))
-        if tick == 0:
-            seen.first_wheel_N_m = asked
         if asked > seen.asked_wheel_N_m:
             seen.asked_wheel_N_m, seen.asked_at_s = asked, tick * h
         if isinstance(gains, AdaptiveDsc.Gains):

@@ -7,7 +7,7 @@ from fleetloop.launch.outcome import Outcome
 from fleetloop.results.summary import RunStats
 
 MOST_NOTICES = 200
-"""Of one process; what else it says is in nobody's interest."""
+"""Notices kept of one process; further ones are dropped."""
 
 
 def stats_of(outcome: Outcome, *, realtime: bool, period_s: float) -> RunStats:
@@ -63,7 +63,7 @@ def _add_report(stats: RunStats, process: str, report: Report) -> None:
 
 
 def _blame_stalls(outcome: Outcome, stats: RunStats, plant: PlantReport, period_s: float) -> None:
-    """Who stopped soon after the plant stood still stopped because of that."""
+    """Name a stall of the plant as the cause of stops soon after it."""
     stats.machine["plant_stalls"] = [
         {"t_s": round(stall.tick * period_s, 6), "lasted_s": round(stall.lasted_s, 3)}
         for stall in plant.stalls

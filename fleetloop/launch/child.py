@@ -166,7 +166,7 @@ class Failure:
 
 
 def cause(children: Iterable[Child]) -> Failure | None:
-    """The failure that explains the others, None if nobody failed."""
+    """The failure that explains the others, None if none failed."""
     failures = [failure for child in children if (failure := child.failure()) is not None]
     return min(failures, key=lambda failure: failure.rank, default=None)
 
@@ -182,7 +182,7 @@ def await_end(children: Iterable[Child], within_s: float) -> list[Child]:
 
 
 def end(children: Sequence[Child], *, grace_s: float = TERM_GRACE_S) -> None:
-    """End all: ask, wait a bounded time, kill; nobody is left."""
+    """End all: ask, wait a bounded time, kill; none is left."""
     for child in children:
         child.ask_to_stop()
     for child in await_end(children, grace_s):

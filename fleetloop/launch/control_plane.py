@@ -48,7 +48,7 @@ class ControlPlane:
         self.remote = remote
         self.children: list[Child] = []
         self.alive: set[str] = set()
-        """Processes whose liveliness token is there."""
+        """Processes with a liveliness token."""
         self.ticking = False
         """Whether the plant has begun to tick."""
         self.now = now

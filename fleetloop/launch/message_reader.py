@@ -46,7 +46,7 @@ class MessageReader:
     def note_dropped(self, dropped: Iterable[Dropped]) -> None:
         """Count what found no room."""
         for tag, key, count in dropped:
-            why = "more than anybody could read"
+            why = "more than can be read"
             self.refusals.note(f"{tag} message", keys.process_of(key), "flood", why, count)
 
     def _wrong(self, progress: Progress) -> str | None:

@@ -32,7 +32,7 @@ def agent_bus(
     Args:
         deployment: where the robot's bus is.
         robot: whose controller.
-        secret: by which its bus knows whom to wait for; "" in real time, where it waits for nobody.
+        secret: by which its bus knows the client to wait for; "" in real time, without waiting.
         socket: where its bus of ours is.
     """
     settings = deployment.bus_of(robot)
@@ -52,7 +52,7 @@ def run_name(scenario: Scenario, deployment: Deployment) -> str | None:
 
 
 def check_credentials(scenario: Scenario, deployment: Deployment) -> None:
-    """Refuse a run whose router could not know who comes, before anything is started.
+    """Refuse a run whose router could not authenticate its clients, before any start.
 
     Raises:
         ScenarioError: a password or a file of TLS is missing or wrong; the text names key and file.
@@ -80,12 +80,12 @@ def outside(deployment: Deployment) -> Outside | None:
 
 
 def bus_guests(deployment: Deployment) -> Mapping[str, tuple[str, ...]]:
-    """Who may open which buses from other machines."""
+    """Access to buses from other machines, by identity."""
     return {} if deployment.network is None else deployment.network.guests
 
 
 def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
-    """Passwords of those who come from elsewhere, by identity.
+    """Passwords of remote clients, by identity.
 
     Raises:
         ScenarioError: the deployment's credentials lack one of them.
@@ -105,10 +105,10 @@ def _as_option(password: str) -> str:
 
 
 def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.AccessPlan:
-    """Who may say and hear what, and everybody's credentials.
+    """Rights and credentials of all clients of the router.
 
     Raises:
-        ScenarioError: the deployment's credentials lack somebody.
+        ScenarioError: the deployment's credentials lack an identity.
     """
     graph, network, clock = scenario.topology, deployment.network, scenario.clock
     realtime = clock.mode == "realtime"

@@ -78,7 +78,7 @@ class _Watch:
         self._told: set[str] = set()
 
     def look(self, _: Progress | None = None) -> None:
-        """Say what is new."""
+        """Print new events."""
         for robot, why in diverged_robots(self._robots, self._period_ns).items():
             if robot not in self._told:
                 self._told.add(robot)
@@ -120,7 +120,7 @@ def run_plant(source: str, options: PlantOptions) -> int:
 
 
 def _join(scenario: Scenario, deployment: Deployment) -> int:
-    """Be the plant of a run whose launcher is elsewhere."""
+    """Run as the plant of a launcher on another machine."""
     keep_to_itself()
     network = placement.network_link(scenario, deployment, PLANT.name)
     brief = placement.robots_of_plant(plant_brief(scenario, network=network), deployment)

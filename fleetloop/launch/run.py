@@ -241,7 +241,7 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: RunOptio
 
 
 def exit_status(summary: Summary, *, allow_unchecked: bool) -> int:
-    """The exit status of a run; what nobody expected can't be missed."""
+    """The exit status of a run; without expectations none can fail."""
     unchecked = summary["verdict"] == "not checked" and not summary["cut_short"]
     if unchecked and (allow_unchecked or not summary["expectations"]):
         return ExitStatus.OK

@@ -28,7 +28,7 @@ Links = Mapping[str, NetworkLink]
 
 @dataclass(frozen=True, slots=True)
 class Orders:
-    """What is to be run, and how."""
+    """The work of a run, and its settings."""
 
     scenario: Scenario
     deployment: Deployment

@@ -71,7 +71,7 @@ class Supervision:
             # In real time the newest message is as good as those that were lost.
             needed = not self._schedule.realtime or child.name == RECORDER.name
             if deaf and needed and child.name not in plane.alive and not child.ended():
-                text = f"{child.name}: did not read what was sent to it, and was cut off"
+                text = f"{child.name}: did not read its messages, and was cut off"
                 return Failure(GAVE_UP, child.name, text)
         return None
 

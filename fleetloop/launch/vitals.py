@@ -2,7 +2,7 @@
 
 beats     in real time every process says how far it is, several times a second
 frozen    silent for `FROZEN_S`: said once, at once, whatever the run's deadlines make of it
-back      the next beat of who was frozen
+back      the next beat of a frozen process
 """
 
 from dataclasses import dataclass
@@ -53,7 +53,7 @@ class Vitals:
         return None if vital is None else Silence(process, vital.tick, now_s - vital.at_s)
 
     def newly_frozen(self, now_s: float) -> list[Silence]:
-        """Those who have been silent for too long, each once."""
+        """Processes that have been silent for too long, each once."""
         found = []
         for process, vital in self._vitals.items():
             if not (vital.frozen or vital.ended) and now_s - vital.at_s > FROZEN_S:

@@ -19,7 +19,7 @@ def warning(scenario: Scenario, *, speed: float, in_process: bool) -> str | None
     at = f" at {speed:g} × real time" if speed else ""
     return (
         f"{scenario.name}: {scenario.ends_at_s:g} s of scenario time will take about"
-        f" {days:.3g} days{at}; Ctrl-C ends it and keeps what is recorded until then"
+        f" {days:.3g} days{at}; Ctrl-C ends it and keeps the record until then"
     )
 
 

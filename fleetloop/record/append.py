@@ -79,7 +79,7 @@ class AppendedFile:
         os.pwrite(self._fd, head, 0)
 
     def in_place(self) -> bool:
-        """Whether its path still leads to it: nobody removed or moved it, or its folder."""
+        """Whether its path still leads to it: neither it nor its folder was removed or moved."""
         try:
             return os.path.samestat(self._path.stat(), os.fstat(self._fd))
         except FileNotFoundError:

@@ -1,6 +1,6 @@
 """A record written by a thread of its own: compression and disk take no time from a tick.
 
-Blocks wait in a bounded queue; who is faster than the disk waits with them. What fails in the
+Blocks wait in a bounded queue; a source faster than the disk waits with them. What fails in the
 background is raised by the next `add`, or by `close`.
 """
 

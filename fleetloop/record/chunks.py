@@ -28,7 +28,7 @@ _ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 
 
 class DamageError(Exception):
-    """Bytes that aren't what was written; the text says what is wrong with them."""
+    """Bytes that differ from the written ones; the text names the difference."""
 
 
 class Packed(NamedTuple):
@@ -71,7 +71,7 @@ class ChunkWriter:
 
 
 class ChunkReader:
-    """Unpacks chunks of a file in their order, and refuses any that isn't what was written."""
+    """Unpacks chunks of a file in their order, and refuses those that differ from the written."""
 
     def __init__(self, layout: Layout) -> None:
         self._layout = layout

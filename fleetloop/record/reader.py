@@ -47,7 +47,7 @@ class Record:
 
         found = scan(path, take)
         if found.damaged and not damaged:
-            raise RecordError(f"{path}: {found.lost}; --partial takes what is before it")
+            raise RecordError(f"{path}: {found.lost}; --partial reads the part before it")
         layout = found.head.layout
 
         def rows(kind: Kind) -> dict[str, np.ndarray]:

@@ -32,7 +32,7 @@ PROGRESS_EVERY_S = 0.25
 AHEAD_TICKS = 1 << 17
 """How far a source's rows may be ahead of the slowest's; they wait in memory."""
 GAPS = 8
-"""Blocks in a row that leave a gap: what is missing doesn't come any more."""
+"""Consecutive blocks after a gap from which on the missing rows count as lost."""
 ROOM_BYTES = 1 << 26
 """Of what waits of one source: a slow disk may take its time."""
 _WHOSE = {"plant": "the plant for {}", "controller": "{}'s controller", "can": "bus {}"}
@@ -53,7 +53,6 @@ class _Recorder:
         self._row_sizes |= {f"can/{bus}": FRAME_ROW.size for bus in brief.buses}
         self.unheard = set(sources)
         self.unfinished = set(sources)
-        self.undecodable = 0
         self.ticks = 0
 
     def take(self, arrival: Arrival) -> bool:
@@ -62,7 +61,6 @@ class _Recorder:
         rows = Rows.decode(arrival.payload, self._row_sizes[arrival.tag])
         wrong = "not well formed" if rows is None else self._wrong(kind, robot, rows)
         if rows is None or wrong is not None:
-            self.undecodable += rows is None
             self._refuse(arrival.tag, wrong or "")
             if rows is not None:
                 self._give_up_if_gone(arrival.tag, rows)
@@ -80,7 +78,7 @@ class _Recorder:
     def _give_up_if_gone(self, tag: str, rows: Rows) -> None:
         """A source with a gap has no row any more that could follow; others don't wait for it.
 
-        One block that is ahead may be somebody else's: the source itself goes on where it was.
+        One block that is ahead may be from another sender: the source itself goes on where it was.
         """
         kind, _, robot = tag.partition("/")
         if kind != "can":

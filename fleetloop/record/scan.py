@@ -73,12 +73,12 @@ class _Found(NamedTuple):
 
 
 def end_record(lost: str) -> records.Metadata:
-    """What stands after the last chunk: what is missing."""
+    """The end after the last chunk; it names lost parts."""
     return records.Metadata(_END, {_LOST: lost})
 
 
 def scan(path: Path, take: Take = lambda _channel, _messages: None) -> Scan:
-    """What is in a record file; `take` gets channel and messages of every chunk before a damage.
+    """Scan a record file; `take` gets channel and messages of every chunk before a damage.
 
     Raises:
         RecordError: it is no record, its head isn't whole, or it can't be read.

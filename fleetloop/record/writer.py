@@ -3,7 +3,7 @@
 Blocks of one source (a robot's plant or controller rows) come in order; those of different sources
 as they like. A group of `CHUNK_TICKS` ticks is written once every source has delivered it or said
 that nothing follows, in the order of the robots; the rest at the end. So the file depends on the
-run alone, and a source that ends early holds nobody's rows back.
+run alone, and a source that ends early holds no other source's rows back.
 """
 
 import contextlib
@@ -55,7 +55,7 @@ class RecordWriter:
     Args:
         path: of the file.
         robots: in their order, each with the table of its controller's rows.
-        scenario_toml: the scenario, for those who read the record.
+        scenario_toml: the scenario, for readers of the record.
         period_ns: of the rows.
     """
 

@@ -36,7 +36,7 @@ def spread(controllers: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def judge(expect: Expect, record: Record, scenario: Scenario) -> Judged:
-    """Hold an expectation against what was recorded."""
+    """Compare an expectation with the record."""
     end_s = scenario.ends_at_s if expect.to_s is None else expect.to_s
     series = _series(expect, record)
     parts = [v[(t >= expect.from_s) & (t <= end_s)] for t, v in series]

@@ -42,7 +42,7 @@ _STYLE: Any = {
 
 @dataclass(frozen=True, slots=True)
 class Captioned:
-    """A figure, its file name without ending, and what it shows."""
+    """A figure, its file name without extension, and its caption."""
 
     name: str
     caption: str
@@ -63,7 +63,7 @@ def all_figures(record: Record, scenario: Scenario) -> list[Captioned]:
 
 
 def graph(_: Record, scenario: Scenario) -> Figure:
-    """Who hears whom: arrows along the flow of information, layers by distance from the leader."""
+    """The directed graph: arrows along the flow of information, layers by leader distance."""
     topology = scenario.topology
     digraph = nx.DiGraph(list(topology.edges))
     digraph.add_nodes_from(topology.robots)
@@ -93,7 +93,7 @@ def graph(_: Record, scenario: Scenario) -> Figure:
             node_size=900,
             connectionstyle="arc3,rad=0.15" if dash == "solid" else "arc3",
         )
-    axes.set_title(f"Directed graph of {scenario.name}: arrows from who speaks to who hears")
+    axes.set_title(f"Directed graph of {scenario.name}: arrows from sender to receiver")
     heights = [float(place[1]) for place in places.values()]
     room = 0.3 * max(max(heights) - min(heights), 0.5)  # for nodes and bent arrows
     axes.set_ylim(min(heights) - room, max(heights) + room)

@@ -107,7 +107,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
 
 
 def to_json(summary: Summary) -> str:
-    """summary.json's text; what is no finite number, as after a law that diverged, is null."""
+    """summary.json's text; a number that isn't finite, as after a law that diverged, is null."""
     return json.dumps(_finite(summary), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 

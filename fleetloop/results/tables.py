@@ -105,7 +105,7 @@ def robot_rows(summary: Summary) -> Iterator[list[str]]:
 
 
 def final_line(summary: Summary) -> str:
-    """What is called final."""
+    """The window of final errors, in words."""
     return f"final: the greatest of a robot's last {min(FINAL_S, summary['simulated_s']):g} s"
 
 
@@ -148,7 +148,7 @@ def trouble_lines(summary: Summary) -> Iterator[str]:
 
 
 def machine_lines(summary: Summary) -> Iterator[str]:
-    """How often launcher and plant stood still; nothing if they didn't, or nobody watched."""
+    """Stalls of launcher and plant; empty without any, or without a watch."""
     machine = {"stalls": 0, **(summary["machine"] or {})}
     if machine["stalls"]:
         stops = machine["stopped_and_continued"]
@@ -194,7 +194,7 @@ def mark(expect: dict[str, Any]) -> str:
 
 
 def claim(expect: dict[str, Any]) -> str:
-    """An expectation and what was found, in one line."""
+    """An expectation and its result, in one line."""
     bounds = [f"{k} {expect[k]:g}" for k in ("max_abs", "min", "max") if k in expect]
     until = f" to {expect['to_s']:g} s" if "to_s" in expect else ""
     found = expect["found"]

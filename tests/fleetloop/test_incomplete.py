@@ -65,7 +65,7 @@ def test_a_cut_record_is_exported_only_if_asked_for(
 def test_a_damaged_record_is_exported_up_to_its_damage_if_asked_for(
     damaged_run: Path, tmp_path: Path
 ) -> None:
-    with pytest.raises(RecordError, match=r"damaged at byte \d+: .*; --partial takes") as refused:
+    with pytest.raises(RecordError, match=r"damaged at byte \d+: .*; --partial reads") as refused:
         export(damaged_run, tmp_path / "a.csv")
     assert refused.value.exit_status == 2
     assert 0 < export(damaged_run, tmp_path / "a.csv", partial=True) < 4000

@@ -10,7 +10,7 @@ from bridge.wire.bits import frame_bits
 from bridge.wire.confinement import NodeState
 from bridge.wire.faults import Fault, FaultKind
 from bridge.wire.node import Delivered, ErrorFrame, ErrorKind, Event, Node, StateChanged
-from bridge.wire.queues import Endless, Fifo, Mailboxes, ReceiveFifo
+from bridge.wire.queues import Endless, Fifo, Mailboxes
 from bridge.wire.wire import Wire
 
 US = 1000
@@ -111,26 +111,6 @@ def test_a_node_that_babbles_identifier_0_fills_the_bus_and_starves_all_commands
     wire.detach(babbler)
     assert [event.frame.can_id for event in delivered(wire.advance(110 * MS))][1:] == [0x00E] * 10
     assert wire.queued(drive) == 0
-
-
-# --- 38: receive overrun --------------------------------------------------------------------------
-
-
-def test_a_burst_overruns_a_reader_that_looks_every_millisecond_and_nobody_else_notices() -> None:
-    wire = Wire(1_000_000)
-    host, drive = wire.attach("host", queue=Fifo(100)), wire.attach("drive")
-    inbox = ReceiveFifo(3)
-    for n in range(50):
-        wire.submit(host, Frame(0x00E, bytes([n])), 0)
-    read = []
-    for k in range(1, 11):
-        for event in delivered(wire.advance(k * MS)):
-            if drive in event.heard_by:
-                inbox.put(event.frame)
-        read += inbox.take()
-    assert host.counters.sent == 50
-    assert len(read) + inbox.overruns == 50
-    assert inbox.overruns > 20
 
 
 # --- 39: error frames, error passive --------------------------------------------------------------

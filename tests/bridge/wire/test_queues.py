@@ -4,7 +4,7 @@ import pytest
 
 from bridge.frame import Frame
 from bridge.wire.bits import arbitration_key, frame_bits
-from bridge.wire.queues import Entry, Fifo, Mailboxes, Queue, ReceiveFifo
+from bridge.wire.queues import Entry, Fifo, Mailboxes, Queue
 
 
 def filled(queue: Queue, *can_ids: int) -> list[bool]:
@@ -39,16 +39,7 @@ def test_a_newer_frame_never_replaces_a_pending_one() -> None:
     assert [entry.frame.data[0] for entry in queue.entries] == [0, 1, 2]
 
 
-def test_frames_that_nobody_reads_are_overwritten_from_the_third_on_and_counted() -> None:
-    fifo = ReceiveFifo(3)
-    for n in range(10):
-        fifo.put(Frame(n, b""))
-    assert [frame.can_id for frame in fifo.take()] == [0, 1, 9]
-    assert fifo.overruns == 7
-    assert fifo.take() == []
-
-
-@pytest.mark.parametrize("kind", [Fifo, Mailboxes, ReceiveFifo])
+@pytest.mark.parametrize("kind", [Fifo, Mailboxes])
 def test_a_queue_without_room_for_one_frame_is_refused(kind: type) -> None:
     with pytest.raises(ValueError, match="1 or more"):
         kind(0)

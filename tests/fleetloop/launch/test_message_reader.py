@@ -173,5 +173,5 @@ def test_what_found_no_room_is_counted_by_its_sender() -> None:
     words = MessageReader(SCHEDULE)
     words.note_dropped([Dropped("progress", "fleetloop/run/@progress/agent/r1", 40_000)])
     assert words.refusals.lines() == [
-        "refused 40000 progress messages of agent/r1: more than anybody could read"
+        "refused 40000 progress messages of agent/r1: more than can be read"
     ]

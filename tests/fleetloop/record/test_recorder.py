@@ -99,5 +99,7 @@ def test_what_is_no_rows_is_counted(tmp_path: Path) -> None:
     short = Rows(0, 2, bytes(8), final=False).encode()
     junk = (Arrival("plant/r1", "", b"x"), Arrival("plant/r1", "", short))
     recorder, found = record(tmp_path / "a.mcap", *junk, *whole(*SOURCES))
-    assert recorder.undecodable == 2
+    assert recorder.refusals.lines() == [
+        "refused 2 row blocks of the plant for r1: not well formed"
+    ]
     assert len(found.plant["r1"]) == 300
