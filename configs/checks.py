@@ -4,38 +4,25 @@ import difflib
 import itertools
 from collections.abc import Iterator, Sequence
 from math import ceil, floor, inf
-from typing import NamedTuple
 
 from pydantic import ValidationError
 
-from configs.drives import options_of
-from configs.errors import ScenarioError
+from configs.drive_checks import drive_problems
+from configs.errors import Problem
 from configs.graph import parse_edge
 from configs.paths import Spline, Varying
 from configs.plugins import Recorded
 from configs.scenario import ETSRO, Scenario
 from configs.sections import (
-    Drive,
     Expect,
 )
 from configs.signals import PLANT_SIGNALS, SPREAD, controller_signals
 from configs.wording import MISSING, remedy_of
 
-MAX_NODE = 62
-"""63 is the address of drives that have none."""
-
-
-class Problem(NamedTuple):
-    """One thing wrong with a scenario."""
-
-    key: str  # as in the file, robots by name
-    value: object
-    remedy: str  # the values that are allowed, or what to change
-
 
 def cross_problems(scenario: Scenario) -> list[Problem]:
     """All problems that no section can see alone."""
-    problems = [*_names(scenario), *_laws(scenario), *_periods(scenario), *_drives(scenario)]
+    problems = [*_names(scenario), *_laws(scenario), *_periods(scenario), *drive_problems(scenario)]
     problems += [*_host(scenario), *_expects(scenario)]
     edges = list(_edges(scenario))
     if not problems and not edges:
@@ -153,96 +140,6 @@ def _periods(scenario: Scenario) -> Iterator[Problem]:
             f"too short to arm the drives: three control periods and two heartbeats need"
             f" {shortest:g} s or more",
         )
-
-
-_WHOLE_MILLISECONDS = (
-    "heartbeat_period_s",
-    "encoder_period_s",
-    "torques_period_s",
-    "error_period_s",
-    "iq_period_s",
-    "temperature_period_s",
-    "bus_voltage_period_s",
-    "powers_period_s",
-)
-
-
-def _drives(scenario: Scenario) -> Iterator[Problem]:
-    drive = scenario.drive
-    yield from _protocol(drive)
-    if drive.right_node == drive.left_node:
-        yield Problem("drive.left_node", drive.left_node, "must differ from drive.right_node")
-    else:
-        yield from _nodes(scenario)
-    least_s, most_s = drive.command_latency_s
-    if least_s > most_s:
-        yield Problem("drive.command_latency_s", [least_s, most_s], "least before most")
-    for key in _WHOLE_MILLISECONDS:
-        period_s = getattr(drive, key) or 0.0
-        if abs(period_s * 1e3 - round(period_s * 1e3)) > 1e-6:
-            yield Problem(f"drive.{key}", period_s, "whole milliseconds, as drives have them")
-    yield from _encoder_period(scenario)
-    if drive.under_voltage_V >= drive.over_voltage_V:
-        above = f"must be below drive.over_voltage_V = {drive.over_voltage_V:g}"
-        yield Problem("drive.under_voltage_V", drive.under_voltage_V, above)
-    if drive.derate_from_C >= drive.derate_to_C:
-        above = f"must be below drive.derate_to_C = {drive.derate_to_C:g}"
-        yield Problem("drive.derate_from_C", drive.derate_from_C, above)
-    if drive.watchdog_s and drive.watchdog_s < 2 * scenario.clock.control_period_s:
-        yield Problem(
-            "drive.watchdog_s",
-            drive.watchdog_s,
-            "0 (off) or at least two control periods, or every torque comes too late",
-        )
-    encoder = scenario.encoder
-    if 2.0 * encoder.pll_bandwidth_rad_s >= encoder.pll_rate_Hz:
-        yield Problem(
-            "encoder.pll_bandwidth_rad_s",
-            encoder.pll_bandwidth_rad_s,
-            f"must be below half of encoder.pll_rate_Hz = {encoder.pll_rate_Hz:g}, as drives want"
-            " it: twice the bandwidth times the loop period is a gain below 1",
-        )
-
-
-def _protocol(drive: Drive) -> Iterator[Problem]:
-    """The protocol exists, and its own keys are right."""
-    try:
-        options_of(drive)
-    except ValidationError as error:
-        for item in error.errors(include_url=False):
-            key = ".".join(map(str, ("drive", "options", *item["loc"])))
-            unknown = item["type"] == "unexpected_keyword_argument"
-            yield Problem(key, item["input"], "unknown key" if unknown else item["msg"])
-    except ScenarioError as error:
-        yield Problem("drive.protocol", drive.protocol, str(error))
-
-
-def _encoder_period(scenario: Scenario) -> Iterator[Problem]:
-    period_s, control_s = scenario.drive.encoder_period_s, scenario.clock.control_period_s
-    if period_s is None:
-        return
-    ratio = control_s / period_s
-    if ratio < 1.0 - 1e-6:
-        remedy = f"at most clock.control_period_s = {control_s:g}: a tick needs news of both wheels"
-        yield Problem("drive.encoder_period_s", period_s, remedy)
-    elif scenario.clock.mode == "lockstep" and abs(ratio - round(ratio)) > 1e-6:
-        remedy = f"must divide clock.control_period_s = {control_s:g}, the tick of lockstep"
-        yield Problem("drive.encoder_period_s", period_s, remedy)
-
-
-def _nodes(scenario: Scenario) -> Iterator[Problem]:
-    taken: dict[tuple[str, int], str] = {}
-    for name in scenario.names:
-        bus = scenario.bus_of(name)
-        for side, node in zip(("right", "left"), scenario.nodes_of(name), strict=True):
-            key = f"robot.{name}.{side}_node"
-            if node > MAX_NODE:
-                remedy = f"bus {bus} has no node left for it: 0 to {MAX_NODE}"
-                yield Problem(key, node, remedy)
-            elif (owner := taken.setdefault((bus, node), f"{name}'s {side} drive")) and (
-                owner != f"{name}'s {side} drive"
-            ):
-                yield Problem(key, node, f"on bus {bus} it is {owner} already; choose another")
 
 
 def _host(scenario: Scenario) -> Iterator[Problem]:

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 
-from configs.checks import Problem
-from configs.errors import Complaint, ScenarioError
+from configs.errors import Complaint, Problem, ScenarioError
 from configs.parameters import as_tuples
 from configs.scenario import Scenario
 from configs.wording import MISSING, remedy_of

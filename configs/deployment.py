@@ -18,9 +18,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from configs import patterns
 from configs.brief import OURS, Settings
-from configs.checks import Problem
 from configs.complaints import complaints, refusal
-from configs.errors import Complaint, ScenarioError
+from configs.errors import Complaint, Problem, ScenarioError
 from configs.files import expanded
 from configs.parameters import FilePath, Name, Parameters, Pattern, as_tuples, parameter
 from configs.roles import AGENT, ROLES, STARTED, identity_of, processes_of

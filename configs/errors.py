@@ -31,6 +31,14 @@ class Complaint(NamedTuple):
     remedy: str  # the values that are allowed, or what to change
 
 
+class Problem(NamedTuple):
+    """One thing wrong with a scenario."""
+
+    key: str  # as in the file, robots by name
+    value: object
+    remedy: str  # the values that are allowed, or what to change
+
+
 class FleetloopError(Exception):
     """An error that a user can cause or mend; its text is the whole message."""
 

@@ -14,9 +14,9 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
-from configs.checks import Problem, cross_problems
+from configs.checks import cross_problems
 from configs.complaints import complaints, refusal, salvage
-from configs.errors import Complaint, ScenarioError
+from configs.errors import Complaint, Problem, ScenarioError
 from configs.overrides import Override
 from configs.parameters import as_tuples
 from configs.scenario import Scenario

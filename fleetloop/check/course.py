@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from agents.laws.build import failure
 from agents.laws.interface import Reference, RobotPath
 from agents.paths import robot_path
-from configs.checks import Problem
 from configs.complaints import refusal
 from configs.curves import formation_offset, reference_path
-from configs.errors import ScenarioError
+from configs.errors import Problem, ScenarioError
 from configs.loading import blamed
 from configs.overrides import Overrides
 from configs.paths import AT_CENTRE, Spline
