@@ -101,7 +101,7 @@ class Schedule:
 
 @dataclass(frozen=True, slots=True)
 class DriveLink:
-    """How a controller reaches the two drives of its robot."""
+    """Connection of a controller to the two drives of its robot."""
 
     protocol: str  # as `configs.drives.load` takes it
     right_node: int

@@ -49,7 +49,7 @@ def complaints(
 
 
 def in_words(error: ValidationError) -> str:
-    """What pydantic has against one value, in our words."""
+    """One error of pydantic in the words of this project."""
     return remedy_of(error.errors(include_url=False)[0])
 
 

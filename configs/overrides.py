@@ -19,7 +19,7 @@ class Override(NamedTuple):
 
     @classmethod
     def from_set(cls, text: str) -> "Override | Complaint":
-        """What `--set KEY=VALUE` says; a value that isn't TOML is a text."""
+        """Override from `--set KEY=VALUE`; a value that isn't TOML is a text."""
         option = f"--set {text}"
         key, equals, value = text.partition("=")
         parts = [part.strip() for part in key.split(".")]

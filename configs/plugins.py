@@ -36,7 +36,7 @@ LAWS = {
 
 
 class Kind(Enum):
-    """What a plugin is; the value is its word in messages and its entry point group."""
+    """Kind of a plug-in; the value is its word in messages and its entry point group."""
 
     LAW = "law", "fleetloop.laws"
     PATH = "path shape", "fleetloop.paths"
@@ -92,7 +92,7 @@ def find(kind: Kind, name: str, folder: str, shipped: Mapping[str, str]) -> Plug
 
 
 def entry_points(kind: Kind) -> dict[str, str]:
-    """What installed packages offer: class by name."""
+    """Plug-ins of installed packages: class by name."""
     from importlib import metadata
 
     return {point.name: point.value for point in metadata.entry_points(group=kind.group)}

@@ -104,7 +104,7 @@ def signals_of(scenario: Scenario, robot: sections.Robot) -> tuple[Signal, ...]:
 
 
 def reach(scenario: Scenario) -> Reach:
-    """How far the path variables and speed estimates of a run can come."""
+    """Bounds of the path variables and speed estimates of a run."""
     coordination, leader = scenario.coordination, scenario.leader
     return reach_of(
         [robot.s_0 for robot in scenario.robot],
@@ -193,7 +193,7 @@ def robot_briefs(scenario: Scenario) -> tuple[RobotBrief, ...]:
 
 
 def wire_model(scenario: Scenario) -> WireModel | None:
-    """How the buses are emulated; None: frames take no time."""
+    """Model of the emulated buses; None: frames take no time."""
     bus = scenario.bus
     if bus.timing == "ideal":
         return None

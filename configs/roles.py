@@ -102,7 +102,7 @@ def identity_of(process: str) -> str:
 
 
 def short_name(process: str) -> str:
-    """How people call a process: a controller by its robot, others by their role."""
+    """Display name of a process: the robot of a controller, the role of others."""
     return process.removeprefix(f"{AGENT.name}/")
 
 

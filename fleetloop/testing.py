@@ -59,7 +59,7 @@ class EmulatedPlant:
     """
 
     buses: dict[str, dict[str, Any]]
-    """What to give to `can.Bus(**...)`, by robot."""
+    """Arguments of `can.Bus(**...)`, by robot."""
 
     def __init__(
         self,

@@ -80,7 +80,7 @@ class Listener:
         return self.abandoned or not self._names
 
     def listen(self, timeout_s: float | None) -> list[Heard]:
-        """What has come; waits for it at most `timeout_s` (None: until a bus ends)."""
+        """Received frames; waits at most `timeout_s` (None: until a bus ends)."""
         wait_ms = 0.0 if self._unread else None if timeout_s is None else max(timeout_s, 0.0) * 1e3
         ready = {fd for fd, _ in self._poll.poll(wait_ms)}
         if self._reader_fd in ready:

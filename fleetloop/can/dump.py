@@ -34,7 +34,7 @@ STAMPS = "adzA"
 
 @dataclass(frozen=True, slots=True)
 class DumpOptions:
-    """What to print of a frame, and when to end."""
+    """Format of printed frames, and conditions to end."""
 
     stamps: str = ""  # of STAMPS, or empty
     nanoseconds: bool = False
@@ -101,7 +101,7 @@ class Printer:
         self._indent = False
 
     def lines(self, heard: Heard) -> str:
-        """What a frame prints, newlines included."""
+        """The text of a frame, newlines included."""
         bus, frame, stamp_ns = heard
         stamp = self._stamps.text(stamp_ns)
         if self._options.log_format:

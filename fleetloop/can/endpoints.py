@@ -21,7 +21,7 @@ from fleetloop.can.client import open_bus
 from fleetloop.terminal import note, say
 
 HEARD_S = 5.0
-"""How long a drive may take to be heard, and to answer."""
+"""Longest wait for a drive's first frame, and for its answer."""
 
 
 def write_endpoints(bus: str | None, firmware: str | None, out: Path | None) -> int:

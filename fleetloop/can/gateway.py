@@ -37,7 +37,7 @@ FAILURES = 10
 
 @dataclass(slots=True)
 class GatewayCounters:
-    """What went one way, and what didn't."""
+    """Frames forwarded and dropped in one direction."""
 
     passed: int = 0
     lost: int = 0

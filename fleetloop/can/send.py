@@ -16,7 +16,7 @@ from fleetloop.can.client import open_bus
 from fleetloop.signals import interruptible
 
 FULL_S = 2.0
-"""How long a full bus may take to have room again."""
+"""Longest wait for room on a full bus."""
 
 
 @interruptible

@@ -32,7 +32,7 @@ _AT_ONCE = 256
 
 @dataclass(slots=True)
 class SlcanCounters:
-    """What went through the adapter."""
+    """Frames through the adapter."""
 
     received: int = 0  # by the software
     sent: int = 0

@@ -43,7 +43,7 @@ _WITHOUT_EFFECT = re.compile(rb"[Mm][0-9A-Fa-f]{8}|W[0-2]|U[0-6]|Q[0-2]|X1")
 
 
 class Answer(NamedTuple):
-    """What some bytes lead to."""
+    """The result of some bytes."""
 
     reply: bytes
     frames: tuple[Frame, ...]

@@ -26,7 +26,7 @@ from fleetloop.results.summary import leader_speed
 Matrix = NDArray[np.float64]
 STEP_S = 0.02
 HORIZON_S = 120.0
-"""How far ahead path variables are computed, at most."""
+"""Longest forecast of path variables."""
 _FREQUENCIES, _FLEET = 200_000, 40
 """Frequencies of a sweep, times robots squared; fleets larger than that aren't swept."""
 
@@ -89,7 +89,7 @@ def delay_margin_s(graph: Graph, p: float, q: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Forecast:
-    """What the path variables will do: rows are instants, columns robots."""
+    """Forecast of the path variables: rows are instants, columns robots."""
 
     t_s: Matrix
     s: Matrix

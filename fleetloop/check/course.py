@@ -141,7 +141,7 @@ def slowest_place(path: RobotPath, places: Sequence[float]) -> tuple[float, floa
 
 
 def _irregular(scenario: Scenario, robot: Robot, at: float) -> Problem:
-    """What to change: the offset, unless the centre's own path stands still there."""
+    """The key to change: the offset, unless the centre's own path stands still there."""
     law = "the law wants v̄_d > 0 everywhere (Assumption 2.4)"
     centre = robot_path(reference_path(scenario.path), AT_CENTRE)
     speed, _ = _speed_and_heading(centre, at)

@@ -79,7 +79,7 @@ def synchronisation(graph: Graph, p: float, q: float) -> Finding:
 
 
 def delay_class(graph: Graph, p: float, q: float) -> Finding:
-    """How much delay and switching the coordination stands."""
+    """Margins of the coordination for delay and switching."""
     degree = graph.max_in_degree
     ratio = p * p / (q * degree) if degree else inf
     title = "p²/(q d_max), largest in-degree d_max"

@@ -34,7 +34,7 @@ MAX_PERIODS = 200
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """What one robot's loops are made of."""
+    """Parameters of one robot's loops."""
 
     law: type[AdaptiveDsc]
     gains: AdaptiveDsc.Gains

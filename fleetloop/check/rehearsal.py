@@ -89,7 +89,7 @@ def rehearse(scenario: Scenario) -> list[Finding]:
 
 
 def _affordable_s(scenario: Scenario) -> float:
-    """How much scenario time `WORK_S` is enough for, whole ticks."""
+    """Scenario time that `WORK_S` is enough for, whole ticks."""
     h, substeps = scenario.clock.control_period_s, 1
     tick_s = _TICK_S
     if scenario.drive.preset == "realistic":

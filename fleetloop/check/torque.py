@@ -187,7 +187,7 @@ def _torque(scenario: Scenario, course: Course, need: Need, bounds: list[Limit])
 
 
 def _behind(scenario: Scenario, course: Course, need: Need, bounds: list[Limit]) -> Series:
-    """How far the robot is behind at each instant [m]."""
+    """Distance of the robot behind its reference at each instant [m]."""
     motion, rest, nu = (
         np.abs(x) for x in (need.motion_wheel_N_m, need.rest_wheel_N_m, need.nu_wheel_rad_s)
     )

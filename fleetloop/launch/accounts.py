@@ -11,7 +11,7 @@ MOST_NOTICES = 200
 
 
 def stats_of(outcome: Outcome, *, realtime: bool, period_s: float) -> RunStats:
-    """What the launcher saw and what all processes reported at their end."""
+    """Statistics from the launcher's observations and the final reports of all processes."""
     stats = RunStats(
         mode="realtime" if realtime else "lockstep",
         ended=outcome.ended,

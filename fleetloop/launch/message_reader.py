@@ -21,7 +21,7 @@ class MessageReader:
         self._schedule = schedule
 
     def progress(self, process: str, payload: bytes) -> Progress | None:
-        """How far a process is, None if it can't be there."""
+        """Progress of a process; None if it is impossible."""
         progress = Progress.decode(payload)
         wrong = "not well formed" if progress is None else self._wrong(progress)
         if wrong is None:

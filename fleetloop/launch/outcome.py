@@ -1,4 +1,4 @@
-"""How a run over processes went: counters for the summary, and why it ended."""
+"""Outcome of a run over processes: counters for the summary, and the cause of its end."""
 
 from dataclasses import dataclass, field
 from typing import Any

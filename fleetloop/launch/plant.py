@@ -51,7 +51,7 @@ _ROW_NAMES = [signal.name for signal in PLANT_SIGNALS]
 
 @dataclass(frozen=True, slots=True)
 class PlantOptions:
-    """What the command line says."""
+    """Options of the command line."""
 
     robots: tuple[str, ...] = ()
     duration_s: float | None = None

@@ -46,7 +46,7 @@ GO_AHEAD_NS = 200_000_000
 UNREAD_SHARE = 0.25
 """Part of the tick deadline after which a client that doesn't read is cut off: all wait for it."""
 LOOK_EVERY_S = 0.1
-"""How often connections are looked at for floods."""
+"""Interval between inspections of connections for floods."""
 _MOST_OTHERS = 3
 
 
@@ -88,7 +88,7 @@ class ProcessRun:
 
     @property
     def outcome(self) -> Outcome:
-        """How the run went, so far."""
+        """Outcome of the run so far."""
         return self._plane.outcome
 
     def run(self, stop: Stop) -> Outcome:

@@ -16,7 +16,7 @@ GRACE_S = 0.5
 
 
 class RemoteRoles:
-    """What became of the roles on other machines."""
+    """State of the roles on other machines."""
 
     def __init__(self, processes: Iterable[str]) -> None:
         self._processes = frozenset(processes)

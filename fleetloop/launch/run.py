@@ -45,7 +45,7 @@ EXIT_STATUS = {
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """What the command line says about a run."""
+    """Options of the command line for a run."""
 
     in_process: bool = False
     speed: float = 0.0

@@ -153,4 +153,4 @@ BRIEFS: Mapping[str, Callable[[Place], object]] = {
     AGENT.name: _agent,
     RECORDER.name: _recorder,
 }
-"""What fills the brief of each role that a run starts."""
+"""Builder of the brief of each role that a run starts."""

@@ -48,7 +48,7 @@ class Vitals:
             vital.ended = True
 
     def silence(self, process: str, now_s: float) -> Silence | None:
-        """How long a process has been silent; None before its first beat."""
+        """Silence of a process; None before its first beat."""
         vital = self._vitals.get(process)
         return None if vital is None else Silence(process, vital.tick, now_s - vital.at_s)
 

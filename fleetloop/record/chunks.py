@@ -134,7 +134,7 @@ class ChunkReader:
 def summary_of(
     channel: int, messages: np.ndarray, start: int, length: int, compressed: int
 ) -> records.ChunkIndex:
-    """What the summary says of a chunk of so many bytes at `start`."""
+    """The summary's entry of a chunk of so many bytes at `start`."""
     index_length = PREFIX.size + _INDEX.size + len(messages) * _ENTRY.itemsize
     return records.ChunkIndex(
         chunk_start_offset=start,

@@ -27,7 +27,7 @@ LIBRARY = "fleetloop"
 SCENARIO = "scenario.toml"
 _VERSION, _CRC, _SIGNALS = "version", "crc32_of_all_before", "signals"
 PREFIX = struct.Struct("<BQ")
-"""What every record of MCAP begins with: its opcode and the length of its content."""
+"""Prefix of every MCAP record: its opcode and the length of its content."""
 _Records = Sequence[tuple[int, bytes]]
 _Kind = TypeVar("_Kind", bound=records.McapRecord)
 

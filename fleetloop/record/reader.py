@@ -24,7 +24,7 @@ class Record:
     controller: dict[str, np.ndarray]
     scenario_toml: str
     lost: str
-    """What isn't in it, and why; empty if it is all there and right."""
+    """The missing part, and the cause; empty for a complete, undamaged record."""
 
     @classmethod
     def open(cls, path: Path, *, damaged: bool = False) -> "Record":
@@ -62,7 +62,7 @@ class Record:
         return cls(path, layout.robots, plant, controller, toml, found.lost)
 
     def shortage(self) -> str:
-        """What isn't in it and how much is; empty if it is all there."""
+        """The missing part and the extent of the rest; empty for a complete record."""
         return f"{self.lost}; in it are {self.extent()}" if self.lost else ""
 
     def extent(self) -> str:

@@ -30,7 +30,7 @@ QUIET_S = 0.3
 """Once asked to stop, the recorder takes what still comes until nothing new came for this long."""
 PROGRESS_EVERY_S = 0.25
 AHEAD_TICKS = 1 << 17
-"""How far a source's rows may be ahead of the slowest's; they wait in memory."""
+"""Largest lead of a source's rows over the slowest's; they wait in memory."""
 GAPS = 8
 """Consecutive blocks after a gap from which on the missing rows count as lost."""
 ROOM_BYTES = 1 << 26

@@ -48,14 +48,14 @@ class Written(NamedTuple):
 
 @dataclass(slots=True)
 class Scan:
-    """What the whole part of a file holds."""
+    """The contents of the undamaged part of a file."""
 
     head: Head
     end: int  # where the whole chunks end
     crc: int  # of all bytes before
     chunks: list[Written] = field(default_factory=list)
     lost: str = ""
-    """What isn't in it and why; empty if it is all there and right."""
+    """The missing part and the cause; empty for a complete, undamaged file."""
     closed: bool = False
     """It has its end and its summary."""
     damaged: bool = False
@@ -190,7 +190,7 @@ def _body(file: _File, found: Scan, take: Take) -> None:
 
 
 def _missing(record: _Found) -> str:
-    """What the end says is missing."""
+    """The missing part, according to the end."""
     if record.opcode != Opcode.METADATA:
         raise DamageError(f"a record of kind {record.opcode}, not a chunk")
     try:

@@ -102,7 +102,7 @@ def _ended(robot: str, source: str, a: int, b: int) -> Difference:
 
 
 def _common(a: Record, b: Record) -> str:
-    """How many ticks were compared."""
+    """Number of compared ticks."""
     ticks = {robot: min(len(a.plant[robot]), len(b.plant[robot])) for robot in a.robots}
     if len(set(ticks.values())) == 1:
         return f"{ticks[a.robots[0]]} ticks of {len(ticks)} robots"

@@ -37,7 +37,7 @@ Table = dict[str, np.ma.MaskedArray]
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """What of a run to export; nothing named: the default signals, all robots, all of the time."""
+    """The part of a run to export. Default: the default signals, all robots, all times."""
 
     signals: Sequence[str] = ()
     robots: Sequence[str] = ()

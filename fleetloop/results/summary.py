@@ -23,7 +23,7 @@ _PACKAGES = ("fleetloop", "eclipse-zenoh", "python-can", "numpy", "msgpack", "mc
 
 @dataclass(slots=True)
 class RunStats:
-    """What the record can't know."""
+    """Facts about a run that its record can't hold."""
 
     mode: str  # "lockstep" over processes, or "in-process"
     started: str = ""  # wall clock, ISO 8601
