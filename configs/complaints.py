@@ -61,10 +61,19 @@ class Salvage(NamedTuple):
 
     def believes(self, problem: Problem) -> bool:
         """Whether a problem is of the file itself, not of a stand-in for a lost key."""
-        if "control.law" in self.lost and problem.key.endswith(".signal"):
-            return False  # it may be the lost law's
+        if "control.law" in self.lost and self._is_of_the_fleets_law(problem.key):
+            return False
         text = f"{problem.key} {problem.remedy}"
         return not any(key in text or key.startswith(f"{problem.key}.") for key in self.lost)
+
+    def _is_of_the_fleets_law(self, key: str) -> bool:
+        """Whether the law of [control] gives a key its meaning: a signal, a robot's gain."""
+        if key.endswith(".signal"):
+            return True
+        return any(
+            key.startswith(f"robot.{robot.name}.control.") and "law" not in robot.control.table
+            for robot in self.scenario.robot
+        )
 
 
 def salvage(

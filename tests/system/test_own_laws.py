@@ -115,6 +115,27 @@ def test_what_is_wrong_is_said_before_the_run(
 
 
 @pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("own.toml", "my_law:Unicycle", "my_law:Bicycle"),
+        ("own.toml", "my_law:Unicycle", "no_law:Unicycle"),
+        ("my_law.py", "class State", "class class"),
+    ],
+)
+def test_a_robots_gains_are_not_judged_by_the_default_law_when_the_fleets_is_lost(
+    own: Path, name: str, old: str, new: str
+) -> None:
+    replaced(own, "own.toml", '"r2"\n', '"r2"\ncontrol = { k_i_1_s2 = 0.4 }\n')
+    replaced(own, "own.toml", '"adaptive_dsc_robust"', '"adaptive_dsc_robust", k55 = 1')
+    replaced(own, name, old, new)
+    done = fleetloop(own, "check", "own.toml")
+    assert done.returncode == 2
+    assert "own.toml: control.law = " in done.stderr
+    assert "k_i_1_s2" not in done.stderr
+    assert "robot.r3.control.k55 = 1: unknown key" in done.stderr  # r3 names its own law
+
+
+@pytest.mark.parametrize(
     ("new", "said"),
     [
         (
