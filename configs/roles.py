@@ -10,6 +10,9 @@
 Spawning, access control, keys and deployments read this table. A role more is a row here, its
 module, and the function that fills its brief (`fleetloop.launch.spawn.BRIEFS`). Modules are named
 by strings: the processes that read the table import none of them.
+
+A process that is no observer ends by itself at the closing tick; an observer goes on until it is
+asked to stop (SIGTERM). The recorder is one, and ends by itself once it has written the last row.
 """
 
 from dataclasses import dataclass
@@ -48,6 +51,8 @@ class Role:
     """Forked from a process that imported it; others get an interpreter of their own."""
     beside_launcher: bool = False
     """Can't be placed on another machine."""
+    observer: bool = False
+    """Takes no part in the run: it is stopped once plant and controllers have ended."""
     puts: tuple[Topic, ...] = ()
     hears: tuple[Topic, ...] = ()
     watches: tuple[str, ...] = ()
@@ -87,6 +92,7 @@ RECORDER = Role(
     module="fleetloop.record.recorder",
     brief=RecorderBrief,
     beside_launcher=True,
+    observer=True,
     hears=(Topic.TRUTHS, Topic.TRAFFIC, Topic.TELEMETRIES),
 )
 LOCALISATION = Role(name="localisation", puts=(Topic.MEASURED_POSES,), hears=(Topic.GO,))
@@ -94,6 +100,11 @@ LOCALISATION = Role(name="localisation", puts=(Topic.MEASURED_POSES,), hears=(To
 ROLES = (PLANT, AGENT, RECORDER, LOCALISATION, LAUNCHER)
 """In the order in which a run starts them."""
 STARTED = tuple(role for role in ROLES if role.module)
+
+
+def is_observer(process: str) -> bool:
+    """Whether a process takes no part in the run."""
+    return any(role.observer and role.name == process.partition("/")[0] for role in ROLES)
 
 
 def identity_of(process: str) -> str:

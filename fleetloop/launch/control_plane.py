@@ -11,7 +11,7 @@ from bridge.network import keys
 from bridge.network.link import Arrival, Link
 from bridge.network.messages import Progress
 from configs.brief import Schedule
-from configs.roles import PLANT
+from configs.roles import PLANT, is_observer
 from fleetloop.launch.child import Child
 from fleetloop.launch.machine import WATCH_EVERY_S
 from fleetloop.launch.message_reader import MessageReader
@@ -82,6 +82,11 @@ class ControlPlane:
     def child(self, process: str) -> Child | None:
         """The process of that name on this machine, None if it is on another."""
         return next((child for child in self.children if child.name == process), None)
+
+    @property
+    def actors(self) -> list[Child]:
+        """The processes on this machine that take part in the run."""
+        return [child for child in self.children if not is_observer(child.name)]
 
     def note(self, process: str, text: str) -> None:
         """Record what the launcher has noticed about a process."""

@@ -13,7 +13,7 @@ from bridge.network.reports import LauncherReport
 from bridge.network.router import RouterLink
 from bridge.process.lifecycle import Stop
 from configs.errors import FleetloopError
-from configs.roles import LAUNCHER
+from configs.roles import LAUNCHER, RECORDER
 from fleetloop.launch.child import GAVE_UP, Child, Failure, end
 from fleetloop.launch.control_plane import ControlPlane
 from fleetloop.launch.machine import WATCH_EVERY_S, MachineWatch
@@ -46,8 +46,8 @@ class Ending:
         """End all processes; `failure` is the one that ended the run, if one did."""
         plane, outcome = self._plane, self._plane.outcome
         self._judge(stop, failure)
-        *actors, recorder = plane.children
-        if failure is not None and failure.name == recorder.name:
+        actors, recorder = plane.actors, plane.child(RECORDER.name)
+        if recorder is not None and failure is not None and failure.name == recorder.name:
             # What it doesn't take any more would keep all others waiting.
             recorder.kill()
         if outcome.ended != "completed":
@@ -61,12 +61,15 @@ class Ending:
         end(actors)
         self._machine.clock.resume()
         self._await_remote_roles(link, DRAIN_S)
-        if outcome.ended != "completed":
-            recorder.ask_to_stop()
-        self._drain(link, recorder)
+        end([child for child in plane.children if child not in (*actors, recorder)])
+        if recorder is not None:
+            if outcome.ended != "completed":
+                recorder.ask_to_stop()
+            self._drain(link, recorder)
         for arrival in waiting(link):
             plane.take(arrival)
-        self._end_recorder(recorder)
+        if recorder is not None:
+            self._end_recorder(recorder)
 
     def tell_remote_roles(self, link: Link, reason: str) -> None:
         """Tell the roles on other machines why the run ends, before the launcher's token goes."""

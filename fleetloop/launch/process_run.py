@@ -28,7 +28,7 @@ from configs.brief import LEASE_S, LOCAL_LEASE_S, NetworkLink
 from configs.deployment import Deployment
 from configs.errors import InfrastructureError
 from configs.resolve import leader_brief, schedule
-from configs.roles import LAUNCHER, PLANT, RECORDER, identity_of, processes_of
+from configs.roles import LAUNCHER, PLANT, identity_of, processes_of
 from configs.scenario import Scenario
 from fleetloop.launch import open_files, placement
 from fleetloop.launch.child import GAVE_UP, Failure, end, refuse_shadowed_roles
@@ -189,7 +189,7 @@ class ProcessRun:
     def _watch(self, link: RouterLink, stop: Stop) -> Failure | None:
         """Follow the run until the plant and all controllers have ended."""
         plane, supervision = self._plane, self._supervision
-        actors = [child for child in plane.children if child.name != RECORDER.name]
+        actors = plane.actors
         while not stop.requested:
             plane.receive(link, WATCH_EVERY_S)
             self._report_refusals(link)
