@@ -42,7 +42,7 @@ _EARLY = 1e-9
 
 
 class EncoderFault(Enum):
-    """A fault of an encoder; the value is its name in scenarios."""
+    """A fault of an encoder; the value is its name."""
 
     FREEZE = "encoder_freeze"
     JUMP = "encoder_jump"

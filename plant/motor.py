@@ -44,7 +44,7 @@ FASTEST_SHAFT_RAD_S = 1e12
 
 
 class MotorFault(Enum):
-    """A fault of a motor or its power stage; the value is its name in scenarios."""
+    """A fault of a motor or its power stage; the value is its name."""
 
     TORQUE_STUCK = "torque_stuck"
     TORQUE_HALF = "torque_half"

@@ -31,7 +31,7 @@ from configs import powertrain
 
 
 class SupplyFault(Enum):
-    """A fault of a supply; the value is its name in scenarios."""
+    """A fault of a supply; the value is its name."""
 
     UNDER_VOLTAGE = "under_voltage"
     OVER_VOLTAGE = "over_voltage"

@@ -228,11 +228,13 @@ class Wire:
                 held = (self.now_ns + found.delay_ns, entry.number, node, entry)
                 heappush(self._withheld, held)
                 return True
-            case _:
+            case FaultKind.DUPLICATE:
                 taken = self._queue(node, entry)
                 self._number += 1
                 self._queue(node, entry._replace(number=self._number))
                 return taken
+            case _:
+                raise ValueError(f"{found.kind} has no effect before a controller")
 
     def _release(self) -> None:
         """A withheld frame's time has come; without room for it, it is lost."""
