@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from pydantic import ValidationError
 
 from configs.drives import options_of
-from configs.errors import Problem, ScenarioError
+from configs.errors import Problem
+from configs.plugins import PluginError
 from configs.scenario import Scenario
 from configs.sections import Drive
 from configs.wording import remedy_of
@@ -72,7 +73,7 @@ def _protocol(drive: Drive) -> Iterator[Problem]:
             key = ".".join(map(str, ("drive", "options", *item["loc"])))
             unknown = item["type"] == "unexpected_keyword_argument"
             yield Problem(key, item["input"], "unknown key" if unknown else remedy_of(item))
-    except ScenarioError as error:
+    except PluginError as error:
         yield Problem("drive.protocol", drive.protocol, str(error))
 
 

@@ -4,12 +4,11 @@ odrive            shipped: a row of `DRIVES`
 my_drive:ROW      the value ROW of an importable module my_drive, a `DriveProtocol`
 """
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from configs.errors import ScenarioError
+from configs import plugins
 from configs.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -32,28 +31,16 @@ def load(name: str) -> Any:
     """The row of a protocol, a `bridge.drives.interface.DriveProtocol`.
 
     Raises:
-        ScenarioError: there is none of that name; the text is the remedy.
+        PluginError: there is none of that name, or its module fails; the text is the remedy.
     """
-    target = DRIVES.get(name, name)
-    module_name, _, row = target.partition(":")
-    if not module_name or not row:
-        known = ", ".join(DRIVES)
-        raise ScenarioError(f'no such protocol (known: {known}; one of your own is "module:ROW")')
-    try:
-        module = importlib.import_module(module_name)
-    except ImportError as error:
-        raise ScenarioError(f"module {module_name}: {error}") from error
-    found = getattr(module, row, None)
-    if not all(hasattr(found, end) for end in ("client", "node", "section")):
-        raise ScenarioError(f"{row} of module {module_name} is no bridge.drives.DriveProtocol")
-    return found
+    return plugins.load(plugins.find(plugins.Kind.DRIVE, name, "", DRIVES))
 
 
 def options_of(drive: "Drive") -> Parameters:
     """The protocol's own keys, checked.
 
     Raises:
-        ScenarioError: there is no such protocol.
+        PluginError: there is no such protocol.
         ValidationError: a key or value is wrong.
     """
     from pydantic import TypeAdapter

@@ -1,4 +1,4 @@
-"""Laws, path shapes and formation offsets by name: shipped, installed, or in a file of one's own.
+"""Laws, path shapes, formation offsets and drive protocols by name: shipped, installed, or own.
 
     adaptive_dsc      shipped: a row of the tables below
     lqr               an entry point of the group, from an installed package
@@ -41,6 +41,7 @@ class Kind(Enum):
     LAW = "law", "fleetloop.laws"
     PATH = "path shape", "fleetloop.paths"
     OFFSET = "formation offset", "fleetloop.offsets"
+    DRIVE = "drive protocol", "fleetloop.drives"
 
     @property
     def word(self) -> str:
@@ -51,6 +52,11 @@ class Kind(Enum):
     def group(self) -> str:
         """Of entry points."""
         return self.value[1]
+
+    @property
+    def form(self) -> str:
+        """The name of one's own in a file."""
+        return "module:ROW" if self is Kind.DRIVE else "module:Class"
 
 
 class PluginError(ScenarioError):
@@ -87,7 +93,7 @@ def find(kind: Kind, name: str, folder: str, shipped: Mapping[str, str]) -> Plug
     hint = f"; did you mean {close[0]}?" if close else ""
     raise PluginError(
         f"no such {kind.word}{hint} (known: {', '.join(known)}; one of your own is"
-        f' "module:Class", from module.py beside the scenario)'
+        f' "{kind.form}", from module.py beside the scenario)'
     )
 
 
@@ -99,20 +105,20 @@ def entry_points(kind: Kind) -> dict[str, str]:
 
 
 def load(plugin: Plugin) -> Any:
-    """The class of a plugin.
+    """The class of a plugin; of a drive protocol its row.
 
     Raises:
         PluginError: there is no such module or class, it fails, or it has the wrong type.
     """
     module_name, _, path = plugin.target.partition(":")
     if not module_name or not path:
-        raise PluginError(f'must be "module:Class", not "{plugin.target}"')
+        raise PluginError(f'must be "{plugin.kind.form}", not "{plugin.target}"')
     module = _module(plugin, module_name)
     found: Any = module
     for part in path.split("."):
         found = getattr(found, part, None)
         if found is None:
-            names = [n for n, value in vars(module).items() if _is_own(value, module)]
+            names = [n for n, v in vars(module).items() if _is_own(plugin.kind, v, module)]
             has = f"; it has {', '.join(names)}" if names else ""
             raise PluginError(f"{_where(module)} has no {path}{has}")
     fault = _FAULTS[plugin.kind](found)
@@ -121,7 +127,9 @@ def load(plugin: Plugin) -> Any:
     return found
 
 
-def _is_own(value: object, module: ModuleType) -> bool:
+def _is_own(kind: Kind, value: object, module: ModuleType) -> bool:
+    if kind is Kind.DRIVE:
+        return _protocol_fault(value) is None
     return isinstance(value, type) and value.__module__ == module.__name__
 
 
@@ -226,7 +234,21 @@ def _shape_fault(found: Any) -> str | None:
     return None
 
 
-_FAULTS = {Kind.LAW: _law_fault, Kind.PATH: _shape_fault, Kind.OFFSET: _shape_fault}
+def _protocol_fault(row: Any) -> str | None:
+    ends = ("client", "node", "cyclic_messages", "words", "node_seen", "section")
+    missing = [end for end in ends if not hasattr(row, end)]
+    if missing:
+        return f"it has no {', no '.join(missing)} (see bridge.drives.interface.DriveProtocol)"
+    fault = _parameters_fault(row.section)
+    return None if fault is None else f"its section: {fault}"
+
+
+_FAULTS = {
+    Kind.LAW: _law_fault,
+    Kind.PATH: _shape_fault,
+    Kind.OFFSET: _shape_fault,
+    Kind.DRIVE: _protocol_fault,
+}
 
 
 # --- a plugin with its parameters -----------------------------------------------------------------

@@ -86,14 +86,35 @@ def test_its_section_is_checked_where_it_stands() -> None:
     ("name", "words"),
     [
         ("canopen", "known: odrive"),
-        ("nowhere_at_all:ROW", "No module named 'nowhere_at_all'"),
-        ("support.second_drive:NOTHING", "is no bridge.drives.DriveProtocol"),
+        ("canopen", 'one of your own is "module:ROW"'),
+        ("nowhere_at_all:ROW", "no module nowhere_at_all is installed"),
+        ("support.second_drive:NOTHING", "has no NOTHING; it has ROW"),
+        ("support.second_drive:PlainClient", "PlainClient is no drive protocol: it has no client"),
     ],
 )
 def test_a_protocol_that_does_not_exist_is_named(name: str, words: str) -> None:
     with pytest.raises(ScenarioError, match=r"drive\.protocol") as refused:
         load("two_robots", (f"drive.protocol='{name}'",))
     assert words in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x = 1\ndef broken(:\n", "line 2: invalid syntax"),
+        ("x = 1\n\nROW = 1 / 0\n", "line 3: ZeroDivisionError: division by zero"),
+        ("import nowhere_at_all\n", "line 1: ModuleNotFoundError: No module named"),
+    ],
+)
+def test_the_place_where_its_module_fails_is_said(
+    monkeypatch, tmp_path, text: str, words: str
+) -> None:
+    file = tmp_path / "failing_drive.py"
+    file.write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ScenarioError, match=r"drive\.protocol") as refused:
+        load("two_robots", ("drive.protocol='failing_drive:ROW'",))
+    assert f"{file}, {words}" in str(refused.value)
 
 
 def test_its_options_load_and_decoder_hang_on_the_row(monkeypatch) -> None:
