@@ -12,7 +12,7 @@ validation: {"folder": ...}; {"recorded": True} takes classes that aren't here a
 import contextlib
 import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from configs.parameters import Parameters
@@ -23,6 +23,7 @@ from configs.plugins import (
     PluginError,
     Recorded,
     entry_points,
+    file_of,
     find,
     load,
 )
@@ -154,7 +155,7 @@ def parameters_of(plugin: Plugin) -> type[Parameters]:
     """The type of a plugin's parameters.
 
     Raises:
-        PluginError: the plugin can't be had.
+        PluginError: the plugin can't be had, or a default is out of its own bounds.
     """
     found = load(plugin)
     parameters: type[Parameters] = found.Gains if plugin.kind is Kind.LAW else found
@@ -162,7 +163,39 @@ def parameters_of(plugin: Plugin) -> type[Parameters]:
         _adapter(parameters)
     except Exception as error:  # pydantic's, of annotations that it doesn't know
         raise PluginError(f"{parameters.__qualname__}: {str(error).splitlines()[0]}") from error
+    _refuse_bad_defaults(parameters)
     return parameters
+
+
+def _refuse_bad_defaults(parameters: type[Parameters]) -> None:
+    """Hold the defaults of a class to its own types and bounds.
+
+    Raises:
+        PluginError: a default that a file couldn't give.
+    """
+    from pydantic import ValidationError
+
+    from configs.wording import remedy_of
+
+    given = {
+        one.name: _plain(one.default)
+        for one in fields(parameters)  # type: ignore[arg-type]
+        if one.default is not MISSING
+    }
+    try:
+        _adapter(parameters).validate_python(given)
+    except ValidationError as error:
+        wrong = [
+            f"the default of {item['loc'][0]} is {given[str(item['loc'][0])]!r:.80}, which"
+            f" {remedy_of(item)}"
+            for item in error.errors(include_url=False)
+            if item["loc"] and item["loc"][0] in given
+        ]
+        if wrong:
+            where = f"{file_of(parameters)}: {parameters.__qualname__}"
+            raise PluginError(f"{where}: {'; '.join(wrong)}") from error
+    except Exception:  # of its __post_init__, which is told of the values of files
+        pass
 
 
 @dataclass(frozen=True, slots=True)

@@ -137,6 +137,12 @@ def _where(module: ModuleType) -> str:
     return getattr(module, "__file__", None) or module.__name__
 
 
+def file_of(found: type) -> str:
+    """The file of a class; the name of its module if that has none."""
+    module = sys.modules.get(found.__module__)
+    return found.__module__ if module is None else _where(module)
+
+
 def _module(plugin: Plugin, name: str) -> ModuleType:
     beside = _beside(plugin.folder, name)
     try:

@@ -98,6 +98,18 @@ def test_a_record_is_read_without_the_files(own: Path) -> None:
         ("my_law.py", "import cos, hypot", "import coz, hypot", "my_law.py, line 4: ImportError"),
         ("my_law.py", "class State", "class class", ": invalid syntax"),
         ("my_law.py", "class Unicycle(Law)", "class Unicycle", "it has no hold"),
+        (
+            "my_law.py",
+            "parameter(0.2,",
+            "parameter(-0.2,",
+            "my_law.py: Unicycle.Gains: the default of k_i_1_s2 is -0.2, which must be 0 or more",
+        ),
+        (
+            "my_shapes.py",
+            "a_m: Positive = parameter(3.0",
+            "a_m: Positive = parameter(-3.0",
+            "my_shapes.py: Ellipse: the default of a_m is -3.0, which must be greater than 0",
+        ),
         ("my_law.py", '"distance_m"', '"x_m"', "SIGNALS: x_m is recorded of every robot already"),
         ("my_law.py", "k_v_N_m_s: Positive", "law: Positive", "law is the key that names the law"),
     ],
