@@ -182,7 +182,7 @@ def _channel(
     margin_s = inf
     if loop.pose_every <= HELD_PERIODS:
         margin_s = delay_margin_s(loop, *arc)
-        said += f"; stands torques later by {1e3 * margin_s:.3g} ms"
+        said += f"; tolerates torques {1e3 * margin_s:.3g} ms late"
     if _CYCLES * slowest_s > scenario.duration_s:
         text = f"{said}: too slow for {scenario.duration_s:g} s; raise the lowest of k1, k2 v_r, k3"
         yield Finding("warning", title, text, key="control.k2")

@@ -106,7 +106,7 @@ def robot_rows(summary: Summary) -> Iterator[list[str]]:
 
 def final_line(summary: Summary) -> str:
     """The window of final errors, in words."""
-    return f"final: the greatest of a robot's last {min(FINAL_S, summary['simulated_s']):g} s"
+    return f"final: greatest magnitude in the last {min(FINAL_S, summary['simulated_s']):g} s"
 
 
 def spread_line(summary: Summary) -> str:
@@ -224,7 +224,7 @@ def _number(value: float | None, spec: str) -> str:
 
 
 def _time(value: float | None) -> str:
-    return "not" if value is None else f"{value:.2f} s"
+    return "never" if value is None else f"{value:.2f} s"
 
 
 def _rules() -> box.Box:

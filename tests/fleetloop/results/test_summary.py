@@ -76,7 +76,7 @@ def test_what_a_value_is_of_is_said(uneven_run: Path, finished_run: Path) -> Non
     whole = uneven(finished_run)
     assert [row[0] for row in robot_rows(whole)] == ["r1", "r2", "worst"]
     assert spread_line(whole).startswith("spread of s: peak ")
-    assert final_line(whole) == "final: the greatest of a robot's last 4 s"
+    assert final_line(whole) == "final: greatest magnitude in the last 4 s"
 
 
 def test_a_stop_is_told_once(finished_run: Path) -> None:
