@@ -32,7 +32,8 @@ from typing import Any
 from agents.admission import Admission
 from agents.coordination import CoordinationState, Coordinator
 from agents.guard import UNCHANGED, Guard, Phase, TorqueOutcome
-from agents.laws.build import build, failure
+from agents.laws.build import build
+from agents.laws.failure import failure
 from agents.laws.interface import PathVariable, Reference, RobotMotion
 from agents.limits import EncoderCheck
 from agents.localisation import Localiser
@@ -245,7 +246,7 @@ class Agent:
         except Exception as error:  # any error of a law or path stops this robot only
             reference, signals = _NO_REFERENCE, self._no_signals
             how, why = failure(error)
-            frames = guard.command(tick, nan, nan, f"the law {how} at s = {s:.4g} m: {why}")
+            frames = guard.command(tick, nan, nan, f"{how} at s = {s:.4g} m: {why}")
         else:
             signals = tuple(out[3])
             frames = guard.command(tick, out[0], out[1])

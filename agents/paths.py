@@ -8,18 +8,20 @@
 Γ_0 is the path of the formation's centre, l_i the robot's offset in axes that turn with it, and
 primes are derivatives by s. A shape gives a point and its first three derivatives (a `Jet`): an
 offset that turns with the path needs θ_d0''. A user's own shape is a dataclass of parameters with a
-method `jet(s)` that returns the jets of x and y; for an offset, those of ahead and left.
+method `jet(s)` that returns the jets of x and y; for an offset, those of ahead and left. It raises
+`ShapeError` where this fails or gives anything else than finite numbers.
 """
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from math import atan2, cos, sin, sqrt
+from math import atan2, cos, isfinite, sin, sqrt
 from typing import Any, NamedTuple
 
+from agents.laws.failure import ShapeError, number, raised
 from agents.laws.interface import Reference, RobotPath
 from configs.curves import FormationOffset, ReferencePath, SplinePath, VaryingOffset
 from configs.paths import Circle, Cosine, FigureEight, Line, Structure, World
-from configs.plugins import Choice
+from configs.plugins import Choice, file_of
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
@@ -168,13 +170,30 @@ def _centre_path(path: ReferencePath) -> _Curve:
 
 
 def _own(choice: Choice) -> _Curve:
-    """A path or an offset of the user's own: `jet(s)` of its class."""
+    """A path or an offset of the user's own: `jet(s)` of its class, its answers checked."""
     shape: Any = choice.parameters
     jet = shape.jet
+    name = f"{choice.plugin.kind.word} {choice.name}"
+    file = file_of(type(shape))
 
     def jet_at(s: float) -> PlanarJet:
-        x, y = jet(s)
-        return PlanarJet(Jet(*x), Jet(*y))
+        try:
+            given = jet(s)
+        except Exception as error:
+            raise ShapeError(f"{name}: {raised(error)}") from error
+        try:
+            x, y = given
+            made = PlanarJet(Jet(*map(number, x)), Jet(*map(number, y)))
+        except (TypeError, ValueError) as error:
+            raise ShapeError(
+                f"{name}: {file}: jet must return ((x, x', x'', x'''), (y, y', y'', y''')),"
+                f" numbers; it returned {given!r:.80}"
+            ) from error
+        if not all(map(isfinite, (*made.x, *made.y))):
+            raise ShapeError(
+                f"{name}: {file}: jet({s:.6g}) is not finite: it returned {given!r:.200}"
+            )
+        return made
 
     return jet_at
 

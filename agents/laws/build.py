@@ -5,12 +5,11 @@ and an error in `hold` or a wrong number of signals is an error of the law, at t
 happens.
 """
 
-import traceback
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from agents.laws.dsc_terms import path_errors
+from agents.laws.failure import LawError, failure
 from agents.laws.interface import (
     Law,
     LawOutput,
@@ -25,10 +24,6 @@ from configs.plugins import LAWS, Choice
 from configs.signals import gives_path_errors
 
 Step = Callable[[Any, RobotMotion, Reference, PathVariable], LawOutput]
-
-
-class LawError(TypeError):
-    """A law's answer is none; the text says why."""
 
 
 class BuiltLaw(NamedTuple):
@@ -90,19 +85,3 @@ def _checked(law: Law, expected: int, *, adds: bool) -> BuiltLaw:
             return before
 
     return BuiltLaw(step, hold, expected + 3 * adds)
-
-
-def failure(error: Exception) -> tuple[str, str]:
-    """What became of a law or a path that raised, and how: arithmetic at its end, or a mistake."""
-    frames = traceback.extract_tb(error.__traceback__)
-    place = ""
-    if frames and not frames[-1].filename.startswith(_HERE):
-        place = f"{frames[-1].filename}, line {frames[-1].lineno}: "
-    if isinstance(error, (ArithmeticError, ValueError)):
-        return "diverged", f"{place}{error}"
-    if isinstance(error, LawError):
-        return "failed", str(error)
-    return "failed", f"{place}{type(error).__name__}: {error}"
-
-
-_HERE = str(Path(__file__).parents[1])

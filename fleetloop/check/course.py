@@ -13,7 +13,7 @@ from math import cos, hypot, inf, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.laws.build import failure
+from agents.laws.failure import ShapeError, raised
 from agents.laws.interface import Reference, RobotPath
 from agents.paths import robot_path
 from configs.complaints import refusal
@@ -79,9 +79,11 @@ def _named(path: RobotPath, robot: str, own: Sequence[Choice]) -> RobotPath:
             return path(s)
         except ZeroDivisionError:  # it stands still there
             raise
+        except ShapeError as error:
+            raise ScenarioError(f"{robot}'s path at s = {s:.4g} m: {error}") from error
         except Exception as error:
             names = " and ".join(one.name for one in own)
-            why = failure(error)[1]
+            why = raised(error)
             raise ScenarioError(f"{robot}'s path, of {names}, at s = {s:.4g} m: {why}") from error
 
     return at

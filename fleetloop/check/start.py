@@ -15,8 +15,9 @@ from math import hypot, inf, isfinite
 import numpy as np
 
 from agents.laws.adaptive_dsc import AdaptiveDsc, DscState
-from agents.laws.build import build, failure
+from agents.laws.build import build
 from agents.laws.dsc_terms import path_errors, smoothing
+from agents.laws.failure import failure
 from agents.laws.interface import PathVariable, RobotMotion
 from configs.brief import Wheels
 from configs.scenario import Scenario
@@ -138,7 +139,7 @@ def _first_torque(scenario: Scenario, robot: Robot, seen: _Start) -> Finding:
         limit for limit in limits(scenario, robot) if limit.key != "control.torque_limit_wheel_N_m"
     ]
     if seen.failed:
-        text = f"{off}: the law {seen.failed}, {seen.diverged_at_s:.3g} s after the start"
+        text = f"{off}: {seen.failed}, {seen.diverged_at_s:.3g} s after the start"
         return Finding("error", title, text, (robot.name,), "control.law")
     control = scenario.control_of(robot)
     if bounds and is_adaptive_dsc(control) and not normalises(control):

@@ -173,3 +173,41 @@ def test_a_law_that_asks_for_no_number_stops_its_robot(own: Path) -> None:
     replaced(own, "my_law.py", "LawOutput(push + turn", "LawOutput(float('nan')")
     done = fleetloop(own, "run", "own.toml", "--force", "--in-process", *QUICK)
     assert "torque that is not finite" in done.stdout
+
+
+OFF, PATH = "return (0.0, 0.0, 0.0, 0.0), (l + l", "return (\n            (a * c, -a"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (OFF, "1 / 0\n        " + OFF, "Breathing: {}, line 32: ZeroDivisionError: division by"),
+        (OFF, OFF.replace("(l", "(1e999 * l"), "Breathing: {}: jet(0) is not finite: it returned"),
+        (PATH, PATH.replace("(a", "(float('nan') * a"), "Ellipse: {}: jet(0) is not finite"),
+        (PATH, "return None\n        " + PATH, "Ellipse: {}: jet must return ((x, x', x'', x'''),"),
+        (PATH, "return c, n\n        " + PATH, "numbers; it returned (1.0, 0.0)"),
+        (PATH, 'return "1234", "1234"\n        ' + PATH, "numbers; it returned ('1234', '1234')"),
+    ],
+)
+def test_a_shape_that_gives_no_jet_is_named_with_its_file(
+    own: Path, old: str, new: str, said: str
+) -> None:
+    replaced(own, "my_shapes.py", old, new)
+    done = fleetloop(own, "check", "own.toml")
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert said.format(own / "my_shapes.py") in " ".join(done.stderr.split())
+    assert " at s = 0 m" in done.stderr
+    assert "curvature" not in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_shape_that_fails_in_a_run_stops_its_robot_and_is_named(own: Path) -> None:
+    run_only = (
+        'import sys\n        if "fleetloop.check" not in sys.modules:\n            1 / 0\n        '
+    )
+    replaced(own, "my_shapes.py", OFF, run_only + OFF)
+    done = fleetloop(own, "run", "own.toml", "--force", "--out", "a", *QUICK)
+    said = " ".join(done.stdout.split())
+    assert "STOPPED r2" in said
+    assert "the path failed at s = 0 m: formation offset my_shapes:Breathing: " in said
+    assert "STOPPED r1" not in said
