@@ -62,7 +62,7 @@ class Guard:
 
     def __init__(self, brief: AgentBrief) -> None:
         host, schedule = brief.host, brief.schedule
-        client = protocol(brief.drives.protocol).client(brief.drives)
+        client = protocol(brief.drives.choice.plugin).client(brief.drives)
         self.drives: DriveClient = DryRun(client) if host.dry_run else client
         self.phase = Phase.ARMING
         self.begun = False

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from math import inf
 
 from configs.curves import FormationOffset, ReferencePath
-from configs.drives import NO_OPTIONS
+from configs.drives import ODRIVE
 from configs.host import Host
 from configs.parameters import Parameters
 from configs.plugins import Choice
@@ -103,7 +103,7 @@ class Schedule:
 class DriveLink:
     """Connection of a controller to the two drives of its robot."""
 
-    protocol: str  # as `configs.drives.load` takes it
+    choice: Choice  # of the protocol, with its own keys
     right_node: int
     left_node: int
     encoder_period_ns: int
@@ -113,7 +113,11 @@ class DriveLink:
     heartbeat_period_ns: int = 100_000_000
     encoder_age_limit_ns: int = 50_000_000  # older: the drive has dropped out
     heartbeat_age_limit_ns: int = 500_000_000  # older: the drive has dropped out
-    own: Parameters = NO_OPTIONS  # the protocol's own keys
+
+    @property
+    def own(self) -> Parameters:
+        """The protocol's own keys."""
+        return self.choice.parameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -222,7 +226,12 @@ class DriveModel(Drive):
     trajectory_accel_shaft_rev_s2: float = 0.5
     trajectory_decel_shaft_rev_s2: float = 0.5
     current_margin_A: float = 8.0  # above the limit in force, then it disarms
-    own: Parameters = NO_OPTIONS  # the protocol's own keys
+    choice: Choice = ODRIVE  # of the protocol, with its own keys
+
+    @property
+    def own(self) -> Parameters:
+        """The protocol's own keys."""
+        return self.choice.parameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

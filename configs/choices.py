@@ -63,7 +63,7 @@ class Chooser(NamedTuple):
             if recorded:
                 return Choice(Plugin(self.kind, name, name), Recorded(tuple(rest.items())))
             raise _stated(self.key, name, str(error)) from error
-        return Choice(plugin, _validated(parameters, rest))
+        return Choice(plugin, validated(parameters, rest))
 
     def __get_pydantic_core_schema__(self, source: Any, handler: "GetCoreSchemaHandler") -> Any:
         """Tables become choices, and are written as tables."""
@@ -73,7 +73,7 @@ class Chooser(NamedTuple):
             if isinstance(value, Choice):
                 return value
             if not isinstance(value, Mapping):
-                raise _in_words("must be a table")
+                raise in_words("must be a table")
             context = info.context or {}
             folder, recorded = context.get("folder", ""), context.get("recorded", False)
             return self.choose(value, folder, recorded=recorded)
@@ -214,7 +214,7 @@ class Changes:
             if isinstance(value, cls):
                 return value
             if not isinstance(value, Mapping):
-                raise _in_words("must be a table")
+                raise in_words("must be a table")
             return cls(dict(value), (info.context or {}).get("folder", ""))
 
         return core_schema.with_info_plain_validator_function(
@@ -289,7 +289,12 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _validated(parameters: type[Parameters], table: dict[str, Any]) -> Parameters:
+def validated(parameters: type[Parameters], table: Mapping[str, Any]) -> Parameters:
+    """The parameters that a table's keys make.
+
+    Raises:
+        ValidationError: of the keys; an unknown one is told with those that are known.
+    """
     from pydantic import ValidationError
 
     known = sorted(one.name for one in fields(parameters))  # type: ignore[arg-type]
@@ -303,7 +308,7 @@ def _validated(parameters: type[Parameters], table: dict[str, Any]) -> Parameter
         wrong = [_again(item) for item in error.errors(include_url=False)] + wrong
     except Exception as error:  # raised by the class itself, in its __post_init__
         text = f"{type(error).__name__}: {error}"
-        raise _in_words(text) from error
+        raise in_words(text) from error
     if wrong or made is None:
         raise ValidationError.from_exception_data(parameters.__name__, wrong)
     return made
@@ -313,7 +318,7 @@ def _again(item: Any) -> "InitErrorDetails":
     details: dict[str, Any] = {"type": item["type"], "loc": item["loc"], "input": item["input"]}
     if item["type"] == "value_error":
         remedy = str(item["ctx"]["error"])
-        details["type"] = _in_words(remedy)
+        details["type"] = in_words(remedy)
     elif "ctx" in item:
         details["ctx"] = item["ctx"]
     made: InitErrorDetails = details  # type: ignore[assignment]
@@ -323,10 +328,10 @@ def _again(item: Any) -> "InitErrorDetails":
 def _unknown(key: str, value: object, known: list[str]) -> "InitErrorDetails":
     close = difflib.get_close_matches(key, known, 1)
     hint = f"; did you mean {close[0]}?" if close else ""
-    remedy = f"unknown key{hint} (known here: {', '.join(known)})"
+    remedy = f"unknown key{hint} (known here: {', '.join(known)})" if known else "unknown key"
     from pydantic_core import InitErrorDetails
 
-    stated = _in_words(remedy)
+    stated = in_words(remedy)
     return InitErrorDetails(type=stated, loc=(key,), input=value)
 
 
@@ -334,12 +339,13 @@ def _stated(key: str, value: object, remedy: str) -> "ValidationError":
     from pydantic import ValidationError
     from pydantic_core import InitErrorDetails
 
-    stated = _in_words(remedy)
+    stated = in_words(remedy)
     details = InitErrorDetails(type=stated, loc=(key,), input=value)
     return ValidationError.from_exception_data(key, [details])
 
 
-def _in_words(remedy: str) -> Any:
+def in_words(remedy: str) -> Any:
+    """An error for pydantic that says just this."""
     from pydantic_core import PydanticCustomError
 
     return PydanticCustomError(STATED, "{remedy}", {"remedy": remedy})

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from pydantic import ValidationError
 
-from configs.drives import options_of
+from configs.drives import choice_of
 from configs.errors import Problem
 from configs.plugins import PluginError
 from configs.scenario import Scenario
@@ -67,12 +67,11 @@ def drive_problems(scenario: Scenario) -> Iterator[Problem]:
 def _protocol(drive: Drive) -> Iterator[Problem]:
     """The protocol exists, and its own keys are right."""
     try:
-        options_of(drive)
+        choice_of(drive)
     except ValidationError as error:
         for item in error.errors(include_url=False):
             key = ".".join(map(str, ("drive", "options", *item["loc"])))
-            unknown = item["type"] == "unexpected_keyword_argument"
-            yield Problem(key, item["input"], "unknown key" if unknown else remedy_of(item))
+            yield Problem(key, item["input"], remedy_of(item))
     except PluginError as error:
         yield Problem("drive.protocol", drive.protocol, str(error))
 

@@ -22,7 +22,7 @@ from configs.brief import (
     WireModel,
 )
 from configs.curves import formation_offset, reference_path
-from configs.drives import options_of
+from configs.drives import choice_of
 from configs.parameters import extended
 from configs.reach import Reach, reach_of
 from configs.scenario import Scenario
@@ -122,7 +122,7 @@ def _drive_link(scenario: Scenario, robot: sections.Robot, drive: DriveModel) ->
     if encoder_age_s is None:
         encoder_age_s = max(ENCODER_AGE_LIMIT_S, 10 * scenario.clock.control_period_s)
     return DriveLink(
-        protocol=drive.protocol,
+        choice=drive.choice,
         right_node=scenario.nodes_of(robot.name)[0],
         left_node=scenario.nodes_of(robot.name)[1],
         encoder_period_ns=drive.encoder_period_ns,
@@ -132,7 +132,6 @@ def _drive_link(scenario: Scenario, robot: sections.Robot, drive: DriveModel) ->
         encoder_age_limit_ns=round(encoder_age_s * 1e9),
         heartbeat_age_limit_ns=round(host.heartbeat_age_limit_s * 1e9),
         mounting=scenario.mounting_of(robot),
-        own=drive.own,
     )
 
 
@@ -254,7 +253,7 @@ def _drive_model(scenario: Scenario, number: int) -> DriveModel:
         watchdog_ns=_ns(drive.watchdog_s),
         boot_ns=_ns(drive.boot_s),
         calibration_ns=_ns(drive.calibration_s),
-        own=options_of(drive),
+        choice=choice_of(drive),
     )
 
 

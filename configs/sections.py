@@ -11,6 +11,7 @@ from annotated_types import Ge, Gt, Le, Len
 
 from configs import patterns
 from configs.choices import Changes, Chooser
+from configs.drives import ProtocolName
 from configs.parameters import (
     MOST_S,
     Finite,
@@ -223,7 +224,9 @@ class Bus(Parameters):
 class Drive(Parameters):
     """The drives, two per robot."""
 
-    protocol: str = parameter("odrive", "odrive, or module:ROW of a protocol of your own")
+    protocol: ProtocolName = parameter(
+        ProtocolName("odrive"), "odrive, or module:ROW of a protocol of your own"
+    )
     options: dict[str, str | int | float | bool] = field(
         default_factory=dict,
         hash=False,

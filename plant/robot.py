@@ -49,7 +49,7 @@ class EmulatedRobot:
     )
 
     def __init__(self, brief: RobotBrief) -> None:
-        node = protocol(brief.drive.protocol).node
+        node = protocol(brief.drive.choice.plugin).node
         self.brief = brief
         self._body = RigidBody(brief.body, brief.disturbance)
         self._right = node(brief.drive, brief.right_node, brief.drive.serial_number)

@@ -5,19 +5,20 @@ wheel, and what tools know of the protocol.
 """
 
 from bridge.drives.interface import DriveProtocol
-from configs.drives import DRIVES, load
+from configs.drives import DRIVES
+from configs.plugins import Kind, Plugin, find, load
 
 
-def protocol(name: str) -> DriveProtocol:
+def protocol(plugin: Plugin) -> DriveProtocol:
     """The protocol of a scenario's `drive.protocol`.
 
     Raises:
-        ScenarioError: there is none of that name.
+        PluginError: its module fails, or has no such row.
     """
-    found: DriveProtocol = load(name)
+    found: DriveProtocol = load(plugin)
     return found
 
 
 def protocols() -> list[DriveProtocol]:
     """All protocols that are shipped."""
-    return [protocol(name) for name in DRIVES]
+    return [protocol(find(Kind.DRIVE, name, "", DRIVES)) for name in DRIVES]

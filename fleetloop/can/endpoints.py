@@ -15,8 +15,8 @@ from bridge.can_bus.pythoncan import to_frame, to_message
 from bridge.drives import protocol
 from bridge.drives.interface import EndpointFile, Versions
 from bridge.process.clock import SYSTEM_CLOCK
+from configs.drives import ODRIVE
 from configs.errors import ExitStatus, InfrastructureError, ScenarioError
-from configs.sections import Drive
 from fleetloop.can.client import open_bus
 from fleetloop.terminal import note, say
 
@@ -77,7 +77,7 @@ def ask(bus: FleetloopBus, name: str, within_s: float) -> Versions:
 
 
 def _file() -> EndpointFile:
-    found = protocol(Drive().protocol).endpoints
+    found = protocol(ODRIVE.plugin).endpoints
     if found is None:
-        raise ScenarioError(f"drives of protocol {Drive().protocol} have no file of endpoints")
+        raise ScenarioError(f"drives of protocol {ODRIVE.name} have no file of endpoints")
     return found

@@ -40,7 +40,7 @@ def bus_messages(robots: Iterable[RobotBrief], period_ns: int) -> list[Message]:
     messages = []
     for robot in robots:
         mounting = robot.mounting
-        cyclic_messages = protocol(robot.drive.protocol).cyclic_messages
+        cyclic_messages = protocol(robot.drive.choice.plugin).cyclic_messages
         for node, sign in (
             (robot.right_node, mounting.right_sign),
             (robot.left_node, mounting.left_sign),

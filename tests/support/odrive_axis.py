@@ -12,7 +12,6 @@ from configs.brief import DriveModel
 MS = 1_000_000
 NODE = 3
 MODEL = DriveModel(
-    protocol="odrive",
     torque_constant_N_m_A=0.05,
     current_limit_A=10.0,
     velocity_limit_shaft_rev_s=10.0,

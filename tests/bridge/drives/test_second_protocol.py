@@ -10,6 +10,7 @@ from bridge.process.lifecycle import Stop
 from configs.brief import NetworkLink
 from configs.errors import ScenarioError
 from configs.loading import load
+from configs.plugins import Kind, find
 from configs.resolve import agent_brief, leader_brief, plant_brief, robot_briefs
 from configs.signals import PLANT_SIGNALS
 from fleetloop.can.census import Census, Node
@@ -78,8 +79,14 @@ def test_its_section_is_checked_where_it_stands() -> None:
         load("two_robots", (f"drive.protocol='{OWN}'", "drive.options.torque_unit_shaft_N_m=-1.0"))
     with pytest.raises(ScenarioError, match=r"drive\.options\.unit.*unknown key"):
         load("two_robots", (f"drive.protocol='{OWN}'", "drive.options.unit=1.0"))
-    with pytest.raises(ScenarioError, match=r"drive\.options\.unit.*unknown key"):
+    with pytest.raises(ScenarioError, match=r"drive\.options\.unit.*unknown key$"):
         load("two_robots", ("drive.options.unit=1.0",))
+
+
+def test_an_unknown_key_of_it_is_told_with_the_known_ones() -> None:
+    known = r"did you mean torque_unit_shaft_N_m\? \(known here: torque_unit_shaft_N_m\)"
+    with pytest.raises(ScenarioError, match=rf"drive\.options\.torque_unit.*unknown key; {known}"):
+        load("two_robots", (f"drive.protocol='{OWN}'", "drive.options.torque_unit_N_m=1.0"))
 
 
 @pytest.mark.parametrize(
@@ -126,7 +133,8 @@ def test_its_options_load_and_decoder_hang_on_the_row(monkeypatch) -> None:
     monkeypatch.setattr(configs.drives, "DRIVES", {"plain": OWN})
     monkeypatch.setattr("bridge.drives.DRIVES", configs.drives.DRIVES)
     assert [row.words(Frame(0x105, bytes(8))) for row in protocols()] == ["plain node 5"]
-    assert protocol("plain") is protocol(OWN)
+    plain, own = (find(Kind.DRIVE, name, "", configs.drives.DRIVES) for name in ("plain", OWN))
+    assert protocol(plain) is protocol(own)
     census = Census(1_000_000)
     census.count(Frame(0x105, bytes(8)), 0)
     assert census.nodes == [Node(5, "ON", "")]

@@ -13,6 +13,7 @@ from bridge.drives.odrive.frames import AxisError, AxisState, Command, identifie
 from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import EFF, ERR, RTR, Frame
 from configs.brief import DriveLink, DriveModel, NetworkLink
+from configs.drives import ODRIVE
 from configs.loading import load
 from configs.resolve import plant_brief
 from configs.sections import Mounting
@@ -26,7 +27,7 @@ MODEL = replace(
     encoder_period_ns=1 * MS,
     watchdog_ns=100 * MS,
 )
-LINK = DriveLink("odrive", 0, 1, 1 * MS, 10.0, 10.0, Mounting())
+LINK = DriveLink(ODRIVE, 0, 1, 1 * MS, 10.0, 10.0, Mounting())
 
 
 class Robot:

@@ -15,10 +15,10 @@ from bridge.drives.odrive.frames import AxisError, Command
 from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import RTR, Frame
 from configs.brief import DriveLink, DriveModel
+from configs.drives import ODRIVE
 from configs.sections import Mounting
 
 MODEL = DriveModel(
-    protocol="odrive",
     torque_constant_N_m_A=0.05,
     current_limit_A=10.0,
     velocity_limit_shaft_rev_s=10.0,
@@ -32,7 +32,7 @@ MODEL = DriveModel(
     zero_torque_on_disarm=False,
     serial_number=0x3858_0000_0000,
 )
-LINK = DriveLink("odrive", 0, 1, 1_000_000, 10.0, 10.0, Mounting())
+LINK = DriveLink(ODRIVE, 0, 1, 1_000_000, 10.0, 10.0, Mounting())
 
 
 @cache
