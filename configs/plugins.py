@@ -219,6 +219,7 @@ def _law_fault(law: Any) -> str | None:
     missing = [name for name in ("Gains", "SIGNALS", "step", "hold") if not hasattr(found, name)]
     if not isinstance(law, type):
         return "it is no class"
+    missing += [name for name in ("step",) if name not in missing and _is_of_protocol(law, name)]
     if missing:
         return f"it has no {', no '.join(missing)} (see agents.laws.interface.Law)"
     fault = _parameters_fault(found.Gains)
@@ -227,6 +228,12 @@ def _law_fault(law: Any) -> str | None:
     if "law" in found.Gains.__dataclass_fields__:
         return "its Gains: law is the key that names the law; choose another name"
     return signals_fault(found.SIGNALS)
+
+
+def _is_of_protocol(law: type, name: str) -> bool:
+    """Whether a class has a method only as the empty one of a protocol."""
+    owner = next((base for base in law.__mro__ if name in vars(base)), None)
+    return owner is not None and getattr(owner, "_is_protocol", False)
 
 
 def _shape_fault(found: Any) -> str | None:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from agents.laws.dsc_terms import path_errors
-from agents.laws.failure import LawError, failure
+from agents.laws.failure import LawError, failure, number
 from agents.laws.interface import (
     Law,
     LawOutput,
@@ -62,8 +62,8 @@ def _checked(law: Law, expected: int, *, adds: bool) -> BuiltLaw:
         out = law.step(state, motion, reference, along)
         try:
             right, left, after, signals = out
-            values = tuple(float(value) for value in signals)
-            right, left = float(right), float(left)
+            values = tuple(map(number, signals))
+            right, left = number(right), number(left)
         except (TypeError, ValueError) as error:
             raise LawError(
                 "step must return (tau_right, tau_left, state, signals), numbers but the state;"

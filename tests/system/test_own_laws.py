@@ -98,6 +98,7 @@ def test_a_record_is_read_without_the_files(own: Path) -> None:
         ("my_law.py", "import cos, hypot", "import coz, hypot", "my_law.py, line 4: ImportError"),
         ("my_law.py", "class State", "class class", ": invalid syntax"),
         ("my_law.py", "class Unicycle(Law)", "class Unicycle", "it has no hold"),
+        ("my_law.py", "def step(", "def stepp(", "Unicycle is no law: it has no step (see"),
         (
             "my_law.py",
             "parameter(0.2,",
@@ -167,6 +168,13 @@ def test_a_law_that_fails_stops_its_own_robots_and_no_other(own: Path, new: str,
     assert "STOPPED r3" not in done.stdout
     record = Record.open(own / "a/record.mcap")
     assert len(record.controller["r1"]) == len(record.controller["r3"]) == 1000
+
+
+def test_a_torque_in_a_text_is_no_number(own: Path) -> None:
+    replaced(own, "my_law.py", "LawOutput(push + turn", "LawOutput(str(push + turn)")
+    done = fleetloop(own, "check", "own.toml")
+    assert done.returncode == 1
+    assert "step must return (tau_right, tau_left, state," in " ".join(done.stdout.split())
 
 
 def test_a_law_that_asks_for_no_number_stops_its_robot(own: Path) -> None:
