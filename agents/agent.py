@@ -243,7 +243,7 @@ class Agent:
         try:
             reference = self._path(s)
             out = self._law_step(self._law_state, motion, reference, along)
-        except Exception as error:  # any error of a law or path stops this robot only
+        except (Exception, SystemExit) as error:  # any end of a law or path stops this robot only
             reference, signals = _NO_REFERENCE, self._no_signals
             how, why = failure(error)
             frames = guard.command(tick, nan, nan, f"{how} at s = {s:.4g} m: {why}")

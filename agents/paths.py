@@ -179,7 +179,7 @@ def _own(choice: Choice) -> _Curve:
     def jet_at(s: float) -> PlanarJet:
         try:
             given = jet(s)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise ShapeError(f"{name}: {raised(error)}") from error
         try:
             x, y = given

@@ -158,7 +158,7 @@ def _module(plugin: Plugin, name: str) -> ModuleType:
         raise PluginError(_raised(error)) from error
     except PluginError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise PluginError(_raised(error)) from error
 
 

@@ -43,7 +43,7 @@ def build(choice: Choice, wheels: Wheels, period_s: float, path: RobotPath) -> B
     kind = choice.load()
     try:
         law: Law = kind(choice.parameters, wheels, period_s, path)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ScenarioError(f"control.law = {choice.name}: {failure(error)[1]}") from error
     if choice.name in LAWS:
         return BuiltLaw(law.step, law.hold, len(kind.SIGNALS))
@@ -80,7 +80,7 @@ def _checked(law: Law, expected: int, *, adds: bool) -> BuiltLaw:
         nonlocal failed
         try:
             return law.hold(before, after)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             failed = f"in hold: {failure(error)[1]}"
             return before
 

@@ -82,7 +82,7 @@ def _start(scenario: Scenario, robot: Robot, ahead: Forecast, number: int, ticks
         motion = RobotMotion(state.x, state.y, state.theta, state.v, state.omega)
         try:
             out = law.step(memory, motion, path(along[0]), PathVariable(*along))
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             how, why = failure(error)
             seen.diverged_at_s, seen.failed = tick * h, f"{how}: {why}"
             return seen

@@ -170,6 +170,15 @@ def test_a_law_that_fails_stops_its_own_robots_and_no_other(own: Path, new: str,
     assert len(record.controller["r1"]) == len(record.controller["r3"]) == 1000
 
 
+@pytest.mark.parametrize("where", ["dx, dy = ", "self.gains, self."])
+def test_a_law_that_exits_has_failed_and_ends_no_check(own: Path, where: str) -> None:
+    replaced(own, "my_law.py", where, "import sys\n        sys.exit(3)\n        " + where)
+    done = fleetloop(own, "check", "own.toml")
+    assert done.returncode in (1, 2)
+    assert "SystemExit: 3" in " ".join((done.stdout + done.stderr).split())
+    assert "Traceback" not in done.stderr
+
+
 def test_a_torque_in_a_text_is_no_number(own: Path) -> None:
     replaced(own, "my_law.py", "LawOutput(push + turn", "LawOutput(str(push + turn)")
     done = fleetloop(own, "check", "own.toml")
