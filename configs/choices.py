@@ -11,7 +11,7 @@ validation: {"folder": ...}; {"recorded": True} takes classes that aren't here a
 
 import contextlib
 import difflib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -63,7 +63,16 @@ class Chooser(NamedTuple):
             if recorded:
                 return Choice(Plugin(self.kind, name, name), Recorded(tuple(rest.items())))
             raise _stated(self.key, name, str(error)) from error
-        return Choice(plugin, validated(parameters, rest))
+        return Choice(plugin, validated(parameters, rest, lambda key: self._of_another(key, name)))
+
+    def _of_another(self, key: str, name: str) -> str:
+        """What to do about a key that shipped classes have and the class `name` hasn't."""
+        owners = [
+            other
+            for other in self.shipped
+            if hasattr(parameters_of(find(self.kind, other, "", self.shipped)), key)
+        ]
+        return f": {name} doesn't have this gain of {owners[0]}; delete it" if owners else ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: "GetCoreSchemaHandler") -> Any:
         """Tables become choices, and are written as tables."""
@@ -289,8 +298,12 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def validated(parameters: type[Parameters], table: Mapping[str, Any]) -> Parameters:
-    """The parameters that a table's keys make.
+def validated(
+    parameters: type[Parameters],
+    table: Mapping[str, Any],
+    hint: Callable[[str], str] = lambda _: "",
+) -> Parameters:
+    """The parameters that a table's keys make; `hint`: what to do about an unknown key.
 
     Raises:
         ValidationError: of the keys; an unknown one is told with those that are known.
@@ -298,7 +311,9 @@ def validated(parameters: type[Parameters], table: Mapping[str, Any]) -> Paramet
     from pydantic import ValidationError
 
     known = sorted(one.name for one in fields(parameters))  # type: ignore[arg-type]
-    wrong = [_unknown(key, value, known) for key, value in table.items() if key not in known]
+    wrong = [
+        _unknown(key, value, known, hint(key)) for key, value in table.items() if key not in known
+    ]
     made: Parameters | None = None
     try:
         made = _adapter(parameters).validate_python(
@@ -325,9 +340,10 @@ def _again(item: Any) -> "InitErrorDetails":
     return made
 
 
-def _unknown(key: str, value: object, known: list[str]) -> "InitErrorDetails":
+def _unknown(key: str, value: object, known: list[str], hint: str) -> "InitErrorDetails":
     close = difflib.get_close_matches(key, known, 1)
-    hint = f"; did you mean {close[0]}?" if close else ""
+    if close and not hint:
+        hint = f"; did you mean {close[0]}?"
     remedy = f"unknown key{hint} (known here: {', '.join(known)})" if known else "unknown key"
     from pydantic_core import InitErrorDetails
 

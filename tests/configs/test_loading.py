@@ -47,6 +47,17 @@ def test_the_scenarios_that_the_paper_needs_are_shipped() -> None:
     assert needed <= set(shipped())
 
 
+def test_gains_that_another_law_has_are_to_be_deleted() -> None:
+    with pytest.raises(ScenarioError) as refused:
+        load("paper", ["control.law='fixed_dsc'"])
+    lines = str(refused.value).splitlines()
+    assert [line.split(" = ")[0] for line in lines] == [
+        f"paper.toml: control.{key}" for key in ("k5", "eta", "rho")
+    ]
+    for line in lines:
+        assert "fixed_dsc doesn't have this gain of adaptive_dsc; delete it" in line
+
+
 def test_the_paper_scenario_has_the_numbers_of_section_4() -> None:
     paper = load("paper")
     assert [(r.pose.x_m, r.pose.y_m) for r in paper.robot] == [

@@ -46,6 +46,15 @@ def test_the_experiment_settles_as_the_theory_says(name: str, tmp_path: Path) ->
 ON_PATH = 'expect=[{signal="y_e_m", from_s=10.0, max_abs=0.05}]'
 
 
+@pytest.mark.parametrize(("name", "x_e_mm"), [("paper_fixed", 2.0), ("paper_backstepping", 0.0)])
+def test_the_baselines_hold_the_papers_expectations(
+    name: str, x_e_mm: float, tmp_path: Path
+) -> None:
+    summary = run(name, tmp_path / "run")
+    assert summary["verdict"] == "held"
+    assert 1e3 * summary["worst"]["final_max"]["x_e_m"] == pytest.approx(x_e_mm, abs=0.1)
+
+
 @pytest.mark.parametrize(
     ("name", "overrides"),
     [
