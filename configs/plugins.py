@@ -73,8 +73,15 @@ class Plugin:
     folder: str = ""  # where the module is looked for first; "" is nowhere
 
 
-def find(kind: Kind, name: str, folder: str, shipped: Mapping[str, str]) -> Plugin:
-    """Where a name leads.
+def find(
+    kind: Kind,
+    name: str,
+    folder: str,
+    shipped: Mapping[str, str],
+    *,
+    place: str = "beside the scenario",
+) -> Plugin:
+    """Where a name leads; `place` is the folder in words.
 
     Raises:
         PluginError: nowhere.
@@ -93,7 +100,7 @@ def find(kind: Kind, name: str, folder: str, shipped: Mapping[str, str]) -> Plug
     hint = f"; did you mean {close[0]}?" if close else ""
     raise PluginError(
         f"no such {kind.word}{hint} (known: {', '.join(known)}; one of your own is"
-        f' "{kind.form}", from module.py beside the scenario)'
+        f' "{kind.form}", from module.py {place})'
     )
 
 

@@ -5,8 +5,7 @@ wheel, and what tools know of the protocol.
 """
 
 from bridge.drives.interface import DriveProtocol
-from configs.drives import DRIVES
-from configs.plugins import Kind, Plugin, find, load
+from configs.plugins import Plugin, load
 
 
 def protocol(plugin: Plugin) -> DriveProtocol:
@@ -17,8 +16,3 @@ def protocol(plugin: Plugin) -> DriveProtocol:
     """
     found: DriveProtocol = load(plugin)
     return found
-
-
-def protocols() -> list[DriveProtocol]:
-    """All protocols that are shipped."""
-    return [protocol(find(Kind.DRIVE, name, "", DRIVES)) for name in DRIVES]

@@ -16,6 +16,14 @@ app = typer.Typer(
 )
 
 BusArg = Annotated[str, typer.Argument(metavar="BUS", help="A live bus, e.g. r1.")]
+ProtocolOption = Annotated[
+    str,
+    typer.Option(
+        "--protocol",
+        metavar="NAME",
+        help="Drive protocol to decode: odrive, or module:ROW of a module in the current folder.",
+    ),
+]
 
 
 @app.command("list")
@@ -27,12 +35,15 @@ def list_(
     bit_rate: Annotated[
         int, typer.Option("--bitrate", min=1, metavar="BIT/S", help="Bit rate that load refers to.")
     ] = 1_000_000,
+    protocol: ProtocolOption = "odrive",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """List the live buses, by run: clients, nodes, frame rate, load."""
     from fleetloop.can.listing import list_buses
 
-    raise typer.Exit(list_buses(seconds=seconds, bit_rate=bit_rate, as_json=as_json))
+    raise typer.Exit(
+        list_buses(seconds=seconds, bit_rate=bit_rate, as_json=as_json, protocol_name=protocol)
+    )
 
 
 @app.command()
@@ -65,12 +76,14 @@ def dump(
             help="End after this time without a frame.",
         ),
     ] = None,
-    decode: Annotated[bool, typer.Option("--decode", help="Decode CANSimple frames.")] = False,
+    decode: Annotated[bool, typer.Option("--decode", help="Decode frames of drives.")] = False,
+    protocol: ProtocolOption = "odrive",
     ascii_too: Annotated[bool, typer.Option("-a", help="Print data as characters too.")] = False,
     explain_errors: Annotated[bool, typer.Option("-e", help="Explain error frames.")] = False,
     nanoseconds: Annotated[bool, typer.Option("-N", help="Timestamps with nanoseconds.")] = False,
 ) -> None:
     """Print the frames on buses, as candump does."""
+    from fleetloop.can.decoder import protocol_of
     from fleetloop.can.dump import DumpOptions
     from fleetloop.can.dump import dump as dump_buses
 
@@ -81,6 +94,7 @@ def dump(
         ascii_too=ascii_too,
         explain_errors=explain_errors,
         decode=decode,
+        drives=protocol_of(protocol),
         count=count,
         silence_s=None if silence_ms is None else silence_ms / 1e3,
     )

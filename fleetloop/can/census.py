@@ -9,10 +9,11 @@ Bus time is the scenario's: in lockstep it passes faster or slower than the wall
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from bridge.drives import protocols
-from bridge.drives.interface import NodeSeen
+from bridge.drives import protocol
+from bridge.drives.interface import DriveProtocol
 from bridge.frame import ERR, Frame
 from bridge.wire.bits import frame_bits
+from configs.drives import ODRIVE
 
 ERROR_FRAME_BITS = 20
 
@@ -31,9 +32,11 @@ class Census:
     """Counts the frames of one bus."""
 
     bit_rate: int
+    drives: DriveProtocol = field(default_factory=lambda: protocol(ODRIVE.plugin))
+    """The protocol whose nodes are counted."""
     frames: int = 0
     error_frames: int = 0
-    other_frames: int = 0  # of no drive protocol
+    other_frames: int = 0  # of other protocols
     _bits: int = 0
     _first_ns: int = -1
     _last_ns: int = -1
@@ -54,7 +57,7 @@ class Census:
         self._last_ns = max(self._last_ns, stamp_ns)
         if frame.can_id & ERR:
             self.error_frames += 1
-        elif (seen := _seen(frame)) is None:
+        elif (seen := self.drives.node_seen(frame)) is None:
             self.other_frames += 1
         elif seen.state or seen.node not in self._nodes:
             self._nodes[seen.node] = Node(*seen)
@@ -85,8 +88,3 @@ class Census:
     def nodes(self) -> Sequence[Node]:
         """Nodes that sent frames or were sent some, by number."""
         return [self._nodes[number] for number in sorted(self._nodes)]
-
-
-def _seen(frame: Frame) -> NodeSeen | None:
-    """The node that a frame concerns, by the first protocol that knows it."""
-    return next(filter(None, (row.node_seen(frame) for row in protocols())), None)

@@ -12,14 +12,16 @@ import io
 import sys
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from typing import TextIO
 
 from bridge.can_bus import sockets
-from bridge.drives import protocols
+from bridge.drives import protocol
+from bridge.drives.interface import DriveProtocol
 from bridge.frame import EFF, Frame
 from bridge.process.clock import SYSTEM_CLOCK
+from configs.drives import ODRIVE
 from configs.errors import ExitStatus, ScenarioError
 from fleetloop.can import error_frames, filters, text
 from fleetloop.can.client import Heard, Listener, open_bus
@@ -42,6 +44,8 @@ class DumpOptions:
     ascii_too: bool = False
     explain_errors: bool = False
     decode: bool = False
+    drives: DriveProtocol = field(default_factory=lambda: protocol(ODRIVE.plugin))
+    """The protocol that `decode` knows."""
     count: int | None = None
     silence_s: float | None = None
 
@@ -114,7 +118,7 @@ class Printer:
     def _with_words(self, shown: str, frame: Frame) -> str:
         if self._options.explain_errors:
             shown += "".join(f"\n\t{line}" for line in error_frames.explain(frame))
-        if self._options.decode and (said := _words(frame)):
+        if self._options.decode and (said := self._options.drives.words(frame)):
             columns = text.long_columns(indent=self._indent)
             shown = f"{shown:<{columns}}   {said}"
         return shown
@@ -207,8 +211,3 @@ def _descriptor(stream: TextIO) -> int | None:
         return stream.fileno()
     except (io.UnsupportedOperation, ValueError):
         return None
-
-
-def _words(frame: Frame) -> str:
-    """A frame in words, by the first drive protocol that knows it; "" if none does."""
-    return next(filter(None, (row.words(frame) for row in protocols())), "")

@@ -11,10 +11,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from bridge.can_bus import sockets
+from bridge.drives.interface import DriveProtocol
 from bridge.process.clock import SYSTEM_CLOCK
+from configs.drives import ODRIVE
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.census import Census, Node
 from fleetloop.can.client import Listener, open_bus
+from fleetloop.can.decoder import protocol_of
 from fleetloop.signals import interruptible
 from fleetloop.terminal import note, say
 
@@ -40,10 +43,17 @@ class BusReport:
 
 
 @interruptible
-def list_buses(*, seconds: float, bit_rate: int, as_json: bool) -> int:
-    """Listen to all buses for `seconds` and print what there is; return the exit status."""
+def list_buses(
+    *, seconds: float, bit_rate: int, as_json: bool, protocol_name: str = ODRIVE.name
+) -> int:
+    """Listen to all buses for `seconds` and print what there is; return the exit status.
+
+    Raises:
+        ScenarioError: there is no such protocol.
+    """
+    drives = protocol_of(protocol_name)
     try:
-        reports = survey(seconds, bit_rate)
+        reports = survey(seconds, bit_rate, drives)
     except KeyboardInterrupt:
         return ExitStatus.INTERRUPTED
     if as_json:
@@ -58,7 +68,7 @@ def list_buses(*, seconds: float, bit_rate: int, as_json: bool) -> int:
     return ExitStatus.OK
 
 
-def survey(seconds: float, bit_rate: int) -> list[BusReport]:
+def survey(seconds: float, bit_rate: int, drives: DriveProtocol) -> list[BusReport]:
     """Listen to all buses at once; one that doesn't answer costs a little more time."""
     clients = connections(Path("/proc/net/unix"))  # before this process adds its own
     paths = sockets.live_buses()
@@ -70,7 +80,7 @@ def survey(seconds: float, bit_rate: int) -> list[BusReport]:
                 buses[str(path)] = opened.enter_context(open_bus(str(path), batched=True))
             except InfrastructureError as error:
                 problems[str(path)] = str(error)
-        census = {name: Census(bit_rate) for name in buses}
+        census = {name: Census(bit_rate, drives) for name in buses}
         with Listener(buses) as listener:
             listener.listen(0.0)  # what gathered while the others were opened
             start = SYSTEM_CLOCK.monotonic_s()

@@ -4,7 +4,7 @@ import pytest
 from support.second_drive.tools import PlainSection
 
 import configs.drives
-from bridge.drives import protocol, protocols
+from bridge.drives import protocol
 from bridge.frame import Frame
 from bridge.process.lifecycle import Stop
 from configs.brief import NetworkLink
@@ -131,10 +131,9 @@ def test_its_options_load_and_decoder_hang_on_the_row(monkeypatch) -> None:
     messages = bus_messages([robot], 1_000_000)
     assert sorted(message.can_id for message in messages) == [0x100, 0x101, 0x200, 0x201]
     monkeypatch.setattr(configs.drives, "DRIVES", {"plain": OWN})
-    monkeypatch.setattr("bridge.drives.DRIVES", configs.drives.DRIVES)
-    assert [row.words(Frame(0x105, bytes(8))) for row in protocols()] == ["plain node 5"]
     plain, own = (find(Kind.DRIVE, name, "", configs.drives.DRIVES) for name in ("plain", OWN))
     assert protocol(plain) is protocol(own)
-    census = Census(1_000_000)
+    assert protocol(own).words(Frame(0x105, bytes(8))) == "plain node 5"
+    census = Census(1_000_000, protocol(own))
     census.count(Frame(0x105, bytes(8)), 0)
     assert census.nodes == [Node(5, "ON", "")]

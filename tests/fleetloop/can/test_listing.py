@@ -9,6 +9,7 @@ import can
 
 from bridge.can_bus import sockets
 from bridge.frame import Frame
+from fleetloop.can.decoder import protocol_of
 from fleetloop.can.listing import connections, list_buses, survey
 
 HEARTBEAT = Frame(0x001, bytes.fromhex("0000000008000000"))
@@ -27,7 +28,7 @@ def test_it_hears_rate_and_nodes_and_counts_clients(buses, in_background) -> Non
         buses.await_clients(1)
         in_background(talk)
         try:
-            first, second = survey(0.3, 1_000_000)
+            first, second = survey(0.3, 1_000_000, protocol_of("odrive"))
         finally:
             over.set()
     assert (first.run, first.bus, first.clients) == ("run", "r1", 1)
