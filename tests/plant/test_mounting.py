@@ -20,7 +20,8 @@ def driven(*overrides: str) -> tuple[tuple[float, ...], tuple[float, ...], Emula
     """What the host reads, what is recorded, and the robot, after 0.1 s of torque."""
     scenario = load("two_robots", overrides)
     robot = emulated_robot(plant_brief(scenario, network=NETWORK).robots[0])
-    client = protocol("odrive").client(agent_brief(scenario, "r1", network=NETWORK, bus=()).drives)
+    link = agent_brief(scenario, "r1", network=NETWORK, bus=()).drives
+    client = protocol(link.choice.plugin).client(link)
     for frame in (*client.torque(0.2, 0.1), *CLOSE):
         robot.on_frame(frame, 0)
     for k in range(50):
