@@ -25,6 +25,7 @@ What a program doesn't read is kept for it within bounds; what is lost beyond th
 """
 
 import errno
+import inspect
 import logging
 import socket
 from collections import deque
@@ -106,7 +107,10 @@ class FleetloopBus(can.BusABC):
     ) -> None:
         remote = {key: as_option(kwargs.pop(key)) for key in OPTIONS if kwargs.get(key) is not None}
         if unknown := sorted(kwargs.keys() - _IGNORED - OPTIONS):
-            raise TypeError(f"the fleetloop interface has no option {', '.join(unknown)}")
+            known = ", ".join(sorted({*_KEYWORDS, *OPTIONS}))
+            raise TypeError(
+                f"the fleetloop interface has no option {', '.join(unknown)} (it has {known})"
+            )
         self.channel = options.channel_name(channel)
         if options.truth("fd", fd):
             raise can.CanInitializationError(f"bus {channel!r} is classic CAN: fd must be False")
@@ -346,3 +350,6 @@ class FleetloopBus(can.BusABC):
                 raise self._unsent(error) from error
             return
         raise can.CanOperationError(f"bus {self.channel!r}: transmit buffer full", errno.ENOBUFS)
+
+
+_KEYWORDS = frozenset(inspect.signature(FleetloopBus).parameters) - {"channel", "kwargs"}
