@@ -198,6 +198,7 @@ class ExternalBuses:
         try:
             fd = bus.fileno()
             self._epoll.register(fd, select.EPOLLIN)
+        # It has no descriptor, -1, or one that epoll doesn't take, such as a file's.
         except (NotImplementedError, OSError, ValueError):
             self._polled += 1
             return
@@ -239,7 +240,6 @@ class ExternalBuses:
             except ValueError:
                 counters.garbage += 1
                 continue
-            frame = to_frame(message)
             if attachment.echoes is not None and attachment.echoes.is_echo(
                 frame, self._clock.monotonic_s()
             ):
