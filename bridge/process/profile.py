@@ -15,6 +15,7 @@ SAMPLE_S = 0.002
 PARTS = ("bus", "drives", "law", "plant", "Zenoh", "record", "other")
 _PLACES = (
     ("/bridge/can_bus/", "bus"),
+    ("/bridge/wire/", "bus"),
     ("/site-packages/can/", "bus"),
     ("/bridge/drives/", "drives"),
     ("/bridge/network/telemetry.py", "record"),
