@@ -105,9 +105,8 @@ class Denials:
 
     def notes(self) -> list[str]:
         """All refusals so far, each with its count if it is more than one."""
-        return [
-            f"{text} ({count} times)" if count > 1 else text for text, count in self._counts.items()
-        ]
+        counts = list(self._counts.items())  # at once: the log's thread may add to them
+        return [f"{text} ({count} times)" if count > 1 else text for text, count in counts]
 
     def news(self) -> list[str]:
         """The kinds of refusals that are new since the last call."""
