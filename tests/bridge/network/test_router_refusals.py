@@ -12,7 +12,7 @@ from support.certificates import certificates
 from bridge.network.router_refusals import MOST, Denials
 
 PROLOGUE = """
-import socket, sys, time
+import socket, sys, threading, time
 from pathlib import Path
 from bridge.network import access
 from bridge.network import keys
@@ -49,10 +49,15 @@ def denied(user, word, certificate=None):
     except InfrastructureError:
         pass
 
-def said_last(link):
-    time.sleep(0.1)  # the log's reader looks a little later
-    for note in link.denials.notes():
+def said(router):  # after its end: then all of its log has been read
+    for note in router.denials.notes():
         print(note)
+
+def until(holds):
+    pause, deadline = threading.Event(), time.monotonic() + 10.0
+    while not holds():
+        assert time.monotonic() < deadline
+        pause.wait(0.005)
 """
 LOGINS = """
 with open_router(None, plan, folder, outside) as router:
@@ -60,8 +65,8 @@ with open_router(None, plan, folder, outside) as router:
     denied("a\\x1b[31mb", "wrong")
     with login("agent-r2", "two"):
         pass
-    said_last(router)
-    print(router.denials.logins_of("agent-r1"))
+said(router)
+print(router.denials.logins_of("agent-r1"))
 """
 PUTS = """
 with open_router(None, plan, folder, outside) as router:
@@ -75,7 +80,7 @@ with open_router(None, plan, folder, outside) as router:
         while router.receive(0.05) is None:
             own.put(b"honest")
         own.put(b"honest")
-    said_last(router)
+said(router)
 """
 CERTIFICATES = """
 with open_router(None, plan, folder, outside) as router:
@@ -88,7 +93,7 @@ with open_router(None, plan, folder, outside) as router:
         while (heard := router.receive(0.05)) is None:
             mouth.put(b"by r2")
         assert heard.payload == b"by r2"
-    said_last(router)
+said(router)
 """
 
 
@@ -180,16 +185,16 @@ def test_no_line_whatever_breaks_the_reader_and_what_it_keeps_is_bounded() -> No
 FLOODS = """
 with open_router(None, plan, folder, outside) as router:
     with login("agent-r1", "one"):
-        time.sleep(0.1)
+        until(lambda: router.denials.peers("agent-r1"))
     router.denials.note_flood("agent-r1", "127.0.0.1:1")
     with login("agent-r1", "one") as again, login("agent-r2", "two") as other:
         for robot in ("r1", "r2"):
             router.subscribe(keys.path("t", robot), robot)
-        time.sleep(0.1)  # the log's reader looks a little later
+        until(lambda: any(note.startswith("turned away") for note in router.denials.notes()))
         again.publisher(keys.path("t", "r1")).put(b"flood")
         other.publisher(keys.path("t", "r2")).put(b"honest")
         print(router.receive(5.0).tag, router.receive(0.3))
-    said_last(router)
+said(router)
 """
 
 
