@@ -6,6 +6,7 @@ from pathlib import Path
 import can
 import pytest
 from support.hub_running import Running
+from support.strangers import Serving
 
 
 @pytest.fixture(params=["local", "remote"])
@@ -34,3 +35,10 @@ def join(running: Running) -> Iterator[Callable[..., can.BusABC]]:
     yield open_bus
     for bus in buses:
         bus.shutdown()
+
+
+@pytest.fixture
+def serving(runtime_folder) -> Iterator[Serving]:
+    serving = Serving()
+    yield serving
+    serving.close()
