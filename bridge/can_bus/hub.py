@@ -117,7 +117,7 @@ class Hub:
     ) -> None:
         """Tell the clients of a bus with bit timing what ended on it until `stamp_ns`.
 
-        Paced clients hear it when they are `asked`: by name, "" asks all of them.
+        Synchronous clients hear it when they are `asked`: by name, "" asks all of them.
         """
         bus = self._buses[name]
         bus.stamp_ns = stamp_ns

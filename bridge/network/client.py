@@ -1,7 +1,7 @@
 """Client sessions: how a process connects to the router of its run.
 
 A refused login is reported at once; a router that isn't there yet is waited for. Zenoh names the
-reason of a refusal to peers only, so a refused client asks again as a peer (`login`).
+reason of a refusal to peers only, so a refused client asks again as a peer.
 """
 
 import zenoh

@@ -13,7 +13,7 @@ still be impossible: readers that know the run check that.
     Rows           [1, first_tick, length, rows, final]          robot/<name>/truth, telemetry
     Progress       [1, tick, t_ns, wall_ns]                      @progress/<process>
     Notice         [1, text]                                     @notice/<process>
-    Go             [1, epoch_ns]                                 @clock/go
+    Go             [1, epoch_ns, ticks]                          @clock/go
 """
 
 from typing import NamedTuple
