@@ -1,14 +1,13 @@
 """Paths and offsets as controllers evaluate them: sections as they are, splines as coefficients.
 
 Γ_0(s) and l_i(s) of equation (1). The launcher solves for the coefficients once for all
-controllers.
+controllers, which import this module for its types: numpy is loaded by the launcher only.
 """
 
 from dataclasses import dataclass
 
 from configs import paths
 from configs.plugins import Choice
-from configs.splines import Ends, chord_lengths, quintic_spline
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +46,8 @@ def reference_path(path: paths.PathShape) -> ReferencePath:
     """The centre's path as the controllers evaluate it."""
     if not isinstance(path, paths.Spline):
         return path
+    from configs.splines import Ends, chord_lengths, quintic_spline
+
     points = [*path.points_m, path.points_m[0]] if path.closed else list(path.points_m)
     knots = chord_lengths(points)
     ends: Ends = "periodic" if path.closed else "natural"
@@ -58,6 +59,8 @@ def formation_offset(offset: paths.Offset) -> FormationOffset:
     """A robot's place in the formation as its controller evaluates it."""
     if not isinstance(offset, paths.Varying):
         return offset
+    from configs.splines import quintic_spline
+
     knots = tuple(knot.s_m for knot in offset.knots)
     ahead = quintic_spline(knots, [knot.ahead_m for knot in offset.knots], "clamped")
     left = quintic_spline(knots, [knot.left_m for knot in offset.knots], "clamped")

@@ -120,7 +120,10 @@ def test_changes_have_the_same_keys_bounds_and_words_and_no_defaults() -> None:
     assert pickle.loads(pickle.dumps(heavier)) == heavier
 
 
-def test_a_process_needs_no_pydantic() -> None:
-    modules = "configs.sections, configs.host, configs.powertrain"
-    code = f"import sys, {modules}; assert 'pydantic' not in sys.modules"
+@pytest.mark.parametrize(
+    "modules",
+    ["configs.sections, configs.host, configs.powertrain", "agents.__main__", "plant.__main__"],
+)
+def test_a_process_needs_neither_pydantic_nor_numpy(modules: str) -> None:
+    code = f"import sys, {modules}; assert not {{'pydantic', 'numpy'}} & sys.modules.keys()"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=30)
