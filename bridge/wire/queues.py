@@ -13,6 +13,7 @@ by identifier (`TransmitFifoPriority = DISABLE`). Of equal identifiers the older
 frame that is on the wire keeps its place until it was sent, for it may have to be sent again.
 """
 
+from abc import ABC, abstractmethod
 from bisect import insort
 from typing import NamedTuple
 
@@ -34,7 +35,7 @@ class Entry(NamedTuple):
     bits: int  # on the wire, see `bits.frame_bits`
 
 
-class Queue:
+class Queue(ABC):
     """A transmit queue; `entries` are in the order in which they go to arbitration."""
 
     __slots__ = ("capacity", "entries")
@@ -45,9 +46,9 @@ class Queue:
         self.capacity = capacity
         self.entries: list[Entry] = []
 
+    @abstractmethod
     def push(self, entry: Entry) -> bool:
         """Take a frame, or return False: no room."""
-        raise NotImplementedError
 
     def sent(self, entry: Entry) -> None:
         """Forget a frame that was sent."""
