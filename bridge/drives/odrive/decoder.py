@@ -174,17 +174,10 @@ def _value(signal: Signal, raw: float) -> Value:
     if signal.name in _ERRORS:
         return Value(signal.name, odrive.error_names(odrive.AxisError(int(raw))), "")
     if signal.meaning is not None:
-        return Value(signal.name, _meaning(signal.meaning, int(raw)), "")
+        return Value(signal.name, odrive.name_of(signal.meaning, int(raw)), "")
     if signal.scale != 1.0:
         return Value(signal.name, raw * signal.scale, signal.unit)
     return Value(signal.name, raw & signal.bits if isinstance(raw, int) else raw, signal.unit)
-
-
-def _meaning(kind: type[IntEnum], raw: int) -> str:
-    try:
-        return kind(raw).name
-    except ValueError:
-        return str(raw)
 
 
 def node_seen(frame: Frame) -> NodeSeen | None:
@@ -196,5 +189,5 @@ def node_seen(frame: Frame) -> NodeSeen | None:
     if command != Command.HEARTBEAT or can_id & RTR or not data:
         return NodeSeen(node)
     heartbeat = odrive.decode_heartbeat(data)
-    state = _meaning(odrive.AxisState, heartbeat.state)
+    state = odrive.name_of(odrive.AxisState, heartbeat.state)
     return NodeSeen(node, state, odrive.error_names(heartbeat.errors))
