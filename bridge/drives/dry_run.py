@@ -6,12 +6,9 @@ the torque that the wrapped client would have sent.
 """
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
+from bridge.drives.interface import DriveClient, Motion
 from bridge.frame import Frame
-
-if TYPE_CHECKING:
-    from bridge.drives.interface import DriveClient
 
 _NOTHING: tuple[Frame, ...] = ()
 
@@ -19,13 +16,13 @@ _NOTHING: tuple[Frame, ...] = ()
 class DryRun:
     """The controller's end of two drives, receive only."""
 
-    def __init__(self, client: "DriveClient") -> None:
+    def __init__(self, client: DriveClient) -> None:
         self._client = client
         self.armed = False
         self.sent_wheel_N_m = (0.0, 0.0)
         self.on_frame: Callable[[int, bytes | bytearray, int], None] = client.on_frame
         self.feedback_since: Callable[[int], bool] = client.feedback_since
-        self.motion: Callable[[], tuple[float, float, float, float] | None] = client.motion
+        self.motion: Callable[[], Motion | None] = client.motion
         self.obstacle: Callable[[int], str | None] = client.obstacle
         self.refusal: Callable[[], str | None] = client.refusal
         self.fault: Callable[[int], str | None] = client.fault
