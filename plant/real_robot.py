@@ -16,19 +16,16 @@ _UNKNOWN = (nan,) * (len(PLANT_SIGNALS) - 4)
 class RealRobot:
     """The last pose of one real robot."""
 
-    __slots__ = ("_pose", "refused", "robot")
+    __slots__ = ("_pose", "robot")
 
     def __init__(self, robot: str, start: Pose) -> None:
         self.robot = robot
-        self.refused = 0
         self._pose = start.x_m, start.y_m, start.theta_rad
 
     def receive_pose(self, fix: PoseFix | None) -> None:
-        """Store a pose of the localisation system; count one beyond the world."""
-        if fix is None or not within_world(fix.x_m, fix.y_m, fix.theta_rad):
-            self.refused += 1
-            return
-        self._pose = fix.x_m, fix.y_m, fix.theta_rad
+        """Store a pose of the localisation system; one beyond the world is ignored."""
+        if fix is not None and within_world(fix.x_m, fix.y_m, fix.theta_rad):
+            self._pose = fix.x_m, fix.y_m, fix.theta_rad
 
     def row(self, t_s: float) -> tuple[float, ...]:
         """The signals of `configs.signals.PLANT_SIGNALS` at this instant."""

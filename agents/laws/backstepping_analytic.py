@@ -143,9 +143,6 @@ class BacksteppingAnalytic(Law):
         span = 2.0 * _STEP_M
         return (after[3] - before[3]) / span, (after[4] - before[4]) / span
 
-    def hold(self, before: None, after: None) -> None:
-        """Nothing is kept."""
-
     @classmethod
     def approach_rate_1_s(cls, gains: "BacksteppingAnalytic.Gains") -> float | None:
         """k_1 of (15)."""
