@@ -5,7 +5,7 @@ inherited file descriptors.
 """
 
 import socket
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
 
@@ -149,7 +149,8 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
         epoch_ns = _serve_until_go(brief, end, link, hellos, stop)
         settle_memory()
         missing_privileges = go_realtime(PLANT_PRIORITY)
-        record = partial(_record, link, others, rows[len(emulated) :], brief.schedule.period_s)
+        by_name = {other.robot: other for other in others}
+        record = partial(_record, link, by_name, rows[len(emulated) :], brief.schedule.period_s)
         wall = RealtimeLoop(
             brief, emulated, end, hub, poses, rows[: len(emulated)], say, taps, record
         )
@@ -250,16 +251,19 @@ def _serve_until_go(
 
 
 def _record(
-    link: Link, others: Sequence[RealRobot], rows: Sequence[RowBuffer], period_s: float, tick: int
+    link: Link,
+    others: Mapping[str, RealRobot],
+    rows: Sequence[RowBuffer],
+    period_s: float,
+    tick: int,
 ) -> None:
     """A row of each robot that isn't emulated."""
     if not others:
         return
-    robots = {other.robot: other for other in others}
     for arrival in waiting(link, ARRIVALS_PER_ROBOT * len(others)):
-        if (other := robots.get(arrival.tag)) is not None:
+        if (other := others.get(arrival.tag)) is not None:
             other.receive_pose(PoseFix.decode(arrival.payload))
-    for other, buffer in zip(others, rows, strict=True):
+    for other, buffer in zip(others.values(), rows, strict=True):
         buffer.add(tick, other.row(tick * period_s))
 
 
