@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.laws.adaptive_dsc import AdaptiveDsc, DscState
+from agents.laws.dsc_terms import Eight
 from agents.laws.interface import PathVariable, Reference, RobotMotion
 from configs.brief import Wheels
 from plant.body import RigidBody, State
@@ -46,13 +47,13 @@ class Loop:
     """Control periods for which a pose is held; 1 if odometry carries it on."""
     pose_delay: int
     """Control periods that a held pose is old when it comes."""
-    theta: tuple[float, ...]
+    theta: Eight
     """Θ̂ that is held: the start values, or `true_theta`."""
 
 
-def true_theta(body: RigidBody, damping: tuple[float, float]) -> tuple[float, ...]:
+def true_theta(body: RigidBody) -> Eight:
     """Θ of (32): (c b, d̄_11, d̄_12, m̄_1, c/b, d̄_21, d̄_22, m̄_2)."""
-    right, left = damping
+    right, left = body.damping_wheel_N_m_s
     mean, half = 0.5 * (right + left), 0.5 * (right - left)
     c, b = body.c, body.b
     return c * b, mean, b * half, body.mbar_1, c / b, half / b, mean, body.mbar_2
@@ -167,7 +168,7 @@ def _interval(loop: Loop, v_bar: float, omega_bar: float, s_dot: float, tick: in
             for r, left in deviation[8:size].reshape(-1, 2).tolist()
         )
         fix = at.in_world(-late_s, *deviation[size:].tolist())
-        memory = DscState(a_theta, v + a_v, omega + a_omega, *rows, 0.0)  # type: ignore[arg-type]
+        memory = DscState(a_theta, v + a_v, omega + a_omega, *rows, 0.0)
         pose = (x, y, theta)
         for n in range(periods):
             t = n * h

@@ -52,43 +52,26 @@ def sampling_findings(scenario: Scenario, courses: list[Course]) -> Iterator[Fin
     """Speed loop, channel and held poses of every robot; alike robots are computed once."""
     known: dict[tuple[object, ...], list[Finding]] = {}
     for course in courses:
-        robot = course.robot
-        if not is_adaptive_dsc(scenario.control_of(robot)):
-            gain = speed_gain(scenario.control_of(robot))
-            if gain is not None:
-                rate = scenario.clock.control_period_s, torque_delay_s(scenario)
-                finding = _speed_loop(
-                    gain,
-                    *rate,
-                    min(inertias(scenario.body_of(robot))),
-                    bounded=bool(limits(scenario, robot)),
-                )
-                yield replace(finding, robots=(robot.name,))
-            yield from _held_pose(scenario, course)
-            continue
-        loop = loop_of(scenario, robot)
-        arcs = _arcs(course)
-        alike = (
-            loop.law,
-            loop.gains,
-            loop.wheels,
-            scenario.body_of(robot),
-            loop.torque_delay_s,
-            bool(limits(scenario, robot)),
-            tuple(np.round(arcs, 2).ravel().tolist()),
-        )
-        if alike not in known:
-            known[alike] = [
-                _speed_loop(
-                    loop.gains.k4,
-                    loop.period_s,
-                    loop.torque_delay_s,
-                    min(inertias(scenario.body_of(robot))),
-                    bounded=bool(limits(scenario, robot)),
-                ),
-                *_channel(scenario, loop, arcs),
-            ]
-        yield from (replace(finding, robots=(robot.name,)) for finding in known[alike])
+        robot, control = course.robot, scenario.control_of(course.robot)
+        found: list[Finding] = []
+        if is_adaptive_dsc(control):
+            loop, arcs = loop_of(scenario, robot), _arcs(course)
+            alike = (
+                loop.law,
+                loop.gains,
+                loop.wheels,
+                scenario.body_of(robot),
+                loop.torque_delay_s,
+                bool(limits(scenario, robot)),
+                tuple(np.round(arcs, 2).ravel().tolist()),
+            )
+            if alike not in known:
+                speed_loop = _speed_loop(scenario, robot, loop.gains.k4)
+                known[alike] = [speed_loop, *_channel(scenario, loop, arcs)]
+            found = known[alike]
+        elif (gain := speed_gain(control)) is not None:
+            found = [_speed_loop(scenario, robot, gain)]
+        yield from (replace(finding, robots=(robot.name,)) for finding in found)
         yield from _held_pose(scenario, course)
 
 
@@ -135,8 +118,10 @@ def _arcs(course: Course) -> list[tuple[float, float, float]]:
     return [(float(course.v_bar[n]), float(course.omega_bar[n]), s_dot) for n in places]
 
 
-def _speed_loop(k4: float, h: float, late_s: float, inertia: float, *, bounded: bool) -> Finding:
-    """k_4 against rate and delay; `bounded` torques swing, others grow without end."""
+def _speed_loop(scenario: Scenario, robot: Robot, k4: float) -> Finding:
+    """k_4 against rate and delay; torques with a limit swing, others grow without end."""
+    h, late_s = schedule(scenario).period_s, torque_delay_s(scenario)
+    inertia = min(inertias(scenario.body_of(robot)))
     gain, delay = k4 * h / inertia, late_s / h
     most = bisect(lambda k: speed_loop_radius(k, delay) < 1.0, 0.0, 4.0, 24)
     title = "sampled speed loop k4 h / min(m̄)"
@@ -145,7 +130,7 @@ def _speed_loop(k4: float, h: float, late_s: float, inertia: float, *, bounded: 
     suits = 0.25 * min(most, 1.0) * inertia / h
     remedy = f"control.k4 = {suits:.3g} suits this rate"
     if all(speed_loop_radius(gain, part * delay) >= 1.0 for part in (0.5, 1.0, 1.5)):
-        level: Level = "warning" if bounded else "error"
+        level: Level = "warning" if limits(scenario, robot) else "error"
         swings = "diverges" if level == "error" else "torques swing between their limits"
         return Finding(level, title, f"{said}: {swings}; {remedy}", key="control.k4")
     if gain > 0.5 * most:
@@ -165,7 +150,7 @@ def _channel(
     at_start = [channel_radius(loop, *arc) for arc in arcs]
     worst = int(np.argmax(at_start))
     radius, arc = at_start[worst], arcs[worst]
-    learnt = replace(loop, theta=_learnt(scenario, loop))
+    learnt = replace(loop, theta=true_theta(loop.body))
     later = max(channel_radius(learnt, *arc) for arc in arcs)
     if radius < 1.0 and later >= 1.0:
         radius, loop = later, learnt
@@ -190,16 +175,6 @@ def _channel(
         yield Finding("warning", title, f"{said}: less than a period", key="control.k4")
     else:
         yield Finding("ok", title, said)
-
-
-def _learnt(scenario: Scenario, loop: Loop) -> tuple[float, ...]:
-    for robot in scenario.robot:
-        body = scenario.body_of(robot)
-        if robot_body(body).mbar_1 == loop.body.mbar_1:
-            return true_theta(
-                loop.body, (body.damping_right_wheel_N_m_s, body.damping_left_wheel_N_m_s)
-            )
-    return loop.theta
 
 
 def _remedies(loop: Loop, arc: tuple[float, float, float]) -> dict[str, float]:

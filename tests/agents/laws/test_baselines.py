@@ -49,7 +49,7 @@ def fixed(factor: float) -> FixedDsc:
 
 
 def test_the_default_parameters_are_those_of_the_papers_robot() -> None:
-    assert true_theta(BODY, (0.02, 0.02)) == pytest.approx(PAPER_THETA, rel=1e-6, abs=1e-12)
+    assert true_theta(BODY) == pytest.approx(PAPER_THETA, rel=1e-6, abs=1e-12)
 
 
 def test_it_is_the_adaptive_law_that_has_stopped_learning() -> None:
