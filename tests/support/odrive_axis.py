@@ -1,9 +1,11 @@
 """An emulated axis, and the few words that tests say to it."""
 
+import struct
 from dataclasses import replace
 
 from bridge.drives.interface import DriveMeasurements
 from bridge.drives.odrive import frames as f
+from bridge.drives.odrive.endpoints import ENDPOINTS
 from bridge.drives.odrive.frames import AxisState, Command
 from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import Frame
@@ -11,6 +13,7 @@ from configs.brief import DriveModel
 
 MS = 1_000_000
 NODE = 3
+NUMBER = {endpoint.path: endpoint.number for endpoint in ENDPOINTS.values()}
 MODEL = DriveModel(
     torque_constant_N_m_A=0.05,
     current_limit_A=10.0,
@@ -69,3 +72,15 @@ def beat(node: OdriveNode, now_ns: int = 0) -> f.Heartbeat:
 def asked(node: OdriveNode, command: Command, now_ns: int = 0) -> tuple[float, float]:
     (frame,) = node.on_frame(f.request(node.node_id, command), now_ns)
     return f.decode_floats(frame.data)
+
+
+def read(node: OdriveNode, path: str, code: str = "f") -> float:
+    (reply,) = tell(node, Command.RX_SDO, struct.pack("<BHBI", 0, NUMBER[path], 0, 0))
+    assert reply.can_id == f.identifier(NODE, Command.TX_SDO)
+    assert struct.unpack_from("<BHB", reply.data) == (0, NUMBER[path], 0)
+    return struct.unpack_from(f"<{code}", reply.data, 4)[0]
+
+
+def write(node: OdriveNode, path: str, value: float, code: str = "f") -> list[Frame]:
+    data = struct.pack(f"<BHB{code}", 1, NUMBER[path], 0, value)
+    return tell(node, Command.RX_SDO, data)
