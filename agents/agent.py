@@ -33,7 +33,7 @@ from agents.admission import Admission
 from agents.coordination import CoordinationState, Coordinator
 from agents.guard import UNCHANGED, Guard, Phase, TorqueOutcome
 from agents.laws.build import build
-from agents.laws.failure import failure
+from agents.laws.failure import DIVERGED, failure
 from agents.laws.interface import PathVariable, Reference, RobotMotion
 from agents.limits import EncoderCheck
 from agents.localisation import Localiser
@@ -45,8 +45,6 @@ from bridge.network.telemetry import RowBuffer
 from configs.brief import AgentBrief
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
-DIVERGED = (ArithmeticError, ValueError)
-"""Exceptions of arithmetic that diverges: overflow, division by zero, the sine of infinity."""
 _NO_REFERENCE = Reference(nan, nan, nan, nan, nan)
 POSE_HISTORY_TICKS = 64
 """Longest age of a fix in real time: the odometry since then is kept for that long."""

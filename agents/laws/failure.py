@@ -4,6 +4,9 @@ import traceback
 from pathlib import Path
 from typing import SupportsFloat
 
+DIVERGED = (ArithmeticError, ValueError)
+"""Exceptions of arithmetic that diverges: overflow, division by zero, the sine of infinity."""
+
 
 class LawError(TypeError):
     """A law's answer is none; the text says why."""
@@ -19,7 +22,7 @@ def failure(error: BaseException) -> tuple[str, str]:
         return "the path failed", str(error)
     if isinstance(error, LawError):
         return "the law failed", str(error)
-    if isinstance(error, (ArithmeticError, ValueError)):
+    if isinstance(error, DIVERGED):
         return "the law diverged", f"{place_of(error)}{error}"
     return "the law failed", raised(error)
 
