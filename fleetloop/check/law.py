@@ -1,6 +1,7 @@
 """Optional properties of a law that checks use, and whether it is of the paper's kind."""
 
 from math import inf
+from typing import Any
 
 from agents.laws.adaptive_dsc import AdaptiveDsc
 from agents.laws.adaptive_dsc_robust import AdaptiveDscRobust
@@ -10,21 +11,19 @@ from configs.plugins import Choice
 
 def torque_limit_wheel_N_m(control: Choice) -> float:
     """The law's own limit of a wheel's torque; infinite if it has none."""
-    ask = getattr(control.load(), "torque_limit_wheel_N_m", None)
-    return inf if ask is None else float(ask(control.parameters))
+    limit = _told(control, "torque_limit_wheel_N_m")
+    return inf if limit is None else float(limit)
 
 
 def approach_rate_1_s(control: Choice) -> float | None:
     """The rate at which it closes an error along the path; None if unknown."""
-    ask = getattr(control.load(), "approach_rate_1_s", None)
-    rate: float | None = None if ask is None else ask(control.parameters)
+    rate: float | None = _told(control, "approach_rate_1_s")
     return rate
 
 
 def speed_gain(control: Choice) -> float | None:
     """Gain of its speed loop, as k_4 of (34); None if unknown."""
-    ask = getattr(control.load(), "speed_gain_N_m_s", None)
-    gain: float | None = None if ask is None else ask(control.parameters)
+    gain: float | None = _told(control, "speed_gain_N_m_s")
     return gain
 
 
@@ -47,3 +46,9 @@ def lateral_gain_1_m(control: Choice) -> float | None:
     """k_2 of (17), of the dynamic surface laws; None of others."""
     gains = control.parameters
     return gains.k2 if isinstance(gains, SurfaceGains) else None
+
+
+def _told(control: Choice, name: str) -> Any:
+    """What a law says of itself with its gains; None if it doesn't."""
+    ask = getattr(control.load(), name, None)
+    return None if ask is None else ask(control.parameters)
