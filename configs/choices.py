@@ -11,7 +11,7 @@ validation: {"folder": ...}; {"recorded": True} takes classes that aren't here a
 
 import contextlib
 import difflib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -124,19 +124,24 @@ class AlsoOwn:
 
     chooser: Chooser
 
-    def _is_own(self, value: Any) -> bool:
+    def _is_own(self, value: Any, shipped: Collection[str]) -> bool:
         name = value.get(self.chooser.key) if isinstance(value, Mapping) else None
-        return isinstance(name, str) and (":" in name or name in entry_points(self.chooser.kind))
+        if not isinstance(name, str) or name in shipped:  # most are, and packages are searched long
+            return False
+        return ":" in name or name in entry_points(self.chooser.kind)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: "GetCoreSchemaHandler") -> Any:
         """Tables of the union as before, others choices."""
         from pydantic_core import core_schema
 
+        union: Any = handler(source)
+        shipped = frozenset(union.get("choices", ()))
+
         def made(value: Any, inner: Any, info: "core_schema.ValidationInfo") -> Any:
             if isinstance(value, Choice):
                 return value
             context = info.context or {}
-            if self._is_own(value):
+            if self._is_own(value, shipped):
                 folder, recorded = context.get("folder", ""), context.get("recorded", False)
                 return self.chooser.choose(value, folder, recorded=recorded)
             return inner(value)
@@ -147,7 +152,7 @@ class AlsoOwn:
 
         return core_schema.with_info_wrap_validator_function(
             made,
-            handler(source),
+            union,
             serialization=core_schema.wrap_serializer_function_ser_schema(written),
         )
 

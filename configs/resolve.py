@@ -118,13 +118,14 @@ def reach(scenario: Scenario) -> Reach:
 
 def _drive_link(scenario: Scenario, robot: sections.Robot, drive: DriveModel) -> DriveLink:
     host = scenario.host
+    right_node, left_node = scenario.nodes_of(robot.name)
     encoder_age_s = host.encoder_age_limit_s
     if encoder_age_s is None:
         encoder_age_s = max(ENCODER_AGE_LIMIT_S, 10 * scenario.clock.control_period_s)
     return DriveLink(
         choice=drive.choice,
-        right_node=scenario.nodes_of(robot.name)[0],
-        left_node=scenario.nodes_of(robot.name)[1],
+        right_node=right_node,
+        left_node=left_node,
         encoder_period_ns=drive.encoder_period_ns,
         velocity_limit_shaft_rev_s=drive.velocity_limit_shaft_rev_s,
         current_limit_A=drive.current_limit_A,
@@ -212,6 +213,7 @@ def leader_brief(scenario: Scenario) -> LeaderBrief:
 
 
 def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief:
+    right_node, left_node = scenario.nodes_of(robot.name)
     return RobotBrief(
         robot=robot.name,
         bus=scenario.bus_of(robot.name),
@@ -221,8 +223,8 @@ def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief
         ),
         drive=_drive_model(scenario, number),
         powertrain=_powertrain_model(scenario, number),
-        right_node=scenario.nodes_of(robot.name)[0],
-        left_node=scenario.nodes_of(robot.name)[1],
+        right_node=right_node,
+        left_node=left_node,
         pose=robot.pose,
         v_m_s=robot.v_m_s,
         omega_rad_s=robot.omega_rad_s,

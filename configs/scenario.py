@@ -97,8 +97,8 @@ class Scenario(BaseModel):
     def nodes_of(self, name: str) -> tuple[int, int]:
         """(right, left) node of a robot's drives: on a shared bus each robot has the next two."""
         robot = next(robot for robot in self.robot if robot.name == name)
-        bus = self.bus_of(name)
-        number = [other for other in self.names if self.bus_of(other) == bus].index(name)
+        bus = robot.bus or name
+        number = [one.name for one in self.robot if (one.bus or one.name) == bus].index(name)
         right, left = robot.right_node, robot.left_node
         step = 2 * number
         return (
