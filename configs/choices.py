@@ -192,9 +192,7 @@ def _refuse_bad_defaults(parameters: type[Parameters]) -> None:
     from configs.wording import remedy_of
 
     given = {
-        one.name: _plain(one.default)
-        for one in fields(parameters)  # type: ignore[arg-type]
-        if one.default is not MISSING
+        one.name: _plain(one.default) for one in fields(parameters) if one.default is not MISSING
     }
     try:
         _adapter(parameters).validate_python(given)
@@ -315,7 +313,7 @@ def validated(
     """
     from pydantic import ValidationError
 
-    known = sorted(one.name for one in fields(parameters))  # type: ignore[arg-type]
+    known = sorted(one.name for one in fields(parameters))
     wrong = [
         _unknown(key, value, known, hint(key)) for key, value in table.items() if key not in known
     ]

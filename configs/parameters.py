@@ -11,7 +11,7 @@ which makes the JSON Schema of them as well. Processes receive the same objects,
 pydantic is imported by the methods that it calls itself: in a process nothing does.
 """
 
-from dataclasses import dataclass, field, fields, make_dataclass, replace
+from dataclasses import Field, dataclass, field, fields, make_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Optional, TypeVar
 
@@ -90,6 +90,7 @@ class Parameters:
     """One table of a file: unknown keys are errors, numbers are finite, types don't change."""
 
     __slots__ = ()
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # of every subclass: it is a dataclass
     __pydantic_config__: ClassVar[dict[str, Any]] = {
         "extra": "forbid",
         "strict": True,
@@ -114,7 +115,7 @@ def changes_of(name: str, section: type[Parameters]) -> type[Any]:
     """A table of the same keys as `section`, none required: what one robot has differently."""
     keys = [
         (key.name, Optional[key.type], field(default=None, metadata=key.metadata))  # noqa: UP045
-        for key in fields(section)  # type: ignore[arg-type]
+        for key in fields(section)
     ]
     options = {"frozen": True, "slots": True, "kw_only": True}
     namespace = {"__doc__": section.__doc__, "__module__": section.__module__}
@@ -123,13 +124,13 @@ def changes_of(name: str, section: type[Parameters]) -> type[Any]:
 
 def changed(section: _P, changes: Parameters) -> _P:
     """The section with those keys of `changes` that are given."""
-    given = {key.name: getattr(changes, key.name) for key in fields(changes)}  # type: ignore[arg-type]
-    return replace(section, **{k: v for k, v in given.items() if v is not None})  # type: ignore[type-var]
+    given = {key.name: getattr(changes, key.name) for key in fields(changes)}
+    return replace(section, **{k: v for k, v in given.items() if v is not None})
 
 
 def extended(made: type[_P], section: Parameters, **derived: Any) -> _P:
     """A subclass of the section's type: what the section has, and what is derived."""
-    return made(**{key.name: getattr(section, key.name) for key in fields(section)} | derived)  # type: ignore[arg-type]
+    return made(**{key.name: getattr(section, key.name) for key in fields(section)} | derived)
 
 
 def as_tuples(value: Any) -> Any:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from functools import cache
 from importlib import metadata
 from io import BytesIO
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from mcap import records
 from mcap.data_stream import ReadDataStream, RecordBuilder
@@ -29,7 +29,16 @@ _VERSION, _CRC, _SIGNALS = "version", "crc32_of_all_before", "signals"
 PREFIX = struct.Struct("<BQ")
 """Prefix of every MCAP record: its opcode and the length of its content."""
 _Records = Sequence[tuple[int, bytes]]
-_Kind = TypeVar("_Kind", bound=records.McapRecord)
+
+
+class _Readable(Protocol):
+    """A kind of MCAP record; `McapRecord` itself has no `read`."""
+
+    @staticmethod
+    def read(stream: ReadDataStream) -> Any: ...
+
+
+_Kind = TypeVar("_Kind", bound=_Readable)
 
 
 class Head(NamedTuple):
@@ -148,9 +157,7 @@ def understood(found: _Records, crc: int) -> Head:
 
 def _all_of(kind: type[_Kind], opcode: Opcode, found: _Records) -> list[_Kind]:
     return [
-        kind.read(ReadDataStream(BytesIO(content)))  # type: ignore[attr-defined]
-        for number, content in found
-        if number == opcode
+        kind.read(ReadDataStream(BytesIO(content))) for number, content in found if number == opcode
     ]
 
 
