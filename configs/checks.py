@@ -1,6 +1,5 @@
 """Relations between the sections of a scenario; all problems at once, none raised."""
 
-import difflib
 import itertools
 from collections.abc import Iterator, Sequence
 from math import ceil, floor, inf
@@ -13,11 +12,9 @@ from configs.graph import parse_edge
 from configs.paths import Spline, Varying
 from configs.plugins import Recorded
 from configs.scenario import ETSRO, Scenario
-from configs.sections import (
-    Expect,
-)
+from configs.sections import Expect
 from configs.signals import PLANT_SIGNALS, SPREAD, controller_signals
-from configs.wording import MISSING, remedy_of
+from configs.wording import MISSING, guess, remedy_of
 
 
 def cross_problems(scenario: Scenario) -> list[Problem]:
@@ -171,8 +168,7 @@ def _expects(scenario: Scenario) -> Iterator[Problem]:
         known = _expectable(scenario, expect.robots or ())
         where = f"expect.{n}"
         if known and expect.signal not in known:
-            close = difflib.get_close_matches(expect.signal, known, 1, cutoff=0.5)
-            hint = f"; did you mean {close[0]}?" if close else ""
+            hint = guess(expect.signal, known, cutoff=0.5)
             remedy = f"no such signal{hint} (known: {', '.join(known)})"
             yield Problem(f"{where}.signal", expect.signal, remedy)
         for robot in expect.robots or ():

@@ -10,12 +10,11 @@ validation: {"folder": ...}; {"recorded": True} takes classes that aren't here a
 """
 
 import contextlib
-import difflib
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from configs.parameters import Parameters
+from configs.parameters import Parameters, as_tuples
 from configs.plugins import (
     Choice,
     Kind,
@@ -27,13 +26,12 @@ from configs.plugins import (
     find,
     load,
 )
+from configs.tables import adapter_of, in_words, origin_of, stated, validated
+from configs.wording import remedy_of
 
 if TYPE_CHECKING:
-    from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, ValidationError
-    from pydantic_core import InitErrorDetails, core_schema
-
-STATED = "stated"
-"""The type of an error that is in our words already: in its context, under `remedy`."""
+    from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+    from pydantic_core import core_schema
 
 
 class Chooser(NamedTuple):
@@ -50,10 +48,10 @@ class Chooser(NamedTuple):
         Raises:
             ValidationError: of the table's keys.
         """
-        rest = {key: _plain(value) for key, value in table.items() if key != self.key}
+        rest = {key: as_tuples(value) for key, value in table.items() if key != self.key}
         name = table.get(self.key, self.default)
         if not isinstance(name, str) or not name:
-            raise _stated(self.key, name, "must be a text, the name of a " + self.kind.word)
+            raise stated(self.key, name, "must be a text, the name of a " + self.kind.word)
         try:
             plugin = find(self.kind, name, folder, self.shipped)
             if recorded and plugin.folder == folder and name not in self.shipped:
@@ -62,7 +60,7 @@ class Chooser(NamedTuple):
         except PluginError as error:
             if recorded:
                 return Choice(Plugin(self.kind, name, name), Recorded(tuple(rest.items())))
-            raise _stated(self.key, name, str(error)) from error
+            raise stated(self.key, name, str(error)) from error
         return Choice(plugin, validated(parameters, rest, lambda key: self._of_another(key, name)))
 
     def _of_another(self, key: str, name: str) -> str:
@@ -83,8 +81,7 @@ class Chooser(NamedTuple):
                 return value
             if not isinstance(value, Mapping):
                 raise in_words("must be a table")
-            context = info.context or {}
-            folder, recorded = context.get("folder", ""), context.get("recorded", False)
+            folder, recorded = origin_of(info)
             return self.choose(value, folder, recorded=recorded)
 
         return core_schema.with_info_plain_validator_function(
@@ -104,7 +101,7 @@ class Chooser(NamedTuple):
         cases = []
         for name in self.shipped:
             parameters = parameters_of(find(self.kind, name, "", self.shipped))
-            keys = _adapter(parameters).json_schema()["properties"]
+            keys = adapter_of(parameters).json_schema()["properties"]
             case: dict[str, Any] = {"properties": {self.key: {"const": name}}}
             if name != self.default:
                 case["required"] = [self.key]
@@ -140,9 +137,8 @@ class AlsoOwn:
         def made(value: Any, inner: Any, info: "core_schema.ValidationInfo") -> Any:
             if isinstance(value, Choice):
                 return value
-            context = info.context or {}
             if self._is_own(value, shipped):
-                folder, recorded = context.get("folder", ""), context.get("recorded", False)
+                folder, recorded = origin_of(info)
                 return self.chooser.choose(value, folder, recorded=recorded)
             return inner(value)
 
@@ -174,7 +170,7 @@ def parameters_of(plugin: Plugin) -> type[Parameters]:
     found = load(plugin)
     parameters: type[Parameters] = found.Gains if plugin.kind is Kind.LAW else found
     try:
-        _adapter(parameters)
+        adapter_of(parameters)
     except Exception as error:  # pydantic's, of annotations that it doesn't know
         raise PluginError(f"{parameters.__qualname__}: {str(error).splitlines()[0]}") from error
     _refuse_bad_defaults(parameters)
@@ -189,13 +185,11 @@ def _refuse_bad_defaults(parameters: type[Parameters]) -> None:
     """
     from pydantic import ValidationError
 
-    from configs.wording import remedy_of
-
     given = {
-        one.name: _plain(one.default) for one in fields(parameters) if one.default is not MISSING
+        one.name: as_tuples(one.default) for one in fields(parameters) if one.default is not MISSING
     }
     try:
-        _adapter(parameters).validate_python(given)
+        adapter_of(parameters).validate_python(given)
     except ValidationError as error:
         wrong = [
             f"the default of {item['loc'][0]} is {given[str(item['loc'][0])]!r:.80}, which"
@@ -227,7 +221,7 @@ class Changes:
                 return value
             if not isinstance(value, Mapping):
                 raise in_words("must be a table")
-            return cls(dict(value), (info.context or {}).get("folder", ""))
+            return cls(dict(value), origin_of(info)[0])
 
         return core_schema.with_info_plain_validator_function(
             made,
@@ -276,95 +270,6 @@ def table_of(choice: Choice, key: str) -> dict[str, Any]:
     """The table of a file that makes this choice, all defaults written out."""
     if isinstance(choice.parameters, Recorded):
         return {key: choice.name, **dict(choice.parameters.values)}
-    adapter = _adapter(type(choice.parameters))
+    adapter = adapter_of(type(choice.parameters))
     table: dict[str, Any] = adapter.dump_python(choice.parameters, mode="json", exclude_none=True)
     return {key: choice.name, **table}
-
-
-_adapters: "dict[type[Parameters], TypeAdapter[Any]]" = {}
-
-
-def _adapter(parameters: type[Parameters]) -> "TypeAdapter[Any]":
-    from pydantic import TypeAdapter
-
-    if parameters not in _adapters:
-        _adapters[parameters] = TypeAdapter(parameters)
-    return _adapters[parameters]
-
-
-def _plain(value: Any) -> Any:
-    """Lists of TOML as the tuples that strict fields want."""
-    if isinstance(value, list):
-        return tuple(map(_plain, value))
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    return value
-
-
-def validated(
-    parameters: type[Parameters],
-    table: Mapping[str, Any],
-    hint: Callable[[str], str] = lambda _: "",
-) -> Parameters:
-    """The parameters that a table's keys make; `hint`: what to do about an unknown key.
-
-    Raises:
-        ValidationError: of the keys; an unknown one is told with those that are known.
-    """
-    from pydantic import ValidationError
-
-    known = sorted(one.name for one in fields(parameters))
-    wrong = [
-        _unknown(key, value, known, hint(key)) for key, value in table.items() if key not in known
-    ]
-    made: Parameters | None = None
-    try:
-        made = _adapter(parameters).validate_python(
-            {key: value for key, value in table.items() if key in known}
-        )
-    except ValidationError as error:
-        wrong = [_again(item) for item in error.errors(include_url=False)] + wrong
-    except Exception as error:  # raised by the class itself, in its __post_init__
-        text = f"{type(error).__name__}: {error}"
-        raise in_words(text) from error
-    if wrong or made is None:
-        raise ValidationError.from_exception_data(parameters.__name__, wrong)
-    return made
-
-
-def _again(item: Any) -> "InitErrorDetails":
-    details: dict[str, Any] = {"type": item["type"], "loc": item["loc"], "input": item["input"]}
-    if item["type"] == "value_error":
-        remedy = str(item["ctx"]["error"])
-        details["type"] = in_words(remedy)
-    elif "ctx" in item:
-        details["ctx"] = item["ctx"]
-    made: InitErrorDetails = details  # type: ignore[assignment]
-    return made
-
-
-def _unknown(key: str, value: object, known: list[str], hint: str) -> "InitErrorDetails":
-    close = difflib.get_close_matches(key, known, 1)
-    if close and not hint:
-        hint = f"; did you mean {close[0]}?"
-    remedy = f"unknown key{hint} (known here: {', '.join(known)})" if known else "unknown key"
-    from pydantic_core import InitErrorDetails
-
-    stated = in_words(remedy)
-    return InitErrorDetails(type=stated, loc=(key,), input=value)
-
-
-def _stated(key: str, value: object, remedy: str) -> "ValidationError":
-    from pydantic import ValidationError
-    from pydantic_core import InitErrorDetails
-
-    stated = in_words(remedy)
-    details = InitErrorDetails(type=stated, loc=(key,), input=value)
-    return ValidationError.from_exception_data(key, [details])
-
-
-def in_words(remedy: str) -> Any:
-    """An error for pydantic that says just this."""
-    from pydantic_core import PydanticCustomError
-
-    return PydanticCustomError(STATED, "{remedy}", {"remedy": remedy})

@@ -1,7 +1,6 @@
 """Errors of a file in terms of the file: key, value, remedy."""
 
 import copy
-import difflib
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -11,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from configs.errors import Complaint, Problem, ScenarioError
 from configs.parameters import as_tuples
 from configs.scenario import Scenario
-from configs.wording import MISSING, remedy_of
+from configs.wording import MISSING, remedy_of, unknown_key
 
 _NOTHING = object()
 _KEY = "[key]"  # pydantic's mark of an error in a key rather than in its value
@@ -167,10 +166,7 @@ def _problem(item: dict[str, Any], data: dict[str, Any], model: type[BaseModel])
 
 
 def _unknown(loc: Sequence[int | str], model: type[BaseModel]) -> str:
-    known = _known_keys(loc[:-1], model)
-    close = difflib.get_close_matches(str(loc[-1]), known, 1)
-    hint = f"; did you mean {close[0]}?" if close else ""
-    return f"unknown key{hint} (known here: {', '.join(known)})" if known else "unknown key"
+    return unknown_key(str(loc[-1]), _known_keys(loc[:-1], model))
 
 
 def _known_keys(loc: Sequence[int | str], model: type[BaseModel]) -> list[str]:

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
-from configs.choices import validated
 from configs.parameters import Parameters
 from configs.plugins import Choice, Kind, Plugin, Recorded, find, load
+from configs.tables import origin_of, validated
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler
@@ -60,8 +60,8 @@ class ProtocolName(str):
         def made(text: str, info: "core_schema.ValidationInfo") -> ProtocolName:
             if isinstance(text, cls):
                 return text
-            context = info.context or {}
-            return cls(text, context.get("folder", ""), recorded=context.get("recorded", False))
+            folder, recorded = origin_of(info)
+            return cls(text, folder, recorded=recorded)
 
         return core_schema.with_info_after_validator_function(
             made, core_schema.str_schema(strict=True)

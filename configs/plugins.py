@@ -25,6 +25,7 @@ from typing import Any
 from configs.errors import ScenarioError
 from configs.parameters import Parameters
 from configs.signals import signals_fault
+from configs.wording import guess
 
 LAWS = {
     "adaptive_dsc": "agents.laws.adaptive_dsc:AdaptiveDsc",
@@ -93,13 +94,9 @@ def find(
     installed = entry_points(kind)
     if name in installed:
         return Plugin(kind, name, installed[name])
-    import difflib
-
     known = sorted({*shipped, *installed})
-    close = difflib.get_close_matches(name, known, 1)
-    hint = f"; did you mean {close[0]}?" if close else ""
     raise PluginError(
-        f"no such {kind.word}{hint} (known: {', '.join(known)}; one of your own is"
+        f"no such {kind.word}{guess(name, known)} (known: {', '.join(known)}; one of your own is"
         f' "{kind.form}", from module.py {place})'
     )
 
@@ -221,12 +218,13 @@ def _parameters_fault(found: object) -> str | None:
     return "it must derive from configs.parameters.Parameters"
 
 
-def _law_fault(law: Any) -> str | None:
-    found = law
-    missing = [name for name in ("Gains", "SIGNALS", "step", "hold") if not hasattr(found, name)]
+def _law_fault(law: object) -> str | None:
     if not isinstance(law, type):
         return "it is no class"
-    missing += [name for name in ("step",) if name not in missing and _is_of_protocol(law, name)]
+    found: Any = law
+    missing = [name for name in ("Gains", "SIGNALS", "step", "hold") if not hasattr(found, name)]
+    if "step" not in missing and _is_of_protocol(law, "step"):
+        missing.append("step")
     if missing:
         return f"it has no {', no '.join(missing)} (see agents.laws.interface.Law)"
     fault = _parameters_fault(found.Gains)

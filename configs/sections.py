@@ -1,7 +1,7 @@
 """The sections of a scenario file as types: closed, frozen, every key with its unit in its name.
 
 Defaults are the paper's (section 4), and where it is silent those that its numbers were checked
-with. What relates sections to each other is checked in `configs.scenario`.
+with. What relates sections to each other is checked in `configs.checks`.
 """
 
 from dataclasses import dataclass, field

@@ -1,10 +1,12 @@
-"""The remedy of an error that pydantic reports, in terms of a scenario file."""
+"""The remedy of an error in terms of a scenario file: of one that pydantic reports, of a name."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from configs.choices import STATED
 from configs.patterns import WORDS
+
+STATED = "stated"
+"""The type of an error that is in our words already: in its context, under `remedy`."""
 
 MISSING = "(missing)"
 """Stands for the value of a key that has none."""
@@ -48,3 +50,18 @@ def remedy_of(item: Mapping[str, Any]) -> str:
         return WORDS.get(about["pattern"], f"must match {about['pattern']}")
     shown = {k: f"{v:g}" if isinstance(v, float) else v for k, v in about.items()}
     return _WORDS.get(kind, "is of the wrong kind").format(**shown)
+
+
+def unknown_key(key: str, known: Sequence[str], hint: str = "") -> str:
+    """The remedy of a key that a table doesn't have; `hint` instead of a guess at what is meant."""
+    if not known:
+        return "unknown key"
+    return f"unknown key{hint or guess(key, known)} (known here: {', '.join(known)})"
+
+
+def guess(name: str, known: Sequence[str], cutoff: float = 0.6) -> str:
+    """The known name that is meant perhaps, to go on a remedy; nothing if none is like it."""
+    import difflib
+
+    close = difflib.get_close_matches(name, known, 1, cutoff)
+    return f"; did you mean {close[0]}?" if close else ""
