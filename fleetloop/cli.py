@@ -22,6 +22,7 @@ from fleetloop.options import (
     ScenarioArg,
     SeedOption,
     SetOption,
+    VersionOption,
     listed,
     overrides_of,
     refuse_lockstep,
@@ -313,26 +314,8 @@ def init(
     write_starter(file)
 
 
-def _print_version(wanted: bool) -> None:
-    if not wanted:
-        return
-    import platform
-    from importlib.metadata import version
-
-    others = ", ".join(f"{name} {version(name)}" for name in ("eclipse-zenoh", "python-can"))
-    typer.echo(f"fleetloop {version('fleetloop')} (Python {platform.python_version()}, {others})")
-    raise typer.Exit
-
-
 @app.callback()
-def _common(
-    version: Annotated[
-        bool,
-        typer.Option(
-            "--version", callback=_print_version, is_eager=True, help="Print versions and end."
-        ),
-    ] = False,
-) -> None:
+def _common(version: VersionOption = False) -> None:
     pass
 
 

@@ -1,4 +1,4 @@
-"""Arguments and options that several verbs share, and their overrides of a scenario."""
+"""Arguments and options that verbs share, and their overrides of a scenario."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,6 +16,17 @@ def _shipped(incomplete: str) -> list[str]:
     from configs.loading import shipped
 
     return [name for name in shipped() if name.startswith(incomplete)]
+
+
+def _print_version(wanted: bool) -> None:
+    if not wanted:
+        return
+    import platform
+    from importlib.metadata import version
+
+    others = ", ".join(f"{name} {version(name)}" for name in ("eclipse-zenoh", "python-can"))
+    typer.echo(f"fleetloop {version('fleetloop')} (Python {platform.python_version()}, {others})")
+    raise typer.Exit
 
 
 ScenarioArg = Annotated[
@@ -59,6 +70,12 @@ DeploymentOption = Annotated[
         "--deployment",
         metavar="FILE",
         help="CAN interfaces, router and roles on other machines. Default: all on this machine.",
+    ),
+]
+VersionOption = Annotated[
+    bool,
+    typer.Option(
+        "--version", callback=_print_version, is_eager=True, help="Print versions and end."
     ),
 ]
 

@@ -1,4 +1,4 @@
-"""Scenario files with some keys changed, as a person would change them in the file."""
+"""A small scenario file, and files with some keys changed, as a person would change them."""
 
 import tomllib
 
@@ -6,6 +6,18 @@ import tomli_w
 
 from configs.errors import Complaint
 from configs.overrides import Override
+
+SMALL = """
+schema = 1
+name = "small"
+[[robot]]
+name = "r1"
+pose = { x_m = 0.0, y_m = 1.0 }
+[[robot]]
+name = "r2"
+pose = { x_m = 0.0, y_m = 2.0 }
+"""
+"""Two robots, all else as it is by default."""
 
 
 def changed(text: str, *changes: str) -> str:
