@@ -5,6 +5,7 @@ controllers, which import this module for its types: numpy is loaded by the laun
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from configs import paths
 from configs.plugins import Choice
@@ -44,8 +45,11 @@ FormationOffset = paths.World | paths.Structure | VaryingOffset | Choice
 
 def reference_path(path: paths.PathShape) -> ReferencePath:
     """The centre's path as the controllers evaluate it."""
-    if not isinstance(path, paths.Spline):
-        return path
+    return _spline_path(path) if isinstance(path, paths.Spline) else path
+
+
+@lru_cache(maxsize=1)
+def _spline_path(path: paths.Spline) -> SplinePath:
     from configs.splines import Ends, chord_lengths, quintic_spline
 
     points = [*path.points_m, path.points_m[0]] if path.closed else list(path.points_m)

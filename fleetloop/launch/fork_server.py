@@ -92,7 +92,7 @@ class ForkServer:
             socket.send_fds(self._socket, [module.encode()], passed)
             answer = self._socket.recv(65536)
         except OSError as error:
-            raise InfrastructureError(f"can't start {module}: the fork_server: {error}") from error
+            raise InfrastructureError(f"can't start {module}: the fork server: {error}") from error
         if not answer:
             raise InfrastructureError(f"can't start {module}: the fork server has ended")
         said = json.loads(answer)
