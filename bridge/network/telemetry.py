@@ -1,7 +1,7 @@
 """Rows of what is recorded of every robot at every tick (`configs.signals`), and their packing.
 
-A row is a fixed number of float64; rows of consecutive ticks
-make a block, the unit that travels over Zenoh.
+A row is a fixed number of float64; rows of consecutive ticks make a block, the unit that travels
+over Zenoh.
 """
 
 import struct

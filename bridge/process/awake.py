@@ -15,8 +15,6 @@ from bridge.process.clock import SYSTEM_CLOCK, Clock
 LOOK_S = 0.1
 STALL_S = 0.25
 """Beyond what a wait was to last: this much later is no lateness any more."""
-
-
 LATE_S = 0.04
 """For who keeps absolute deadlines: who is so late may be taken for silent by others."""
 AFTERMATH_S = 0.5

@@ -99,7 +99,7 @@ def test_a_descriptor_is_readable_once_per_frame(running, join) -> None:
     assert [message.arbitration_id for message in heard] == list(range(50))
 
 
-def test_a_gathered_client_sends_with_its_next_look_and_takes_an_instant_in_one_packet(
+def test_a_batched_client_sends_with_its_next_look_and_takes_an_instant_in_one_packet(
     running, join
 ) -> None:
     batched, other = join(batched=True), join()

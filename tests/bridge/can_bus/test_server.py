@@ -61,7 +61,7 @@ def test_a_second_controller_of_a_robot_is_refused_while_the_first_is_there(serv
     assert serving.hub.left() == ("r1",)
 
 
-def test_a_stranger_that_says_a_robots_name_unpaced_and_leaves_is_not_its_controller(
+def test_a_stranger_that_says_a_robots_name_unsynchronised_and_leaves_is_not_its_controller(
     serving,
 ) -> None:
     stranger = serving.join(f"r1\0{SECRET}")
