@@ -26,9 +26,9 @@ from bridge.network.messages import Notice, Rows
 from bridge.network.reports import AgentReport
 from bridge.network.telemetry import RowBuffer, row_of
 from bridge.network.zenoh_link import POLLED_DEPTH
+from bridge.process.clock import process_cpu_ns
 from bridge.process.lifecycle import (
     Stop,
-    cpu_ns,
     go_realtime,
     name_process,
     processor_wait_ns,
@@ -128,7 +128,7 @@ class _Connections(NamedTuple):
         Returns the reason for an early end of the body, "" if there was none.
         """
         sampler = Sampler()
-        began_ns, waited_ns = cpu_ns(), processor_wait_ns()
+        began_ns, waited_ns = process_cpu_ns(), processor_wait_ns()
         failure = ""
         try:
             with sampler if self.agent.brief.schedule.profile else nullcontext():
@@ -147,7 +147,7 @@ class _Connections(NamedTuple):
                 notices=tuple(self.agent.notices()),
                 flooders=tuple(self.agent.admission.refusals.floods()),
                 missing_privileges=tuple(missing_privileges),
-                cpu_ns=cpu_ns() - began_ns,
+                cpu_ns=process_cpu_ns() - began_ns,
                 durations_ns=counters.durations_ns()
                 | {"processor": processor_wait_ns() - waited_ns},
                 profile_ns=sampler.nanoseconds(),

@@ -20,10 +20,9 @@ from bridge.network.messages import Go, Notice, PoseFix, Progress, Rows
 from bridge.network.reports import PlantReport
 from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer
 from bridge.process.awake import Stall
-from bridge.process.clock import SYSTEM_CLOCK, implausible_start, monotonic_of
+from bridge.process.clock import SYSTEM_CLOCK, implausible_start, monotonic_of, process_cpu_ns
 from bridge.process.lifecycle import (
     Stop,
-    cpu_ns,
     go_realtime,
     processor_wait_ns,
     serve,
@@ -164,7 +163,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
         loop = LockstepLoop(brief, emulated, hub, poses, rows, say, taps)
         counters, progress_of, body = loop.counters, loop.progress, loop.run
     sampler = Sampler()
-    began_ns, waited_ns = cpu_ns(), processor_wait_ns()
+    began_ns, waited_ns = process_cpu_ns(), processor_wait_ns()
     try:
         with sampler if brief.schedule.profile else nullcontext():
             _body(body, stop)
@@ -181,7 +180,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
         summary = PlantReport(
             left_early=stop.reason if counters.ticks < brief.schedule.ticks else "",
             missing_privileges=tuple(missing_privileges),
-            cpu_ns=cpu_ns() - began_ns,
+            cpu_ns=process_cpu_ns() - began_ns,
             durations_ns={
                 "wall": counters.wall_ns,
                 "waited": counters.waited_ns,

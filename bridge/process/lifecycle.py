@@ -30,7 +30,6 @@ from typing import BinaryIO, TypeVar
 
 import setproctitle
 
-from bridge.process.clock import process_cpu_ns
 from bridge.process.waiting import readable
 from configs.errors import ExitStatus, FleetloopError, PeerLostError
 
@@ -219,11 +218,6 @@ def processor_wait_ns() -> int:
         return int(Path("/proc/self/schedstat").read_text("ascii").split()[1])
     except (OSError, ValueError, IndexError):
         return 0
-
-
-def cpu_ns() -> int:
-    """Processor time of this process so far, all threads; a run counts from its first tick."""
-    return process_cpu_ns()
 
 
 def settle_memory() -> None:

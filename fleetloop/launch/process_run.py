@@ -22,8 +22,8 @@ from bridge.network import keys
 from bridge.network.barrier import Hellos
 from bridge.network.messages import Go, LeaderSpeed, Progress
 from bridge.network.router import RouterLink, open_router
-from bridge.process.clock import SYSTEM_CLOCK, Clock, wall_of
-from bridge.process.lifecycle import Stop, cpu_ns
+from bridge.process.clock import SYSTEM_CLOCK, Clock, process_cpu_ns, wall_of
+from bridge.process.lifecycle import Stop
 from configs.brief import LEASE_S, LOCAL_LEASE_S, NetworkLink
 from configs.deployment import Deployment
 from configs.errors import InfrastructureError
@@ -110,9 +110,9 @@ class ProcessRun:
                     raise
                 if failure is None and not stop.requested:
                     self.outcome.startup_s = self._clock.monotonic_s() - began
-                    began_ns = cpu_ns()
+                    began_ns = process_cpu_ns()
                     failure = self._watch(link, stop)
-                    self.outcome.cpu_ns = cpu_ns() - began_ns
+                    self.outcome.cpu_ns = process_cpu_ns() - began_ns
                 ending = self._clock.monotonic_s()
                 self._ending.end(link, stop, failure)
                 self.outcome.teardown_s = self._clock.monotonic_s() - ending

@@ -18,8 +18,8 @@ from bridge.network.messages import Progress, Rows
 from bridge.network.refused_messages import Refusals
 from bridge.network.reports import Report
 from bridge.network.telemetry import BLOCK_FRAMES, BLOCK_TICKS, FRAME_ROW, PLANT_ROW, row_of
-from bridge.process.clock import SYSTEM_CLOCK
-from bridge.process.lifecycle import Stop, cpu_ns, serve
+from bridge.process.clock import SYSTEM_CLOCK, process_cpu_ns
+from bridge.process.lifecycle import Stop, serve
 from configs.brief import RecorderBrief
 from configs.roles import RECORDER
 from fleetloop.record.can_log import frames_of
@@ -170,7 +170,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         )
         link.declare_live(keys.live(name, RECORDER.name))
         next_report = 0.0
-        began_ns = cpu_ns()
+        began_ns = process_cpu_ns()
         quiet_since = SYSTEM_CLOCK.monotonic_s()
         while recorder.unfinished:
             arrival = link.receive(PROGRESS_EVERY_S)
@@ -196,7 +196,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         summary = Report(
             notices=tuple(refused),
             flooders=tuple(recorder.refusals.floods()),
-            cpu_ns=cpu_ns() - began_ns,
+            cpu_ns=process_cpu_ns() - began_ns,
         )
         report.put(summary.encode())
         stop.await_release()
