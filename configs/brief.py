@@ -15,13 +15,12 @@ from dataclasses import dataclass, field
 from math import inf
 
 from configs.curves import FormationOffset, ReferencePath
-from configs.drives import ODRIVE
 from configs.host import Host
 from configs.parameters import Parameters
 from configs.plugins import Choice
 from configs.powertrain import Encoder, Motor, Supply
 from configs.reach import Reach
-from configs.sections import Body, Bus, Coordination, Disturbance, Drive, Mounting, Pose
+from configs.sections import Body, Bus, Coordination, Disturbance, Mounting, Pose
 from configs.signals import Signal
 from configs.tls import TlsFiles
 
@@ -103,20 +102,18 @@ class Schedule:
 class DriveLink:
     """Connection of a controller to the two drives of its robot."""
 
-    choice: Choice  # of the protocol, with its own keys
+    choice: Choice  # of the protocol, with its section
+    limited: bool  # False: drives obey no limits (preset ideal)
     right_node: int
     left_node: int
     encoder_period_ns: int
-    velocity_limit_shaft_rev_s: float  # of the motor shaft
-    current_limit_A: float
     mounting: Mounting
-    heartbeat_period_ns: int = 100_000_000
     encoder_age_limit_ns: int = 50_000_000  # older: the drive has dropped out
     heartbeat_age_limit_ns: int = 500_000_000  # older: the drive has dropped out
 
     @property
-    def own(self) -> Parameters:
-        """The protocol's own keys."""
+    def section(self) -> Parameters:
+        """Section [drive], of the type that the protocol's row names."""
         return self.choice.parameters
 
 
@@ -198,39 +195,18 @@ class WheelDisturbance(Disturbance):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DriveModel(Drive):
-    """Section [drive] as an emulated drive obeys it.
+class DriveModel:
+    """Both emulated drives of one robot."""
 
-    The limits are those of the preset. Values that no file sets are the vendor's defaults.
-    """
-
-    torque_limiters: bool  # False: torque reaches the wheel as commanded (ideal drive)
+    choice: Choice  # of the protocol, with its section
+    limited: bool  # False: torque reaches the wheel as commanded (preset ideal)
     serial_number: int  # of the right drive; the left one has the next number
-    firmware_version: tuple[int, int, int] = (0, 6, 10)
-    command_latency_ns: tuple[int, int] = (0, 0)  # from a frame's end until firmware acts on it
-    heartbeat_period_ns: int
     encoder_period_ns: int
-    torques_period_ns: int  # cyclic messages, this and the next five; 0: only on request
-    error_period_ns: int = 0
-    iq_period_ns: int = 0
-    temperature_period_ns: int = 0
-    bus_voltage_period_ns: int = 0
-    powers_period_ns: int = 0
-    watchdog_ns: int  # 0: off
-    boot_ns: int = 0  # silent for so long after a reboot
-    calibration_ns: int = 2_000_000_000  # each of motor and encoder
-    velocity_ramp_shaft_rev_s2: float = 1.0
-    torque_ramp_shaft_N_m_s: float = 0.01
-    input_filter_bandwidth_1_s: float = 2.0
-    trajectory_velocity_shaft_rev_s: float = 2.0
-    trajectory_accel_shaft_rev_s2: float = 0.5
-    trajectory_decel_shaft_rev_s2: float = 0.5
-    current_margin_A: float = 8.0  # above the limit in force, then it disarms
-    choice: Choice = ODRIVE  # of the protocol, with its own keys
+    command_latency_ns: tuple[int, int] = (0, 0)  # from a frame's end until firmware acts on it
 
     @property
-    def own(self) -> Parameters:
-        """The protocol's own keys."""
+    def section(self) -> Parameters:
+        """Section [drive], of the type that the protocol's row names."""
         return self.choice.parameters
 
 

@@ -129,33 +129,21 @@ def _periods(scenario: Scenario) -> Iterator[Problem]:
             f"must not be above coordination.silence_limit_s = {silence_s:g}, or every neighbour"
             " counts as silent between two shares",
         )
-    shortest = 3 * clock.control_period_s + 2 * scenario.drive.heartbeat_period_s
-    if clock.countdown_s < shortest:
-        yield Problem(
-            "clock.countdown_s",
-            clock.countdown_s,
-            f"too short to arm the drives: three control periods and two heartbeats need"
-            f" {shortest:g} s or more",
-        )
 
 
 def _host(scenario: Scenario) -> Iterator[Problem]:
-    host, clock, heartbeat_s = scenario.host, scenario.clock, scenario.drive.heartbeat_period_s
+    host, clock = scenario.host, scenario.clock
     delay_s = scenario.localisation.delay_s or clock.control_period_s
     least = {
-        "heartbeat_age_limit_s": (2 * heartbeat_s, "two of drive.heartbeat_period_s"),
         "encoder_age_limit_s": (2 * clock.control_period_s, "two of clock.control_period_s"),
         "pose_age_limit_s": (
             delay_s + 2 * clock.localisation_period_s,
             "the delay and two of clock.localisation_period_s",
         ),
     }
-    if host.rearm:
-        least["rearm_after_s"] = 2 * heartbeat_s, "two of drive.heartbeat_period_s"
-        least["rearm_limit_s"] = 3 * heartbeat_s, "three of drive.heartbeat_period_s"
-        if scenario.localisation.source == "odometry":
-            remedy = "odometry alone doesn't know where a robot is after a fault: false, or fixes"
-            yield Problem("host.rearm", True, remedy)
+    if host.rearm and scenario.localisation.source == "odometry":
+        remedy = "odometry alone doesn't know where a robot is after a fault: false, or fixes"
+        yield Problem("host.rearm", True, remedy)
     for key, (limit, what) in least.items():
         value = getattr(host, key)
         if value is not None and value < limit:

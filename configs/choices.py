@@ -1,8 +1,8 @@
-"""Tables of a file whose keys depend on a name in them: the law's gains, an own shape's parameters.
+"""Tables of a file whose keys depend on a name in them: of a law, an own shape, a drive protocol.
 
-    [control]                       [path]
-    law = "my_law:MyLaw"            kind = "my_paths:Clover"
-    k = 2.0                         radius_m = 3.0
+    [control]                [path]                       [drive]
+    law = "my_law:MyLaw"     kind = "my_paths:Clover"     protocol = "my_drive:ROW"
+    k = 2.0                  radius_m = 3.0               torque_unit_shaft_N_m = 1e-3
 
 The name leads to a class (`configs.plugins`), the class to its parameters, and these are validated
 like any other section: unknown keys, types, bounds. Where the file is, is in the context of the
@@ -12,7 +12,7 @@ validation: {"folder": ...}; {"recorded": True} takes classes that aren't here a
 import contextlib
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from configs.parameters import Parameters, as_tuples
 from configs.plugins import (
@@ -34,6 +34,9 @@ if TYPE_CHECKING:
     from pydantic_core import core_schema
 
 
+_P = TypeVar("_P", bound=Parameters)
+
+
 class Chooser(NamedTuple):
     """Makes a table a `Choice`: annotates it in a model."""
 
@@ -41,6 +44,7 @@ class Chooser(NamedTuple):
     key: str  # that holds the name
     shipped: Mapping[str, str]
     default: str = ""  # the name if there is none
+    shared: type[Parameters] = Parameters  # what all parameters derive from
 
     def choose(self, table: Mapping[str, Any], folder: str, *, recorded: bool = False) -> Choice:
         """The choice that a table makes.
@@ -68,9 +72,9 @@ class Chooser(NamedTuple):
         owners = [
             other
             for other in self.shipped
-            if hasattr(parameters_of(find(self.kind, other, "", self.shipped)), key)
+            if key in keys_of(parameters_of(find(self.kind, other, "", self.shipped)))
         ]
-        return f": {name} doesn't have this gain of {owners[0]}; delete it" if owners else ""
+        return f": {name} doesn't have this key of {owners[0]}; delete it" if owners else ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: "GetCoreSchemaHandler") -> Any:
         """Tables become choices, and are written as tables."""
@@ -92,8 +96,8 @@ class Chooser(NamedTuple):
         )
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: "GetJsonSchemaHandler") -> Any:
-        """The keys of a shipped choice; all keys of any other."""
-        about = f'a shipped {self.kind.word}, or "module:Class" of your own'
+        """The keys of a shipped choice; all keys of any other, and those that choices share."""
+        about = f'a shipped {self.kind.word}, or "{self.kind.form}" of your own'
         names = [*self.shipped]
         key: dict[str, Any] = {"type": "string", "description": about, "examples": names}
         if self.default:
@@ -101,13 +105,14 @@ class Chooser(NamedTuple):
         cases = []
         for name in self.shipped:
             parameters = parameters_of(find(self.kind, name, "", self.shipped))
-            keys = adapter_of(parameters).json_schema()["properties"]
+            keys = _described(parameters)
             case: dict[str, Any] = {"properties": {self.key: {"const": name}}}
             if name != self.default:
                 case["required"] = [self.key]
             then = {"properties": {self.key: True, **keys}, "additionalProperties": False}
             cases.append({"if": case, "then": then})
-        made: dict[str, Any] = {"type": "object", "properties": {self.key: key}}
+        shared = _described(self.shared) if keys_of(self.shared) else {}
+        made: dict[str, Any] = {"type": "object", "properties": {self.key: key, **shared}}
         if cases:
             made["allOf"] = cases
         if not self.default:
@@ -168,13 +173,37 @@ def parameters_of(plugin: Plugin) -> type[Parameters]:
         PluginError: the plugin can't be had, or a default is out of its own bounds.
     """
     found = load(plugin)
-    parameters: type[Parameters] = found.Gains if plugin.kind is Kind.LAW else found
+    parameters: type[Parameters] = found
+    if plugin.kind is Kind.LAW:
+        parameters = found.Gains
+    elif plugin.kind is Kind.DRIVE:
+        parameters = found.section
     try:
         adapter_of(parameters)
     except Exception as error:  # pydantic's, of annotations that it doesn't know
         raise PluginError(f"{parameters.__qualname__}: {str(error).splitlines()[0]}") from error
     _refuse_bad_defaults(parameters)
     return parameters
+
+
+def keys_of(parameters: type[Parameters]) -> set[str]:
+    """The keys of a table; none of `Parameters` itself."""
+    return set(getattr(parameters, "__dataclass_fields__", ()))
+
+
+def shared_part(shared: type[_P], parameters: Parameters) -> _P:
+    """A choice's parameters as what all choices share; of a record's class just these keys."""
+    if isinstance(parameters, shared):
+        return parameters
+    values = dict(parameters.values) if isinstance(parameters, Recorded) else {}
+    known = {key: values[key] for key in keys_of(shared) & set(values)}
+    made: _P = adapter_of(shared).validate_python(known)
+    return made
+
+
+def _described(parameters: type[Parameters]) -> dict[str, Any]:
+    properties: dict[str, Any] = adapter_of(parameters).json_schema()["properties"]
+    return properties
 
 
 def _refuse_bad_defaults(parameters: type[Parameters]) -> None:

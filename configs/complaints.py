@@ -63,6 +63,8 @@ class Salvage(NamedTuple):
         if "control.law" in self.lost and self._is_of_the_fleets_law(problem.key):
             return False
         text = f"{problem.key} {problem.remedy}"
+        if "drive.protocol" in self.lost and "drive." in text:
+            return False
         return not any(key in text or key.startswith(f"{problem.key}.") for key in self.lost)
 
     def _is_of_the_fleets_law(self, key: str) -> bool:

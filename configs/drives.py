@@ -1,82 +1,78 @@
-"""Where the drive protocols are, by name; and their own keys of `[drive.options]`.
+"""Section [drive]: the keys that every drive protocol has; and the protocols, by name.
 
 odrive            shipped: a row of `DRIVES`
 my_drive:ROW      the value ROW of my_drive.py (or of the package my_drive) beside the scenario
-                  file, else on sys.path: a `DriveProtocol`
+                  file, else on sys.path: a `bridge.drives.interface.DriveProtocol`
+
+The section of a protocol derives from `Drive`: in the file its keys stand beside the shared ones.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from configs.parameters import Parameters
-from configs.plugins import Choice, Kind, Plugin, Recorded, find, load
-from configs.tables import origin_of, validated
+from configs.parameters import Node, Parameters, Positive, Seconds, SecondsOrZero, parameter
 
 if TYPE_CHECKING:
-    from pydantic import GetCoreSchemaHandler
-    from pydantic_core import core_schema
-
-    from configs.sections import Drive
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NoOptions(Parameters):
-    """A protocol without keys of its own."""
-
-
-NO_OPTIONS = NoOptions()
-
+    from configs.errors import Problem
+    from configs.host import Host
+    from configs.sections import Clock
 
 DRIVES: Mapping[str, str] = {"odrive": "bridge.drives.odrive:ODRIVE"}
 """The protocols that are shipped: where each one's row is."""
-ODRIVE = Choice(find(Kind.DRIVE, "odrive", "", DRIVES), NO_OPTIONS)
+DEFAULT = "odrive"
 
 
-class ProtocolName(str):
-    """The name of a protocol, and the folder of the file that has it.
+class VelocityLimit(NamedTuple):
+    """A drive's limit of speed in torque mode: at the shaft |τ| ≤ gain × (limit − |speed|)."""
 
-    The folder comes with the context of the validation, as for `configs.choices`.
+    key: str  # of [drive] that sets it
+    limit_shaft_rev_s: float
+    gain_shaft_N_m_s_rev: float
+
+
+class Derating(NamedTuple):
+    """Temperatures between which a drive takes its current limit linearly to 0."""
+
+    from_C: float
+    to_C: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive(Parameters):
+    """The drives, two per robot.
+
+    The methods are a protocol's to override: what checks know of it.
     """
 
-    __slots__ = ("folder", "recorded")
-    folder: str
-    recorded: bool
+    preset: Literal["ideal", "limited", "realistic"] = parameter(
+        "ideal",
+        "ideal: torque as commanded; limited: with the limits of the drive; realistic: these,"
+        " and [motor], [encoder], [supply]",
+    )
+    right_node: Node = 0
+    left_node: Node = 1
+    encoder_period_s: Seconds | None = parameter(
+        None,
+        "of encoder frames, at most one control period, which it is if not given;"
+        " in lockstep on ideal buses they come with the ticks",
+    )
+    command_latency_s: tuple[SecondsOrZero, SecondsOrZero] = parameter(
+        (0.0001, 0.0011),
+        "least and most from the end of a frame until firmware acts on it; preset"
+        " realistic on buses with bit timing",
+    )
+    torque_constant_N_m_A: Positive = 0.05
+    current_limit_A: Positive = 10.0
 
-    def __new__(cls, name: str, folder: str = "", *, recorded: bool = False) -> Self:
-        """A name of a file in this folder; `recorded`: its module needn't be here."""
-        made = super().__new__(cls, name)
-        made.folder, made.recorded = folder, recorded
-        return made
+    def problems(self, clock: "Clock", host: "Host") -> Iterator["Problem"]:  # noqa: ARG002
+        """Problems of the protocol's own keys with each other, with [clock] and with [host]."""
+        return iter(())
 
-    def __getnewargs_ex__(self) -> Any:
-        return (str(self), self.folder), {"recorded": self.recorded}
+    def velocity_limit(self) -> VelocityLimit | None:
+        """The limit of speed in torque mode, None if there is none; not of the preset ideal."""
+        return None
 
-    @classmethod
-    def __get_pydantic_core_schema__(cls, source: Any, handler: "GetCoreSchemaHandler") -> Any:
-        """A text."""
-        from pydantic_core import core_schema
-
-        def made(text: str, info: "core_schema.ValidationInfo") -> ProtocolName:
-            if isinstance(text, cls):
-                return text
-            folder, recorded = origin_of(info)
-            return cls(text, folder, recorded=recorded)
-
-        return core_schema.with_info_after_validator_function(
-            made, core_schema.str_schema(strict=True)
-        )
-
-
-def choice_of(drive: "Drive") -> Choice:
-    """The protocol of [drive] with its own keys, checked.
-
-    Raises:
-        PluginError: there is none of that name, or its module fails; the text is the remedy.
-        ValidationError: a key or value of `[drive.options]` is wrong.
-    """
-    name = drive.protocol
-    if name.recorded and name not in DRIVES:
-        return Choice(Plugin(Kind.DRIVE, name, name), Recorded(tuple(drive.options.items())))
-    plugin = find(Kind.DRIVE, str(name), name.folder, DRIVES)
-    return Choice(plugin, validated(load(plugin).section, drive.options))
+    def derating(self) -> Derating | None:
+        """The temperatures of derating, None if drives don't derate."""
+        return None

@@ -22,6 +22,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from configs.drives import Drive
 from configs.errors import ScenarioError
 from configs.parameters import Parameters
 from configs.signals import signals_fault
@@ -258,6 +259,10 @@ def _protocol_fault(row: Any) -> str | None:
     if missing:
         return f"it has no {', no '.join(missing)} (see bridge.drives.interface.DriveProtocol)"
     fault = _parameters_fault(row.section)
+    if fault is None and not issubclass(row.section, Drive):
+        fault = "it must derive from configs.drives.Drive"
+    if fault is None and "protocol" in row.section.__dataclass_fields__:
+        fault = "protocol is the key that names the row; choose another name"
     return None if fault is None else f"its section: {fault}"
 
 

@@ -22,7 +22,7 @@ from configs.brief import (
     WireModel,
 )
 from configs.curves import formation_offset, reference_path
-from configs.drives import choice_of
+from configs.drives import Drive
 from configs.parameters import extended
 from configs.reach import Reach, reach_of
 from configs.scenario import Scenario
@@ -35,8 +35,6 @@ POSE_AGE_LIMIT_S = 0.5
 START_DEADLINE_S, START_DEADLINE_PER_ROBOT_S = 20.0, 0.5
 HELLO_EVERY_S, HELLO_EVERY_PER_ROBOT_S = 0.02, 0.001
 """All processes send hellos at once, so those of a large fleet are less frequent."""
-UNLIMITED = 1e6
-"""A limit that nothing reaches: [A], [rev/s]."""
 SERIAL_NUMBER = 0x3858_0000_0000
 
 
@@ -124,12 +122,10 @@ def _drive_link(scenario: Scenario, robot: sections.Robot, drive: DriveModel) ->
         encoder_age_s = max(ENCODER_AGE_LIMIT_S, 10 * scenario.clock.control_period_s)
     return DriveLink(
         choice=drive.choice,
+        limited=drive.limited,
         right_node=right_node,
         left_node=left_node,
         encoder_period_ns=drive.encoder_period_ns,
-        velocity_limit_shaft_rev_s=drive.velocity_limit_shaft_rev_s,
-        current_limit_A=drive.current_limit_A,
-        heartbeat_period_ns=drive.heartbeat_period_ns,
         encoder_age_limit_ns=round(encoder_age_s * 1e9),
         heartbeat_age_limit_ns=round(host.heartbeat_age_limit_s * 1e9),
         mounting=scenario.mounting_of(robot),
@@ -234,37 +230,16 @@ def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief
 
 def _drive_model(scenario: Scenario, number: int) -> DriveModel:
     drive = scenario.drive
-    limited = drive.preset != "ideal"
-    return extended(
-        DriveModel,
-        drive,
-        current_limit_A=drive.current_limit_A if limited else UNLIMITED,
-        velocity_limit_shaft_rev_s=drive.velocity_limit_shaft_rev_s if limited else UNLIMITED,
-        torque_limiters=limited,
+    return DriveModel(
+        choice=scenario.drive_choice,
+        limited=drive.preset != "ideal",
         serial_number=SERIAL_NUMBER + 2 * number,
-        firmware_version=_version(drive.firmware),
-        command_latency_ns=_latency_ns(drive),
-        heartbeat_period_ns=_ns(drive.heartbeat_period_s),
         encoder_period_ns=_ns(drive.encoder_period_s or scenario.clock.control_period_s),
-        torques_period_ns=_ns(drive.torques_period_s),
-        error_period_ns=_ns(drive.error_period_s),
-        iq_period_ns=_ns(drive.iq_period_s),
-        temperature_period_ns=_ns(drive.temperature_period_s),
-        bus_voltage_period_ns=_ns(drive.bus_voltage_period_s),
-        powers_period_ns=_ns(drive.powers_period_s),
-        watchdog_ns=_ns(drive.watchdog_s),
-        boot_ns=_ns(drive.boot_s),
-        calibration_ns=_ns(drive.calibration_s),
-        choice=choice_of(drive),
+        command_latency_ns=_latency_ns(drive),
     )
 
 
-def _version(text: str) -> tuple[int, int, int]:
-    major, minor, revision = (int(part) for part in text.split("."))
-    return major, minor, revision
-
-
-def _latency_ns(drive: sections.Drive) -> tuple[int, int]:
+def _latency_ns(drive: Drive) -> tuple[int, int]:
     if drive.preset != "realistic":
         return 0, 0
     least_s, most_s = drive.command_latency_s

@@ -10,7 +10,8 @@ from typing import Annotated, Literal
 from annotated_types import Len
 from pydantic import BaseModel, ConfigDict, Field
 
-from configs.choices import chosen_anew
+from configs.choices import chosen_anew, shared_part
+from configs.drives import Drive
 from configs.graph import Graph, generated, parse_edge, random_rooted
 from configs.host import Host
 from configs.parameters import Name, Seconds, Seed, changed
@@ -19,13 +20,14 @@ from configs.plugins import Choice
 from configs.powertrain import Encoder, Motor, Supply
 from configs.sections import (
     LAW,
+    PROTOCOL,
     Body,
     Bus,
     Clock,
     Control,
     Coordination,
     Disturbance,
-    Drive,
+    DriveChoice,
     Expect,
     GraphSection,
     Leader,
@@ -62,7 +64,9 @@ class Scenario(BaseModel):
     coordination: Coordination = Coordination()
     localisation: Localisation = Localisation()
     bus: Bus = Bus()
-    drive: Drive = Drive()
+    drive_choice: DriveChoice = Field(
+        default_factory=lambda: PROTOCOL.choose({}, ""), alias="drive"
+    )
     motor: Motor = Motor()
     encoder: Encoder = Encoder()
     supply: Supply = Supply()
@@ -78,6 +82,11 @@ class Scenario(BaseModel):
     def ends_at_s(self) -> float:
         """Scenario time at which the run ends."""
         return self.duration_s if self.until_s is None else self.until_s
+
+    @property
+    def drive(self) -> Drive:
+        """Section [drive]; of a record whose protocol isn't here the shared keys."""
+        return shared_part(Drive, self.drive_choice.parameters)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from annotated_types import Ge, Gt, Le, Len
 
 from configs import patterns
 from configs.choices import Changes, Chooser
-from configs.drives import ProtocolName
+from configs.drives import DEFAULT, DRIVES, Drive
 from configs.parameters import (
     MOST_S,
     Finite,
@@ -220,67 +220,9 @@ class Bus(Parameters):
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Drive(Parameters):
-    """The drives, two per robot."""
-
-    protocol: ProtocolName = parameter(
-        ProtocolName("odrive"), "odrive, or module:ROW of a protocol of your own"
-    )
-    options: dict[str, str | int | float | bool] = field(
-        default_factory=dict,
-        hash=False,
-        metadata={"description": "the keys of a protocol of your own"},
-    )
-    preset: Literal["ideal", "limited", "realistic"] = parameter(
-        "ideal",
-        "ideal: torque as commanded; limited: with the limits below; realistic: these,"
-        " and [motor], [encoder], [supply]",
-    )
-    right_node: Node = 0
-    left_node: Node = 1
-    heartbeat_period_s: Seconds = 0.1
-    encoder_period_s: Seconds | None = parameter(
-        None,
-        "of encoder frames, whole milliseconds, at most one control period, which it is"
-        " if not given; in lockstep on ideal buses they come with the ticks",
-    )
-    torques_period_s: SecondsOrZero = parameter(
-        0.0, "this message and the next five: whole milliseconds; 0: only on request"
-    )
-    error_period_s: SecondsOrZero = 0.0
-    iq_period_s: SecondsOrZero = 0.0
-    temperature_period_s: SecondsOrZero = 0.0
-    bus_voltage_period_s: SecondsOrZero = 0.0
-    powers_period_s: SecondsOrZero = 0.0
-    firmware: Annotated[str, Pattern(patterns.FIRMWARE)] = parameter(
-        "0.6.10", "from 0.6.11 on, writing an endpoint is answered"
-    )
-    boot_s: SecondsOrZero = parameter(0.5, "silent for so long after a reboot")
-    calibrated: bool = parameter(True, "at power-up; else arming needs a calibration")
-    calibration_s: Seconds = parameter(2.0, "of the motor, and then of the encoder")
-    estop_blocks_arming: bool = parameter(True, "until errors are cleared")
-    under_voltage_V: NotNegative = parameter(10.0, "of the bus; below, a drive disarms")
-    over_voltage_V: Positive = parameter(30.0, "of the bus; above, a drive disarms")
-    derate_from_C: Finite = parameter(100.0, "from here the current limit falls linearly")
-    derate_to_C: Finite = parameter(120.0, "to nothing here; 5 K above, a drive disarms")
-    spinout_power_W: NotNegative = parameter(
-        10.0, "disarms if the motor brakes and takes more than this; 0: it never does"
-    )
-    watchdog_s: SecondsOrZero = parameter(0.1, "0: off, as drives are delivered")
-    command_latency_s: tuple[SecondsOrZero, SecondsOrZero] = parameter(
-        (0.0001, 0.0011),
-        "least and most from the end of a frame until firmware acts on it; preset"
-        " realistic on buses with bit timing",
-    )
-    zero_torque_on_disarm: bool = parameter(False, "False: as in the field")
-    torque_constant_N_m_A: Positive = 0.05
-    current_limit_A: Positive = 10.0
-    velocity_limit_shaft_rev_s: Positive = 10.0
-    velocity_gain_shaft_N_m_s_rev: Positive = 1.0 / 6.0
-    velocity_integrator_gain_shaft_N_m_rev: NotNegative = 1.0 / 3.0
-    position_gain_1_s: NotNegative = 20.0
-    overspeed_ratio: Annotated[float, Ge(1)] = 1.2
+PROTOCOL = Chooser(Kind.DRIVE, "protocol", DRIVES, DEFAULT, Drive)
+DriveChoice = Annotated[Choice, PROTOCOL]
+"""The drive protocol and its section, in one table."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,8 +9,7 @@ from typing import NamedTuple, Protocol
 
 from bridge.frame import Frame
 from configs.brief import DriveLink, DriveModel
-from configs.drives import NoOptions
-from configs.parameters import Parameters
+from configs.drives import Drive
 
 Motion = tuple[float, float, float, float]
 """(right, left) wheel angle [rad], then (right, left) wheel speed [rad/s]."""
@@ -179,6 +178,7 @@ class DriveProtocol(NamedTuple):
     """A frame in one line for people, "" if it isn't the protocol's."""
     node_seen: Callable[[Frame], NodeSeen | None]
     """The node that a frame concerns, None if it isn't the protocol's."""
-    section: type[Parameters] = NoOptions
-    """Keys of `[drive.options]`; both ends find them in `DriveLink.own` and `DriveModel.own`."""
+    section: type[Drive] = Drive
+    """Keys of [drive]; both ends find theirs in `DriveLink.section` and `DriveModel.section`."""
     endpoints: EndpointFile | None = None
+    """None: the drives have no such file."""

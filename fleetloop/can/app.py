@@ -203,8 +203,9 @@ def endpoints(
         Path | None,
         typer.Option("--out", "-o", metavar="FILE", help="Output file. Default: standard output."),
     ] = None,
+    protocol: ProtocolOption = "odrive",
 ) -> None:
     """Print the endpoints of the drives in the form of the vendor's flat_endpoints.json."""
     from fleetloop.can.endpoints import write_endpoints
 
-    raise typer.Exit(write_endpoints(bus, firmware, out))
+    raise typer.Exit(write_endpoints(bus, firmware, out, protocol))

@@ -9,11 +9,10 @@ Bus time is the scenario's: in lockstep it passes faster or slower than the wall
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from bridge.drives import protocol
 from bridge.drives.interface import DriveProtocol
 from bridge.frame import ERR, Frame
 from bridge.wire.bits import frame_bits
-from configs.drives import ODRIVE
+from fleetloop.can.decoder import protocol_of
 
 ERROR_FRAME_BITS = 20
 
@@ -32,7 +31,7 @@ class Census:
     """Counts the frames of one bus."""
 
     bit_rate: int
-    drives: DriveProtocol = field(default_factory=lambda: protocol(ODRIVE.plugin))
+    drives: DriveProtocol = field(default_factory=protocol_of)
     """The protocol whose nodes are counted."""
     frames: int = 0
     error_frames: int = 0

@@ -4,12 +4,12 @@ from pathlib import Path
 
 from bridge.drives import protocol
 from bridge.drives.interface import DriveProtocol
-from configs.drives import DRIVES
+from configs.drives import DEFAULT, DRIVES
 from configs.errors import ScenarioError
 from configs.plugins import Kind, PluginError, find
 
 
-def protocol_of(name: str) -> DriveProtocol:
+def protocol_of(name: str = DEFAULT) -> DriveProtocol:
     """The protocol of an option `--protocol`: shipped, or module:ROW of the current folder.
 
     Raises:

@@ -17,14 +17,13 @@ from datetime import datetime
 from typing import TextIO
 
 from bridge.can_bus import sockets
-from bridge.drives import protocol
 from bridge.drives.interface import DriveProtocol
 from bridge.frame import EFF, Frame
 from bridge.process.clock import SYSTEM_CLOCK
-from configs.drives import ODRIVE
 from configs.errors import ExitStatus, ScenarioError
 from fleetloop.can import error_frames, filters, text
 from fleetloop.can.client import Heard, Listener, open_bus
+from fleetloop.can.decoder import protocol_of
 from fleetloop.can.filters import Filter
 from fleetloop.signals import interruptible
 from fleetloop.streams import forget_output
@@ -44,7 +43,7 @@ class DumpOptions:
     ascii_too: bool = False
     explain_errors: bool = False
     decode: bool = False
-    drives: DriveProtocol = field(default_factory=lambda: protocol(ODRIVE.plugin))
+    drives: DriveProtocol = field(default_factory=protocol_of)
     """The protocol that `decode` knows."""
     count: int | None = None
     silence_s: float | None = None

@@ -12,27 +12,29 @@ import can
 
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import to_frame, to_message
-from bridge.drives import protocol
 from bridge.drives.interface import EndpointFile, Versions
 from bridge.process.clock import SYSTEM_CLOCK
-from configs.drives import ODRIVE
+from configs.drives import DEFAULT
 from configs.errors import ExitStatus, InfrastructureError, ScenarioError
 from fleetloop.can.client import open_bus
+from fleetloop.can.decoder import protocol_of
 from fleetloop.terminal import note, say
 
 HEARD_S = 5.0
 """Longest wait for a drive's first frame, and for its answer."""
 
 
-def write_endpoints(bus: str | None, firmware: str | None, out: Path | None) -> int:
+def write_endpoints(
+    bus: str | None, firmware: str | None, out: Path | None, protocol_name: str = DEFAULT
+) -> int:
     """Print the table, or write it to a file; return the exit status.
 
     Raises:
-        ScenarioError: a version that no emulated drive has, a file that can't be written, or both
-            a bus and a version.
+        ScenarioError: no such protocol, or one without endpoints; a version that no emulated drive
+            has, a file that can't be written, or both a bus and a version.
         InfrastructureError: no such bus, or no drive on it.
     """
-    file = _file()
+    file = endpoint_file(protocol_name)
     if bus is None:
         try:
             versions = file.versions_of(firmware)
@@ -42,7 +44,7 @@ def write_endpoints(bus: str | None, firmware: str | None, out: Path | None) -> 
         raise ScenarioError(f"--fw-version {firmware}: {bus} says itself which firmware it has")
     else:
         with open_bus(bus) as opened:
-            versions = ask(opened, bus, HEARD_S)
+            versions = ask(opened, bus, HEARD_S, file)
     text = json.dumps(file.contents(versions), indent=2)
     if out is None:
         say(text)
@@ -55,13 +57,13 @@ def write_endpoints(bus: str | None, firmware: str | None, out: Path | None) -> 
     return ExitStatus.OK
 
 
-def ask(bus: FleetloopBus, name: str, within_s: float) -> Versions:
+def ask(bus: FleetloopBus, name: str, within_s: float, file: EndpointFile) -> Versions:
     """The versions of a drive on a bus.
 
     Raises:
         InfrastructureError: none is heard or answers in time, or the bus ended.
     """
-    query = _file().query()
+    query = file.query()
     deadline = SYSTEM_CLOCK.monotonic_s() + within_s
     try:
         while query.versions is None and (left_s := deadline - SYSTEM_CLOCK.monotonic_s()) > 0.0:
@@ -76,8 +78,13 @@ def ask(bus: FleetloopBus, name: str, within_s: float) -> Versions:
     return query.versions
 
 
-def _file() -> EndpointFile:
-    found = protocol(ODRIVE.plugin).endpoints
-    if found is None:
-        raise ScenarioError(f"drives of protocol {ODRIVE.name} have no file of endpoints")
-    return found
+def endpoint_file(protocol_name: str = DEFAULT) -> EndpointFile:
+    """The file of a protocol's drives.
+
+    Raises:
+        ScenarioError: no such protocol, or its drives have no such file.
+    """
+    file = protocol_of(protocol_name).endpoints
+    if file is None:
+        raise ScenarioError(f"--protocol {protocol_name}: its drives have no file of endpoints")
+    return file

@@ -13,7 +13,7 @@ from pathlib import Path
 from bridge.can_bus import sockets
 from bridge.drives.interface import DriveProtocol
 from bridge.process.clock import SYSTEM_CLOCK
-from configs.drives import ODRIVE
+from configs.drives import DEFAULT
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.census import Census, Node
 from fleetloop.can.client import Listener, open_bus
@@ -44,7 +44,7 @@ class BusReport:
 
 @interruptible
 def list_buses(
-    *, seconds: float, bit_rate: int, as_json: bool, protocol_name: str = ODRIVE.name
+    *, seconds: float, bit_rate: int, as_json: bool, protocol_name: str = DEFAULT
 ) -> int:
     """Listen to all buses for `seconds` and print what there is; return the exit status.
 

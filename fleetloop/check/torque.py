@@ -10,7 +10,7 @@ On a steady curve (1) is d (v̄_d + b |ω̄_d|) v_r / r at the outer wheel. Let 
     the law's limit (robust)      control.torque_limit_wheel_N_m
     the host's                    host.torque_limit_wheel_N_m
     gear × k_t × i_max            drive.torque_constant_N_m_A, current_limit_A, and [motor]'s
-    gear × k_v (v_max − gear ν)   drive.velocity_limit_shaft_rev_s: torque mode's                (3)
+    gear × k_v (v_max − gear ν)   the drive's velocity limit, of its torque mode                 (3)
     gear × k_t × (U − k_t ω_s)/R  supply.voltage_V at the shaft's speed ω_s                      (4)
 
 Where need exceeds it, only a part f < 1 of the speed is kept up; the robot falls behind by
@@ -114,17 +114,19 @@ def _drive_limits(scenario: Scenario, robot: Robot) -> list[Limit]:
             key, limit_A = "motor.current_limit_A", motor.current_limit_A
     words = f"gear {gear:g} × {constant:g} N·m/A × {limit_A:g} A"
     per_rad = 1.0 / (2.0 * pi)
-    gain, fastest = drive.velocity_gain_shaft_N_m_s_rev, drive.velocity_limit_shaft_rev_s
-    found = [
-        Limit(key, words, gear * constant * limit_A),
-        Limit(
-            "drive.velocity_limit_shaft_rev_s",
-            f"what the drive's velocity limit of {fastest:g} rev/s leaves",
-            gear * gain * fastest,
-            gear**2 * gain * per_rad,
-            fastest * 2.0 * pi / gear * radius_m,
-        ),
-    ]
+    found = [Limit(key, words, gear * constant * limit_A)]
+    velocity = drive.velocity_limit()
+    if velocity is not None:
+        fastest, gain = velocity.limit_shaft_rev_s, velocity.gain_shaft_N_m_s_rev
+        found.append(
+            Limit(
+                velocity.key,
+                f"what the drive's velocity limit of {fastest:g} rev/s leaves",
+                gear * gain * fastest,
+                gear**2 * gain * per_rad,
+                fastest * 2.0 * pi / gear * radius_m,
+            )
+        )
     if drive.preset == "realistic":
         resistance = motor.winding_resistance_ohm + motor.fet_resistance_ohm
         most = _MODULATION * scenario.supply.voltage_V
@@ -217,7 +219,8 @@ def _heat(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:
         i = i_max (T_to − T) / (T_to − T_from),  T = T_ambient + R R_th i²              (5)
     """
     drive, motor = scenario.drive, scenario.motor
-    if drive.preset != "realistic":
+    derating = drive.derating()
+    if drive.preset != "realistic" or derating is None:
         return
     gear = scenario.mounting_of(course.robot).gear_ratio
     constant = motor.torque_constant_N_m_A or drive.torque_constant_N_m_A
@@ -227,7 +230,7 @@ def _heat(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:
     )
     amps = np.minimum(np.abs(need.torque_wheel_N_m) / gear / constant, most_A)
     square = float((amps**2).mean(axis=0).max())
-    allowed_K = drive.derate_from_C - motor.ambient_C
+    allowed_K = derating.from_C - motor.ambient_C
     parts = [
         (*_warm_up_s(per_A2 * square, allowed_K, time_s), per_A2, part)
         for part, per_A2, time_s in (
@@ -246,12 +249,12 @@ def _heat(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:
     after_s, rise_K, per_A2, part = min(parts)
     if after_s == inf:
         return
-    span_K = drive.derate_to_C - drive.derate_from_C
+    span_K = derating.to_C - derating.from_C
     slope = span_K / drive.current_limit_A
-    above_K = drive.derate_to_C - motor.ambient_C
+    above_K = derating.to_C - motor.ambient_C
     left_A = (sqrt(slope**2 + 4.0 * per_A2 * max(above_K, 0.0)) - slope) / (2.0 * per_A2)
     text = (
-        f"{sqrt(square):.3g} A rms take the {part} to {drive.derate_from_C:g} °C, where derating"
+        f"{sqrt(square):.3g} A rms take the {part} to {derating.from_C:g} °C, where derating"
         f" begins, after {after_s:.2g} s, and would to {motor.ambient_C + rise_K:.0f} °C; it leaves"
         f" {gear * constant * left_A:.3g} N·m in the long run"
     )

@@ -9,15 +9,13 @@ from typing import Any
 import pytest
 
 from configs import brief, curves
+from configs.drives import Drive
 from configs.parameters import Parameters
 from configs.scenario import Scenario
 
 RESOLVED = {
     "AgentBrief": {"offset", "s_0", "bus"},
-    "DriveLink": {
-        *("protocol", "right_node", "left_node"),
-        *("velocity_limit_shaft_rev_s", "current_limit_A"),
-    },
+    "DriveLink": {"right_node", "left_node"},
     "HostLimits": {
         *("torque_limit_wheel_N_m", "torque_slew_limit_wheel_N_m_s"),
         *("encoder_mismatch_limit_wheel_rad", "pose_mismatch_limit_m"),
@@ -48,7 +46,7 @@ def sections_in(kind: Any) -> Iterator[type[Parameters]]:
 
 SECTIONS = {
     section for field in Scenario.model_fields.values() for section in sections_in(field.annotation)
-}
+} | {Drive}
 KEYS = {field.name for section in SECTIONS for field in dataclasses.fields(section)}
 BRIEFS = [
     kind

@@ -43,7 +43,7 @@ def test_gains_that_another_law_has_are_to_be_deleted() -> None:
         f"paper.toml: control.{key}" for key in ("k5", "eta", "rho")
     ]
     for line in lines:
-        assert "fixed_dsc doesn't have this gain of adaptive_dsc; delete it" in line
+        assert "fixed_dsc doesn't have this key of adaptive_dsc; delete it" in line
 
 
 def test_the_paper_scenario_has_the_numbers_of_section_4() -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from support.scenario_text import changed
 
+from bridge.drives.odrive.model import AxisModel
 from configs.brief import NetworkLink, PowertrainModel, RobotBrief
 from configs.errors import ScenarioError
 from configs.loading import load, loads
@@ -46,9 +47,11 @@ def test_the_realistic_preset_has_the_limits_of_the_limited_one() -> None:
     (limited, *_), (realistic, *_) = (
         robots("two_robots", f"drive.preset='{preset}'") for preset in ("limited", "realistic")
     )
-    assert replace(realistic.drive, preset="limited", command_latency_ns=(0, 0)) == limited.drive
+    axis = AxisModel.of(realistic.drive)
+    assert replace(axis, preset="limited") == AxisModel.of(limited.drive)
+    assert axis.torque_limiters
+    assert limited.drive.command_latency_ns == (0, 0)
     assert realistic.drive.command_latency_ns == (100_000, 1_100_000)
-    assert realistic.drive.torque_limiters
 
 
 def test_the_motor_has_the_torque_constant_and_limit_of_its_drive_if_not_its_own() -> None:

@@ -7,14 +7,15 @@ from bridge.drives.interface import DriveMeasurements
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.endpoints import ENDPOINTS
 from bridge.drives.odrive.frames import AxisState, Command
+from bridge.drives.odrive.model import AxisModel
 from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import Frame
-from configs.brief import DriveModel
 
 MS = 1_000_000
 NODE = 3
+SERIAL_NUMBER = 0xABCDEF
 NUMBER = {endpoint.path: endpoint.number for endpoint in ENDPOINTS.values()}
-MODEL = DriveModel(
+MODEL = AxisModel(
     torque_constant_N_m_A=0.05,
     current_limit_A=10.0,
     velocity_limit_shaft_rev_s=10.0,
@@ -26,7 +27,6 @@ MODEL = DriveModel(
     torques_period_ns=0,
     watchdog_ns=100 * MS,
     zero_torque_on_disarm=False,
-    serial_number=0xABCDEF,
 )
 HEALTHY = DriveMeasurements(
     torque_shaft_N_m=0.0, current_A=0.0, fet_C=30.0, motor_C=float("nan"), bus_V=24.0, bus_A=0.0
@@ -34,7 +34,7 @@ HEALTHY = DriveMeasurements(
 
 
 def axis(**changes) -> OdriveNode:
-    return OdriveNode(replace(MODEL, **changes), NODE, MODEL.serial_number)
+    return OdriveNode(replace(MODEL, **changes), NODE, SERIAL_NUMBER)
 
 
 def tell(node: OdriveNode, command: Command, data: bytes = b"", now_ns: int = 0) -> list[Frame]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from agents.agent import Agent
 from agents.guard import Phase
 from bridge.drives.odrive.frames import AxisState, Command, identifier
+from bridge.drives.odrive.model import AxisModel
 from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import Frame
 from bridge.network.messages import PathState, PoseFix
@@ -29,7 +30,7 @@ class Bench:
         scenario = load("two_robots", (*BARE, *overrides)) if overrides else SCENARIO
         brief: AgentBrief = agent_brief(scenario, robot, network=NOWHERE, bus=())
         brief = replace(brief, **changes)
-        model = plant_brief(scenario, network=NOWHERE).robots[0].drive
+        model = AxisModel.of(plant_brief(scenario, network=NOWHERE).robots[0].drive)
         self.rows: list[tuple[float, ...]] = []
         self._row = row_of(controller_signals(brief.law.load().SIGNALS))
         self.agent = Agent(brief, RowBuffer(self._row, self._keep))

@@ -23,6 +23,7 @@ from functools import partial
 from bridge.drives.interface import Motion
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisState, Command, ControlMode, InputMode
+from bridge.drives.odrive.model import section_of
 from bridge.drives.odrive.remote_axis import NEVER, RemoteAxis
 from bridge.frame import RTR, Frame
 from configs.brief import DriveLink
@@ -57,6 +58,7 @@ class OdriveClient:
 
     def __init__(self, link: DriveLink) -> None:
         self._link = link
+        self._limits = section_of(link.section).limits(limited=link.limited)
         self._right = RemoteAxis("right", link.right_node, link.mounting.right_sign, link)
         self._left = RemoteAxis("left", link.left_node, link.mounting.left_sign, link)
         self._axes = (self._right, self._left)
@@ -133,9 +135,7 @@ class OdriveClient:
                 ]
             case _Step.SET:
                 self._step = _Step.CLOSE
-                limits = f.TWO_FLOATS.pack(
-                    self._link.velocity_limit_shaft_rev_s, self._link.current_limit_A
-                )
+                limits = f.TWO_FLOATS.pack(*self._limits)
                 mode = f.TWO_U32.pack(ControlMode.TORQUE, InputMode.PASSTHROUGH)
                 return [
                     frame

@@ -12,8 +12,8 @@ from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.endpoints import flat_endpoints
 from bridge.drives.odrive.frames import Command
 from bridge.drives.odrive.reports import HARDWARE
+from bridge.drives.odrive.section import OdriveSection
 from bridge.frame import Frame
-from configs.sections import Drive
 
 
 class FlatEndpoints:
@@ -25,7 +25,7 @@ class FlatEndpoints:
         Raises:
             ValueError: no emulated drive has this firmware.
         """
-        found = re.fullmatch(r"(0)\.(6)\.([0-9]{1,2})", firmware or Drive().firmware)
+        found = re.fullmatch(r"(0)\.(6)\.([0-9]{1,2})", firmware or OdriveSection().firmware)
         if found is None:
             raise ValueError("right is 0.6 and a revision, e.g. 0.6.10")
         major, minor, revision = (int(part) for part in found.groups())

@@ -17,13 +17,13 @@ from math import exp, pi
 
 from bridge.drives.interface import DriveMeasurements
 from bridge.drives.odrive.frames import AxisError
-from configs.brief import DriveModel
+from bridge.drives.odrive.model import AxisModel
 
 TRIP_K = 5.0
 _POWER_BANDWIDTH_RAD_S = 20.0
 
 
-def derating(celsius: float, model: DriveModel) -> float:
+def derating(celsius: float, model: AxisModel) -> float:
     """The factor on the current limit by (1), in [0, 1]; 0 for NaN."""
     span = model.derate_to_C - model.derate_from_C
     if not celsius < model.derate_to_C:
@@ -31,7 +31,7 @@ def derating(celsius: float, model: DriveModel) -> float:
     return 1.0 if celsius <= model.derate_from_C else (model.derate_to_C - celsius) / span
 
 
-def current_limit(measurements: DriveMeasurements, limit_A: float, model: DriveModel) -> float:
+def current_limit(measurements: DriveMeasurements, limit_A: float, model: AxisModel) -> float:
     """The current limit in force [A]."""
     factor = derating(measurements.fet_C, model)
     if measurements.motor_C == measurements.motor_C:
@@ -39,7 +39,7 @@ def current_limit(measurements: DriveMeasurements, limit_A: float, model: DriveM
     return limit_A * factor
 
 
-def conditions(measurements: DriveMeasurements, limit_in_force_A: float, model: DriveModel) -> int:
+def conditions(measurements: DriveMeasurements, limit_in_force_A: float, model: AxisModel) -> int:
     """The conditions that disarm the drive now, as bits of `AxisError`."""
     hottest_C = model.derate_to_C + TRIP_K
     bits = 0

@@ -31,8 +31,8 @@ from bridge.drives.odrive.calibration import NEVER, Calibration
 from bridge.drives.odrive.control import Controller
 from bridge.drives.odrive.frames import AxisError, AxisState, ControlMode, InputMode
 from bridge.drives.odrive.frames import ProcedureResult as Result
+from bridge.drives.odrive.model import AxisModel
 from bridge.drives.odrive.parameters import FLOAT32_MAX, Parameters
-from configs.brief import DriveModel
 
 
 class LocalAxis:
@@ -64,7 +64,7 @@ class LocalAxis:
         "velocity",
     )
 
-    def __init__(self, model: DriveModel, serial: int) -> None:
+    def __init__(self, model: AxisModel, serial: int) -> None:
         self.model = model
         self.serial = serial
         self._lasting = AxisError(0)  # never cleared

@@ -31,10 +31,10 @@ from bridge.drives.odrive.calibration import NEVER
 from bridge.drives.odrive.commands import SETTERS
 from bridge.drives.odrive.frames import AxisState, Command, RebootAction
 from bridge.drives.odrive.local_axis import LocalAxis
+from bridge.drives.odrive.model import AxisModel
 from bridge.drives.odrive.parameters import FLOAT32_MAX, Parameters
 from bridge.drives.odrive.reports import REPORTS, address, floats
 from bridge.frame import EFF, ERR, RTR, Frame
-from configs.brief import DriveModel
 
 ANSWER_WITHIN_NS = 20_000_000
 """Longest delay of an unaddressed drive's answer to Address."""
@@ -63,7 +63,7 @@ class OdriveNode(LocalAxis):
     _next_encoder_ns: int
     _next_other_ns: int
 
-    def __init__(self, model: DriveModel, node_id: int, serial_number: int) -> None:
+    def __init__(self, model: AxisModel, node_id: int, serial_number: int) -> None:
         super().__init__(model, serial_number)
         self._random = Random(serial_number)
         self._saved = Parameters.of(model, node_id)

@@ -1,7 +1,7 @@
 """The parameters of an axis that a host can set: in RAM, saved by Reboot 1, lost by other reboots.
 
 Floats are finite and not negative, as is everything else; what isn't is refused, and the value
-stays. The vendor's defaults [firmware 0.5.6 source] come with `DriveModel`.
+stays. The vendor's defaults come with `AxisModel`.
 """
 
 from dataclasses import dataclass, replace
@@ -9,7 +9,7 @@ from math import inf, isfinite
 from typing import Self
 
 from bridge.drives.odrive.frames import Command, ControlMode, InputMode
-from configs.brief import DriveModel
+from bridge.drives.odrive.model import AxisModel
 
 FLOAT32_MAX = 3.4028234663852886e38
 
@@ -41,7 +41,7 @@ class Parameters:
     input_mode: int = InputMode.PASSTHROUGH
 
     @classmethod
-    def of(cls, model: DriveModel, node_id: int) -> Self:
+    def of(cls, model: AxisModel, node_id: int) -> Self:
         """The parameters of a drive as delivered."""
         return cls(
             node_id=node_id,

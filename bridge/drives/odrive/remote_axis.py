@@ -14,6 +14,7 @@ from math import pi
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.cadence import LIMIT, Cadence
 from bridge.drives.odrive.frames import AxisError, AxisState, Command, ProcedureResult
+from bridge.drives.odrive.model import section_of
 from bridge.frame import Frame
 from configs.brief import DriveLink
 
@@ -73,7 +74,8 @@ class RemoteAxis:
         self._heartbeats = 0
         self._doubled = ""
         self._encoder_cadence = Cadence(link.encoder_period_ns)
-        self._heartbeat_cadence = Cadence(link.heartbeat_period_ns)
+        heartbeat_s = section_of(link.section).heartbeat_period_s
+        self._heartbeat_cadence = Cadence(round(heartbeat_s * 1e9))
 
     def frame(self, command: Command, data: bytes) -> Frame:
         """A frame for this drive."""

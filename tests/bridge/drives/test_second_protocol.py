@@ -3,18 +3,19 @@
 import pytest
 from support.second_drive.tools import PlainSection
 
-import configs.drives
 from bridge.drives import protocol
 from bridge.frame import Frame
 from bridge.process.lifecycle import Stop
 from configs.brief import NetworkLink
+from configs.drives import DRIVES
 from configs.errors import ScenarioError
-from configs.loading import load
+from configs.loading import load, loads, to_toml
 from configs.plugins import Kind, find
 from configs.resolve import agent_brief, leader_brief, plant_brief, robot_briefs
 from configs.signals import PLANT_SIGNALS
 from fleetloop.can.census import Census, Node
 from fleetloop.check.bus_load import bus_messages
+from fleetloop.check.torque import limits
 from fleetloop.in_process import InProcessRun
 
 OWN = "support.second_drive:ROW"
@@ -41,12 +42,12 @@ class Rows:
 @pytest.mark.parametrize("timing", ["ideal", "wire"])
 @pytest.mark.parametrize("name", [OWN, "plain"])
 def test_a_scenario_runs_with_a_protocol_of_ones_own(monkeypatch, timing: str, name: str) -> None:
-    monkeypatch.setattr(configs.drives, "DRIVES", {**configs.drives.DRIVES, "plain": OWN})
+    monkeypatch.setitem(DRIVES, "plain", OWN)
     scenario = load(
         "two_robots_100hz",
         (
             f"drive.protocol='{name}'",
-            "drive.options.torque_unit_shaft_N_m=0.0001",
+            "drive.torque_unit_shaft_N_m=0.0001",
             "mounting={left_sign=-1, gear_ratio=9.0}",
             f"bus.timing='{timing}'",
             "drive.preset='ideal'",
@@ -73,20 +74,67 @@ def test_a_scenario_runs_with_a_protocol_of_ones_own(monkeypatch, timing: str, n
 
 
 def test_its_section_is_checked_where_it_stands() -> None:
-    with pytest.raises(
-        ScenarioError, match=r"drive\.options\.torque_unit_shaft_N_m=-1.0: .*greater than 0"
-    ):
-        load("two_robots", (f"drive.protocol='{OWN}'", "drive.options.torque_unit_shaft_N_m=-1.0"))
-    with pytest.raises(ScenarioError, match=r"drive\.options\.unit.*unknown key"):
-        load("two_robots", (f"drive.protocol='{OWN}'", "drive.options.unit=1.0"))
-    with pytest.raises(ScenarioError, match=r"drive\.options\.unit.*unknown key$"):
-        load("two_robots", ("drive.options.unit=1.0",))
+    own = f"drive.protocol='{OWN}'"
+    with pytest.raises(ScenarioError, match=r"drive\.torque_unit_shaft_N_m=-1.0: .*greater than 0"):
+        load("two_robots", (own, "drive.torque_unit_shaft_N_m=-1.0"))
+    with pytest.raises(ScenarioError, match=r"drive\.right_node=63: must be 62 or less"):
+        load("two_robots", (own, "drive.right_node=63"))
+    with pytest.raises(ScenarioError, match=r"drive\.unit.*unknown key"):
+        load("two_robots", ("drive.unit=1.0",))
+
+
+def test_keys_of_another_protocol_are_told_as_such() -> None:
+    words = (
+        rf"drive\.watchdog_s=0\.2: unknown key: {OWN} doesn't have this key of odrive; delete it"
+    )
+    with pytest.raises(ScenarioError, match=words):
+        load("two_robots", (f"drive.protocol='{OWN}'", "drive.watchdog_s=0.2"))
+    with pytest.raises(ScenarioError, match=r"drive\.torque_unit_shaft_N_m=1\.0: unknown key"):
+        load("two_robots", ("drive.torque_unit_shaft_N_m=1.0",))
+
+
+def test_relations_of_its_keys_are_its_own() -> None:
+    """A heartbeat is ODrive's: the countdown that it asks for is not asked of others."""
+    short = ("host.heartbeat_age_limit_s=0.001", "clock.countdown_s=0.0")
+    with pytest.raises(ScenarioError) as refused:
+        load("two_robots", short)
+    assert "two of drive.heartbeat_period_s need" in str(refused.value)
+    assert "host.heartbeat_age_limit_s=0.001: two of drive.heartbeat_period_s" in str(refused.value)
+    assert load("two_robots", (f"drive.protocol='{OWN}'", *short)).clock.countdown_s == 0.0
+
+
+def test_an_unknown_protocol_is_one_complaint() -> None:
+    """Nothing is said of its keys, nor of ODrive's in their place."""
+    with pytest.raises(ScenarioError) as refused:
+        load("two_robots", ("drive.protocol='odriv'", "clock.countdown_s=0.0"))
+    (complaint,) = refused.value.complaints
+    assert (complaint.where, complaint.key) == ("--set drive.protocol='odriv'", "")
+    assert "did you mean odrive?" in complaint.remedy
+
+
+def test_a_record_of_it_is_read_without_it() -> None:
+    written = to_toml(load("two_robots", (f"drive.protocol='{OWN}'", "drive.right_node=7")))
+    elsewhere = written.replace("support.second_drive", "not_here")
+    with pytest.raises(ScenarioError, match="no module not_here is installed"):
+        loads("a record", elsewhere)
+    read = loads("a record", elsewhere, recorded=True)
+    assert read.drive.right_node == 7
+    assert to_toml(read) == elsewhere
+
+
+def test_limits_of_an_odrive_are_not_checked_of_it() -> None:
+    scenario = load("two_robots", (f"drive.protocol='{OWN}'", "drive.preset='realistic'"))
+    assert [limit.key for limit in limits(scenario, scenario.robot[0])] == [
+        "drive.current_limit_A",
+        "supply.voltage_V",
+    ]
+    assert scenario.drive.derating() is None
 
 
 def test_an_unknown_key_of_it_is_told_with_the_known_ones() -> None:
-    known = r"did you mean torque_unit_shaft_N_m\? \(known here: torque_unit_shaft_N_m\)"
-    with pytest.raises(ScenarioError, match=rf"drive\.options\.torque_unit.*unknown key; {known}"):
-        load("two_robots", (f"drive.protocol='{OWN}'", "drive.options.torque_unit_N_m=1.0"))
+    known = r"did you mean torque_unit_shaft_N_m\? \(known here: .*right_node, torque_constant"
+    with pytest.raises(ScenarioError, match=rf"drive\.torque_unit.*unknown key; {known}"):
+        load("two_robots", (f"drive.protocol='{OWN}'", "drive.torque_unit_N_m=1.0"))
 
 
 @pytest.mark.parametrize(
@@ -124,14 +172,14 @@ def test_the_place_where_its_module_fails_is_said(
     assert f"{file}, {words}" in str(refused.value)
 
 
-def test_its_options_load_and_decoder_hang_on_the_row(monkeypatch) -> None:
+def test_its_section_load_and_decoder_hang_on_the_row(monkeypatch) -> None:
     scenario = load("two_robots", (f"drive.protocol='{OWN}'",))
     robot = robot_briefs(scenario)[0]
-    assert robot.drive.own == PlainSection()
+    assert robot.drive.section == PlainSection()
     messages = bus_messages([robot], 1_000_000)
     assert sorted(message.can_id for message in messages) == [0x100, 0x101, 0x200, 0x201]
-    monkeypatch.setattr(configs.drives, "DRIVES", {"plain": OWN})
-    plain, own = (find(Kind.DRIVE, name, "", configs.drives.DRIVES) for name in ("plain", OWN))
+    monkeypatch.setitem(DRIVES, "plain", OWN)
+    plain, own = (find(Kind.DRIVE, name, "", DRIVES) for name in ("plain", OWN))
     assert protocol(plain) is protocol(own)
     assert protocol(own).words(Frame(0x105, bytes(8))) == "plain node 5"
     census = Census(1_000_000, protocol(own))

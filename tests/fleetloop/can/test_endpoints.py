@@ -10,7 +10,7 @@ from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import Command
 from bridge.frame import Frame
 from configs.errors import InfrastructureError, ScenarioError
-from fleetloop.can.endpoints import ask, write_endpoints
+from fleetloop.can.endpoints import ask, endpoint_file, write_endpoints
 
 HEARTBEAT = f.HEARTBEAT.pack(0, 1, 0, 0, 0)
 
@@ -33,12 +33,19 @@ def test_without_a_word_it_is_the_firmware_that_drives_have_by_default(tmp_path:
         write_endpoints(None, None, tmp_path / "nowhere" / "x.json")
 
 
+def test_a_protocol_without_endpoints_is_refused_by_name(capsys) -> None:
+    name = "support.second_drive:ROW"
+    with pytest.raises(ScenarioError, match=f"--protocol {name}: its drives have no file of end"):
+        write_endpoints(None, None, None, name)
+    assert capsys.readouterr().out == ""
+
+
 def test_a_drive_on_the_bus_is_asked_for_its_versions(buses, in_background) -> None:
     found = []
 
     def asking() -> None:
         with FleetloopBus("r1") as bus:
-            found.append(ask(bus, "r1", 10.0))
+            found.append(ask(bus, "r1", 10.0, endpoint_file()))
 
     in_background(asking)
     buses.await_clients(1)
@@ -56,4 +63,4 @@ def test_a_bus_without_drives_is_named(buses) -> None:
         FleetloopBus("r1") as bus,
         pytest.raises(InfrastructureError, match=r"no drive.s heartbeat within 0\.05 s"),
     ):
-        ask(bus, "r1", 0.05)
+        ask(bus, "r1", 0.05, endpoint_file())

@@ -1,7 +1,7 @@
 """A minimal drive protocol of a test's own: two messages per axis.
 
 0x100 + node    drive → host     angle [1e-6 rev] and speed [1e-5 rev/s] of the shaft, i32
-0x200 + node    host → drive     torque at the shaft, i16, in units of `[drive.options]`
+0x200 + node    host → drive     torque at the shaft, i16, in units of [drive]
 """
 
 from support.second_drive.client import PlainClient

@@ -16,8 +16,8 @@ class PlainClient:
     notices: tuple[str, ...] = ()
 
     def __init__(self, link: DriveLink) -> None:
-        assert isinstance(link.own, PlainSection)
-        self._unit = link.own.torque_unit_shaft_N_m
+        assert isinstance(link.section, PlainSection)
+        self._unit = link.section.torque_unit_shaft_N_m
         mounting = link.mounting
         self._nodes = (link.right_node, link.left_node)
         self._gears = tuple(

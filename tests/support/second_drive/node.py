@@ -13,8 +13,8 @@ class PlainNode:
     """One drive."""
 
     def __init__(self, model: DriveModel, node_id: int, serial_number: int) -> None:  # noqa: ARG002
-        assert isinstance(model.own, PlainSection)
-        self._unit = model.own.torque_unit_shaft_N_m
+        assert isinstance(model.section, PlainSection)
+        self._unit = model.section.torque_unit_shaft_N_m
         self._id = MOTION + node_id
         self.setpoint_id = TORQUE + node_id
         self._period_ns = model.encoder_period_ns

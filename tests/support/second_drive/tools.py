@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from bridge.drives.interface import CyclicMessage, NodeSeen
 from bridge.frame import EFF, ERR, Frame
 from configs.brief import DriveModel
-from configs.parameters import Parameters, Positive, parameter
+from configs.drives import Drive
+from configs.parameters import Positive, parameter
 
 MOTION, TORQUE = 0x100, 0x200
 ENCODER = struct.Struct("<ii")
@@ -15,8 +16,8 @@ REV, REV_S = 1e-6, 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlainSection(Parameters):
-    """Keys of `[drive.options]`."""
+class PlainSection(Drive):
+    """The shared keys of [drive] and one more."""
 
     torque_unit_shaft_N_m: Positive = parameter(1e-3, "one step of a set-point")
 

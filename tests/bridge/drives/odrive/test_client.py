@@ -6,34 +6,24 @@ from math import inf, nan, pi
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.odrive_axis import MODEL, MS
 
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.client import OdriveClient
 from bridge.drives.odrive.frames import AxisError, AxisState, Command, identifier
+from bridge.drives.odrive.model import AxisModel
 from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import EFF, ERR, RTR, Frame
-from configs.brief import DriveLink, DriveModel, NetworkLink
-from configs.drives import ODRIVE
-from configs.loading import load
-from configs.resolve import plant_brief
-from configs.sections import Mounting
+from configs.brief import DriveLink
+from configs.sections import PROTOCOL, Mounting
 
-MS = 1_000_000
-MODEL = replace(
-    plant_brief(load("two_robots"), network=NetworkLink("t", "", "", "")).robots[0].drive,
-    current_limit_A=10.0,
-    velocity_limit_shaft_rev_s=10.0,
-    torque_limiters=True,
-    encoder_period_ns=1 * MS,
-    watchdog_ns=100 * MS,
-)
-LINK = DriveLink(ODRIVE, 0, 1, 1 * MS, 10.0, 10.0, Mounting())
+LINK = DriveLink(PROTOCOL.choose({}, ""), True, 0, 1, 1 * MS, Mounting())
 
 
 class Robot:
     """Two axes and their client on an ideal bus."""
 
-    def __init__(self, model: DriveModel = MODEL, link: DriveLink = LINK) -> None:
+    def __init__(self, model: AxisModel = MODEL, link: DriveLink = LINK) -> None:
         self.axes = [OdriveNode(model, 0, 7), OdriveNode(model, 1, 8)]
         self.client = OdriveClient(link)
         self.now_ns = 0

@@ -1,5 +1,6 @@
 """CANSimple frames against documented bytes, the vendor's DBC, and hosts' odd lengths."""
 
+from dataclasses import replace
 from functools import cache
 from importlib import resources
 
@@ -8,31 +9,18 @@ import pytest
 from cantools.database import Database
 from hypothesis import given
 from hypothesis import strategies as st
+from support import odrive_axis
 
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.client import OdriveClient
 from bridge.drives.odrive.frames import AxisError, Command
 from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import RTR, Frame
-from configs.brief import DriveLink, DriveModel
-from configs.drives import ODRIVE
-from configs.sections import Mounting
+from configs.brief import DriveLink
+from configs.sections import PROTOCOL, Mounting
 
-MODEL = DriveModel(
-    torque_constant_N_m_A=0.05,
-    current_limit_A=10.0,
-    velocity_limit_shaft_rev_s=10.0,
-    velocity_gain_shaft_N_m_s_rev=1 / 6,
-    overspeed_ratio=1.2,
-    torque_limiters=True,
-    heartbeat_period_ns=100_000_000,
-    encoder_period_ns=1_000_000,
-    torques_period_ns=10_000_000,
-    watchdog_ns=0,
-    zero_torque_on_disarm=False,
-    serial_number=0x3858_0000_0000,
-)
-LINK = DriveLink(ODRIVE, 0, 1, 1_000_000, 10.0, 10.0, Mounting())
+MODEL = replace(odrive_axis.MODEL, torques_period_ns=10_000_000, watchdog_ns=0)
+LINK = DriveLink(PROTOCOL.choose({}, ""), True, 0, 1, 1_000_000, Mounting())
 
 
 @cache

@@ -5,6 +5,7 @@ from support.odrive_axis import (
     MODEL,
     MS,
     NODE,
+    SERIAL_NUMBER,
     arm,
     ask_state,
     axis,
@@ -158,9 +159,9 @@ def test_an_unaddressed_drive_is_silent_but_answers_for_its_address_after_a_whil
     assert SECOND < at_ns <= SECOND + ANSWER_WITHIN_NS
     (reply,) = node.due(at_ns)
     assert reply.can_id == f.identifier(f.UNADDRESSED, Command.ADDRESS)
-    assert reply.data == b"\x3f" + MODEL.serial_number.to_bytes(6, "little") + b"\0"
+    assert reply.data == b"\x3f" + SERIAL_NUMBER.to_bytes(6, "little") + b"\0"
     assert not node.due(at_ns + SECOND)
-    told(node, MODEL.serial_number, 5)
+    told(node, SERIAL_NUMBER, 5)
     assert [frame.can_id for frame in node.due(at_ns + SECOND)] == [0x0A1, 0x0A9]
 
 
@@ -176,7 +177,7 @@ def test_unaddressed_drives_answer_at_different_times() -> None:
 @pytest.mark.parametrize("length", [1, 2, 6])
 def test_a_short_address_is_ignored(length: int) -> None:
     node = axis()
-    told(node, MODEL.serial_number, 9, length)
+    told(node, SERIAL_NUMBER, 9, length)
     assert node.node_id == NODE
 
 
@@ -184,9 +185,9 @@ def test_an_address_of_seven_bytes_a_foreign_one_and_one_out_of_range() -> None:
     node = axis()
     told(node, 77, 9)
     assert node.node_id == NODE
-    told(node, MODEL.serial_number, 64)
+    told(node, SERIAL_NUMBER, 64)
     assert node.node_id == NODE
-    told(node, MODEL.serial_number, 9, 7)
+    told(node, SERIAL_NUMBER, 9, 7)
     assert (node.node_id, node.setpoint_id) == (9, 0x12E)
     told(node, 0, 10)
     assert node.node_id == 10

@@ -5,7 +5,7 @@ from math import inf, isfinite, nan
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.odrive_axis import MODEL, MS, NODE, arm, axis, beat, tell, torque
+from support.odrive_axis import MS, NODE, SERIAL_NUMBER, arm, axis, beat, tell, torque
 
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisError, AxisState, Command
@@ -178,8 +178,8 @@ def test_address_is_told_and_set_by_serial_number() -> None:
     node = axis()
     (reply,) = node.on_frame(f.request(f.UNADDRESSED, Command.ADDRESS), 0)
     assert reply.data[0] == NODE
-    assert int.from_bytes(reply.data[1:7], "little") == MODEL.serial_number
-    serial = MODEL.serial_number.to_bytes(6, "little")
+    assert int.from_bytes(reply.data[1:7], "little") == SERIAL_NUMBER
+    serial = SERIAL_NUMBER.to_bytes(6, "little")
     ask = Frame(f.identifier(f.UNADDRESSED, Command.ADDRESS), b"\x09" + serial)
     node.on_frame(ask, 0)
     assert node.node_id == 9
