@@ -21,9 +21,10 @@
 Filters and κ̂ are advanced exactly, Θ̂ by Euler's rule. `proj` is in `agents.laws.dsc_terms`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan, cos, exp, hypot, tanh
-from typing import NamedTuple
+from math import atan, cos, exp, hypot, inf, tanh
+from typing import Any, NamedTuple
 
 from agents.laws.dsc_terms import (
     Eight,
@@ -37,13 +38,17 @@ from agents.laws.dsc_terms import (
 )
 from agents.laws.interface import (
     PATH_ERRORS,
+    AdaptationLimit,
+    Fast,
     Law,
     LawOutput,
+    LoopElement,
     PathVariable,
     Reference,
     RobotMotion,
     RobotPath,
     Signal,
+    Theta,
     Wheels,
 )
 from configs.parameters import NotNegative, Positive, parameter
@@ -176,12 +181,92 @@ class AdaptiveDsc(Law):
         theta_1, theta_2, kappa = self._estimates if before is None else before[3:]
         return after._replace(theta_1=theta_1, theta_2=theta_2, kappa=kappa)
 
+    # --- what follows from the equations, for `fleetloop check` ---------------------------------
+
+    SPEED_GAIN = "k4"
+    LOOP_GAINS = ("k1", "k3", "k2", "k4")
+    SATURATION = (
+        "the paper's law learns the limit;"
+        ' control.law = "adaptive_dsc_robust" doesn\'t, or start closer'
+    )
+
+    @classmethod
+    def torque_limit_wheel_N_m(cls, gains: SurfaceGains) -> float:  # noqa: ARG003
+        """None: (34) asks for whatever its terms are."""
+        return inf
+
     @classmethod
     def approach_rate_1_s(cls, gains: SurfaceGains) -> float | None:
         """k_1 of (15)."""
         return gains.k1
 
     @classmethod
+    def lateral_gain_1_m(cls, gains: SurfaceGains) -> float | None:
+        """k_2 of (17)."""
+        return gains.k2
+
+    @classmethod
     def speed_gain_N_m_s(cls, gains: SurfaceGains) -> float | None:
         """k_4 of (34)."""
         return gains.k4
+
+    @classmethod
+    def loop_elements(
+        cls,
+        gains: Any,
+        wheels: Wheels,
+        period_s: float,
+        path: RobotPath,
+        along: PathVariable,
+        theta: Theta,
+    ) -> Sequence[LoopElement] | None:
+        """Filters (19), (20), (27) about steady motion; Θ̂ at its start values, and at Θ; κ̂ is 0."""
+        law = cls(gains, wheels, period_s, path)
+        start_1, start_2, _ = law._estimates
+        here = path(along.s)
+        steady = 0.0, here.v_bar * along.s_dot, here.omega_bar * along.s_dot
+        lags_s = gains.gamma_1_s, gains.gamma_2_s, gains.gamma_3_s
+
+        def element(theta_1: Row, theta_2: Row) -> LoopElement:
+            def step(
+                filters: Fast, motion: RobotMotion, reference: Reference, along: PathVariable
+            ) -> tuple[float, float, Fast]:
+                alpha_theta, alpha_v, alpha_omega = filters
+                state = DscState(alpha_theta, alpha_v, alpha_omega, theta_1, theta_2, 0.0)
+                right, left, after, _ = law.step(state, motion, reference, along)
+                return right, left, after[:3]
+
+            return LoopElement(steady, step, "filters", lags_s)
+
+        return element(start_1, start_2), element(theta[:4], theta[4:])
+
+    @classmethod
+    def adaptation_limit(cls, gains: Any, period_s: float) -> AdaptationLimit | None:
+        """(35) by Euler's rule in the speed loop is stable for h Σ k_5 F² < k_4 in both rows of Ω.
+
+        F has ω² and the filters' rates in it: it is large where a robot starts far off its path or
+        facing away.
+        """
+        k5_1, k5_2 = gains.k5[:4], gains.k5[4:]
+        moved_v = gains.gamma_2_s * smoothing(period_s, gains.gamma_2_s)
+        moved_omega = gains.gamma_3_s * smoothing(period_s, gains.gamma_3_s)
+
+        def ratio(before: DscState | None, after: DscState, motion: RobotMotion) -> float:
+            if before is None:
+                return 0.0
+            rate_v = (after.alpha_v - before.alpha_v) / moved_v
+            rate_omega = (after.alpha_omega - before.alpha_omega) / moved_omega
+            v, omega = motion.v, motion.omega
+            rows = (
+                (k5_1, (omega * omega, v, omega, rate_v)),
+                (k5_2, (v * omega, v, omega, rate_omega)),
+            )
+            sizes = [sum(k * f * f for k, f in zip(*row, strict=True)) for row in rows]
+            return float(period_s * max(sizes) / gains.k4)
+
+        return AdaptationLimit(
+            "(35) sampled: h Σ k5 F² < k4",
+            "k4",
+            'control.law = "adaptive_dsc_robust" normalises it; or lower k5, or start closer',
+            ratio,
+        )

@@ -8,17 +8,22 @@ Four changes to `agents.laws.adaptive_dsc`, all of them that law again to first 
     Θ̂_r' divided by 1 + h |K_5 F_r²| / (k_4/4)           stable when sampled       (35)
 """
 
-from dataclasses import dataclass
-from math import atan, tanh
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import atan, inf, tanh
+from typing import Any
 
 from agents.laws.adaptive_dsc import AdaptiveDsc, DscState
 from agents.laws.dsc_terms import Row, adapt
 from agents.laws.interface import (
+    AdaptationLimit,
     LawOutput,
+    LoopElement,
     PathVariable,
     Reference,
     RobotMotion,
     RobotPath,
+    Theta,
     Wheels,
 )
 from configs.parameters import Positive, parameter
@@ -67,7 +72,30 @@ class AdaptiveDscRobust(AdaptiveDsc):
         normalised = error * (1.0 / (1.0 + size / (0.25 * k4)))
         return adapt(row, regressor, normalised, rates, self._bounds)
 
+    # --- what follows from the equations, for `fleetloop check` ---------------------------------
+
+    SATURATION = ""
+
     @classmethod
-    def torque_limit_wheel_N_m(cls, gains: "AdaptiveDscRobust.Gains") -> float:
+    def torque_limit_wheel_N_m(cls, gains: Any) -> float:
         """The law's limit."""
-        return gains.torque_limit_wheel_N_m
+        return float(gains.torque_limit_wheel_N_m)
+
+    @classmethod
+    def loop_elements(
+        cls,
+        gains: Any,
+        wheels: Wheels,
+        period_s: float,
+        path: RobotPath,
+        along: PathVariable,
+        theta: Theta,
+    ) -> Sequence[LoopElement] | None:
+        """Those of the law without its torque limit: close to the path it doesn't act."""
+        unlimited = replace(gains, torque_limit_wheel_N_m=inf)
+        return super().loop_elements(unlimited, wheels, period_s, path, along, theta)
+
+    @classmethod
+    def adaptation_limit(cls, gains: Any, period_s: float) -> AdaptationLimit | None:  # noqa: ARG003
+        """None: (35) is normalised, and is stable with any gains."""
+        return None

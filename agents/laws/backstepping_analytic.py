@@ -22,20 +22,25 @@ away from 0, where the robot would have to spin: it is held at `margin` and abov
 as in `agents.laws.fixed_dsc`; nothing adapts, and there is no state.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan, cos, sin
+from math import atan, cos, inf, sin
 
 from agents.laws.dsc_terms import Eight, path_errors, wheel_torques
 from agents.laws.fixed_dsc import PAPER_THETA, scaled
 from agents.laws.interface import (
     PATH_ERRORS,
+    AdaptationLimit,
+    Fast,
     Law,
     LawOutput,
+    LoopElement,
     PathVariable,
     Reference,
     RobotMotion,
     RobotPath,
     Signal,
+    Theta,
     Wheels,
 )
 from configs.parameters import NotNegative, Parameters, Positive, parameter
@@ -143,12 +148,57 @@ class BacksteppingAnalytic(Law):
         span = 2.0 * _STEP_M
         return (after[3] - before[3]) / span, (after[4] - before[4]) / span
 
+    # --- what follows from the equations, for `fleetloop check` ---------------------------------
+
+    SPEED_GAIN = "k4"
+    LOOP_GAINS = ("k1", "k3", "k2", "k4")
+
+    @classmethod
+    def torque_limit_wheel_N_m(cls, gains: "BacksteppingAnalytic.Gains") -> float:  # noqa: ARG003
+        """None: [4] asks for whatever its terms are."""
+        return inf
+
     @classmethod
     def approach_rate_1_s(cls, gains: "BacksteppingAnalytic.Gains") -> float | None:
         """k_1 of (15)."""
         return gains.k1
 
     @classmethod
+    def lateral_gain_1_m(cls, gains: "BacksteppingAnalytic.Gains") -> float | None:
+        """k_2 of (17)."""
+        return gains.k2
+
+    @classmethod
     def speed_gain_N_m_s(cls, gains: "BacksteppingAnalytic.Gains") -> float | None:
         """k_4 of [4]."""
         return gains.k4
+
+    @classmethod
+    def loop_elements(
+        cls,
+        gains: "BacksteppingAnalytic.Gains",
+        wheels: Wheels,
+        period_s: float,
+        path: RobotPath,
+        along: PathVariable,  # noqa: ARG003 - there is no state that has to fit it
+        theta: Theta,  # noqa: ARG003 - the law has its own
+    ) -> Sequence[LoopElement] | None:
+        """The law itself: it has no state."""
+        law = cls(gains, wheels, period_s, path)
+
+        def step(
+            fast: Fast, motion: RobotMotion, reference: Reference, along: PathVariable
+        ) -> tuple[float, float, Fast]:
+            out = law.step(None, motion, reference, along)
+            return out.tau_right, out.tau_left, fast
+
+        return (LoopElement((), step),)
+
+    @classmethod
+    def adaptation_limit(
+        cls,
+        gains: "BacksteppingAnalytic.Gains",  # noqa: ARG003
+        period_s: float,  # noqa: ARG003
+    ) -> AdaptationLimit | None:
+        """None: nothing adapts."""
+        return None

@@ -7,11 +7,20 @@ is the best that adaptation could come to, f = 0 is the speed loop alone. All el
 `agents.laws.adaptive_dsc`. The default Θ is that of the paper's robot, d_11 = d_22 = 0.02 N·m·s.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from agents.laws.adaptive_dsc import AdaptiveDsc
 from agents.laws.dsc_terms import Eight, SurfaceGains
-from agents.laws.interface import RobotPath, Wheels
+from agents.laws.interface import (
+    AdaptationLimit,
+    LoopElement,
+    PathVariable,
+    RobotPath,
+    Theta,
+    Wheels,
+)
 from configs.parameters import NotNegative, parameter
 
 PAPER_THETA: Eight = (3.68e-5, 0.02, 0.0, 0.007664, 3.68e-3, 0.0, 0.02, 0.0072416)
@@ -50,3 +59,26 @@ class FixedDsc(AdaptiveDsc):
             theta_hat_0=scaled(gains.theta, gains.factor),
         )
         super().__init__(fixed, wheels, period_s, path)
+
+    # --- what follows from the equations, for `fleetloop check` ---------------------------------
+
+    SATURATION = ""
+
+    @classmethod
+    def loop_elements(
+        cls,
+        gains: Any,
+        wheels: Wheels,
+        period_s: float,
+        path: RobotPath,
+        along: PathVariable,
+        theta: Theta,
+    ) -> Sequence[LoopElement] | None:
+        """The first one of the adaptive law: Θ̂ stays at f Θ."""
+        elements = super().loop_elements(gains, wheels, period_s, path, along, theta)
+        return None if elements is None else elements[:1]
+
+    @classmethod
+    def adaptation_limit(cls, gains: Any, period_s: float) -> AdaptationLimit | None:  # noqa: ARG003
+        """None: nothing adapts."""
+        return None

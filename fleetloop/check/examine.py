@@ -8,6 +8,7 @@ from fleetloop.check.coordination import forecast
 from fleetloop.check.course import courses, refuse_irregular
 from fleetloop.check.finding import Finding, alike
 from fleetloop.check.graph import graph_findings
+from fleetloop.check.law import law_findings
 from fleetloop.check.sampling import sampling_findings
 from fleetloop.check.start import start_findings
 from fleetloop.check.torque import torque_findings
@@ -30,6 +31,7 @@ def examine(source: str, scenario: Scenario, overrides: Overrides = ()) -> list[
             *sampling_findings(scenario, along),
             *torque_findings(scenario, along),
             *start_findings(scenario, ahead),
+            *law_findings(scenario),
             *bus_findings(scenario, robot_briefs(scenario)),
             *unused(scenario),
         ]

@@ -1,54 +1,123 @@
-"""Optional properties of a law that checks use, and whether it is of the paper's kind."""
+"""What a law tells of itself, by its class and its gains: `agents.laws.interface.Law`.
 
+A law offers what its class defines itself or has from a class other than `Law`. What it doesn't
+offer, or raises when it is asked, is unknown here, and `law_findings` says which analysis that
+leaves out.
+"""
+
+from collections.abc import Iterator
 from math import inf
-from typing import Any
+from typing import Any, NamedTuple
 
-from agents.laws.adaptive_dsc import AdaptiveDsc
-from agents.laws.adaptive_dsc_robust import AdaptiveDscRobust
-from agents.laws.dsc_terms import SurfaceGains
+from agents.laws.failure import number, raised
+from agents.laws.interface import AdaptationLimit, Law
 from configs.plugins import Choice
+from configs.scenario import Scenario
+from fleetloop.check.finding import Finding
+
+ANALYSES = {
+    "torque_limit_wheel_N_m": "its own torque limit",
+    "approach_rate_1_s": "catching up after a limit",
+    "lateral_gain_1_m": "motion backwards",
+    "speed_gain_N_m_s": "the sampled speed loop",
+    "loop_elements": "the sampled loop near the path",
+    "adaptation_limit": "sampled adaptation",
+}
+"""What of a law is analysed, by the method of `Law` that tells it."""
+
+
+class Told(NamedTuple):
+    """The answer of a law."""
+
+    value: Any = None
+    trouble: str = ""
+    """The error that it raised instead."""
+
+
+def law_findings(scenario: Scenario) -> Iterator[Finding]:
+    """What isn't analysed of each robot's law."""
+    period_s = scenario.clock.control_period_s
+    for robot in scenario.robot:
+        control = scenario.control_of(robot)
+        missing = [name for name in ANALYSES if not offers(control, name)]
+        if missing:
+            each = ", ".join(f"{ANALYSES[name]} ({name})" for name in missing)
+            text = f"law {control.name} doesn't tell: {each}"
+            yield Finding("ok", "not analysed", text, (robot.name,))
+        for name, what in ANALYSES.items():
+            trouble = "" if name == "loop_elements" else _asked(control, name, period_s).trouble
+            if trouble:
+                text = f"{what}: law {control.name}, {name}: {trouble}"
+                yield Finding("warning", "not analysed", text, (robot.name,), "control.law")
+
+
+def offers(control: Choice, name: str) -> bool:
+    """Whether a law has a method of `Law` other than its default."""
+    found = getattr(control.load(), name, None)
+    return found is not None and getattr(found, "__func__", found) is not _default(name)
 
 
 def torque_limit_wheel_N_m(control: Choice) -> float:
     """The law's own limit of a wheel's torque; infinite if it has none."""
-    limit = _told(control, "torque_limit_wheel_N_m")
-    return inf if limit is None else float(limit)
+    limit: float | None = _asked(control, "torque_limit_wheel_N_m").value
+    return inf if limit is None else limit
 
 
 def approach_rate_1_s(control: Choice) -> float | None:
     """The rate at which it closes an error along the path; None if unknown."""
-    rate: float | None = _told(control, "approach_rate_1_s")
+    rate: float | None = _asked(control, "approach_rate_1_s").value
     return rate
+
+
+def lateral_gain_1_m(control: Choice) -> float | None:
+    """The part of an error across the path that it closes per distance ahead; None if unknown."""
+    gain: float | None = _asked(control, "lateral_gain_1_m").value
+    return gain
 
 
 def speed_gain(control: Choice) -> float | None:
     """Gain of its speed loop, as k_4 of (34); None if unknown."""
-    gain: float | None = _told(control, "speed_gain_N_m_s")
+    gain: float | None = _asked(control, "speed_gain_N_m_s").value
     return gain
 
 
-def is_adaptive_dsc(control: Choice) -> bool:
-    """Whether it is the paper's law or derived from it: its state and gains are known."""
-    found = control.load()
-    return (
-        isinstance(found, type)
-        and issubclass(found, AdaptiveDsc)
-        and hasattr(control.parameters, "k5")
-    )
+def speed_gain_key(control: Choice) -> str:
+    """The name of the gain that sets `speed_gain`; "" if unknown."""
+    name: str = getattr(control.load(), "SPEED_GAIN", "")
+    return name if hasattr(control.parameters, name or " ") else ""
 
 
-def normalises(control: Choice) -> bool:
-    """Whether its adaptation is normalised and holds still at a limit."""
-    return issubclass(control.load(), AdaptiveDscRobust)
+def loop_gains(law: type[Law], gains: Any) -> tuple[str, ...]:
+    """Names of the gains that shape its loop near the path, the first to lower first."""
+    return tuple(name for name in getattr(law, "LOOP_GAINS", ()) if hasattr(gains, name))
 
 
-def lateral_gain_1_m(control: Choice) -> float | None:
-    """k_2 of (17), of the dynamic surface laws; None of others."""
-    gains = control.parameters
-    return gains.k2 if isinstance(gains, SurfaceGains) else None
+def saturation(control: Choice) -> str:
+    """What limits of the drives do to it, and what to do; "" if it isn't harmed, or unknown."""
+    words: str = getattr(control.load(), "SATURATION", "")
+    return words
 
 
-def _told(control: Choice, name: str) -> Any:
-    """What a law says of itself with its gains; None if it doesn't."""
-    ask = getattr(control.load(), name, None)
-    return None if ask is None else ask(control.parameters)
+def adaptation_limit(control: Choice, period_s: float) -> AdaptationLimit | None:
+    """The limit of its sampled adaptation; None if it has none, or unknown."""
+    limit: AdaptationLimit | None = _asked(control, "adaptation_limit", period_s).value
+    return limit
+
+
+def _asked(control: Choice, name: str, period_s: float = 0.0) -> Told:
+    """What a law says of itself with its gains; a number, but of its adaptation."""
+    if not offers(control, name):
+        return Told()
+    ask = getattr(control.load(), name)
+    try:
+        if name == "adaptation_limit":
+            return Told(ask(control.parameters, period_s))
+        answer = ask(control.parameters)
+        return Told(None if answer is None else number(answer))
+    except (Exception, SystemExit) as error:
+        return Told(trouble=raised(error))
+
+
+def _default(name: str) -> Any:
+    method = getattr(Law, name)
+    return getattr(method, "__func__", method)

@@ -7,22 +7,30 @@ Speed loop (29)-(34), output held, torque late by D whole and f of a period, K =
 which is stable for K < 2 sin(π / (2 (2 D + 1))) where f = 0.
 
 Whole channel: the robot's own law and body, linearised by differences about motion along a line or
-an arc at constant speed. State: pose, speeds and filters (19), (20), (27), torques on their way,
-poses on their way, the pose that is held between fixes; the map goes from one fix to the next and
-is taken per control period. Estimates are held at their start values, and at the true ones.   (2)
+an arc at constant speed. State: pose, speeds, the law's fast states, torques on their way, poses on
+their way, the pose that is held between fixes; the map goes from one fix to the next and is taken
+per control period. The law brings its part as a `LoopElement`: what adapts is held.           (2)
 """
 
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import cos, sin
+from operator import add
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.laws.adaptive_dsc import AdaptiveDsc, DscState
-from agents.laws.dsc_terms import Eight
-from agents.laws.interface import PathVariable, Reference, RobotMotion
+from agents.laws.interface import (
+    Law,
+    LoopElement,
+    PathVariable,
+    Reference,
+    RobotMotion,
+    RobotPath,
+    Theta,
+)
 from configs.brief import Wheels
 from plant.body import RigidBody, State
 from plant.integrate import rk4
@@ -37,8 +45,8 @@ MAX_PERIODS = 200
 class Loop:
     """Parameters of one robot's loops."""
 
-    law: type[AdaptiveDsc]
-    gains: AdaptiveDsc.Gains
+    law: type[Law]
+    gains: Any
     wheels: Wheels
     body: RigidBody
     period_s: float
@@ -47,16 +55,24 @@ class Loop:
     """Control periods for which a pose is held; 1 if odometry carries it on."""
     pose_delay: int
     """Control periods that a held pose is old when it comes."""
-    theta: Eight
-    """Θ̂ that is held: the start values, or `true_theta`."""
+    learnt: bool = False
+    """Whether what adapts is held where it may end up, not at its start."""
 
 
-def true_theta(body: RigidBody) -> Eight:
+def true_theta(body: RigidBody) -> Theta:
     """Θ of (32): (c b, d̄_11, d̄_12, m̄_1, c/b, d̄_21, d̄_22, m̄_2)."""
     right, left = body.damping_wheel_N_m_s
     mean, half = 0.5 * (right + left), 0.5 * (right - left)
     c, b = body.c, body.b
     return c * b, mean, b * half, body.mbar_1, c / b, half / b, mean, body.mbar_2
+
+
+def elements(loop: Loop, v_bar: float, omega_bar: float, s_dot: float) -> tuple[LoopElement, ...]:
+    """The law's own on an arc of this v̄_d and ω̄_d at speed ṡ > 0; none if it has no such."""
+    path = _Frame(v_bar * s_dot, omega_bar * s_dot).path(v_bar, omega_bar, s_dot)
+    along, theta = PathVariable(0.0, s_dot, 0.0), true_theta(loop.body)
+    found = loop.law.loop_elements(loop.gains, loop.wheels, loop.period_s, path, along, theta)
+    return () if found is None else tuple(found)
 
 
 def speed_loop_radius(gain: float, delay_periods: float) -> float:
@@ -111,26 +127,17 @@ def delay_margin_s(loop: Loop, v_bar: float, omega_bar: float, s_dot: float) -> 
 
 
 def largest_gain(loop: Loop, name: str, v_bar: float, omega_bar: float, s_dot: float) -> float:
-    """The largest value of k1, k2, k3 or k4 up to today's with which (2) is stable; 0: none."""
+    """The largest value of a gain up to today's with which (2) is stable; 0: none."""
 
     def stable(value: float) -> bool:
-        other = replace(loop, gains=with_gain(loop.gains, name, value))
-        return channel_radius(other, v_bar, omega_bar, s_dot) < 1.0 - 1e-6
+        return channel_radius(with_gain(loop, name, value), v_bar, omega_bar, s_dot) < 1.0 - 1e-6
 
     return bisect(stable, 0.0, getattr(loop.gains, name), 7)
 
 
-def with_gain(gains: AdaptiveDsc.Gains, name: str, value: float) -> AdaptiveDsc.Gains:
-    """Gains of which k1, k2, k3 or k4 is another."""
-    match name:
-        case "k1":
-            return replace(gains, k1=value)
-        case "k2":
-            return replace(gains, k2=value)
-        case "k3":
-            return replace(gains, k3=value)
-        case _:
-            return replace(gains, k4=value)
+def with_gain(loop: Loop, name: str, value: float) -> Loop:
+    """The loop with another value of one gain."""
+    return replace(loop, gains=replace(loop.gains, **{name: value}))
 
 
 def bisect(holds: Callable[[float], bool], low: float, high: float, steps: int) -> float:
@@ -153,40 +160,40 @@ def _interval(loop: Loop, v_bar: float, omega_bar: float, s_dot: float, tick: in
     whole = int(loop.torque_delay_s / h)
     part = loop.torque_delay_s / h - whole
     v, omega = v_bar * s_dot, omega_bar * s_dot
-    rows = loop.theta[:4], loop.theta[4:]
     at = _Frame(v, omega)
+    path = at.path(v_bar, omega_bar, s_dot)
     steady = loop.body.wheel_torques(v, omega, 0.0, 0.0)
-    size = 8 + 2 * (whole + 1)
-    law = loop.law(loop.gains, loop.wheels, h, lambda _: Reference(0.0, 0.0, 0.0, v_bar, omega_bar))
-    along = PathVariable(0.0, s_dot, 0.0)
+    element = elements(loop, v_bar, omega_bar, s_dot)[-1 if loop.learnt else 0]
+    queue_at = 5 + len(element.steady)
+    size = queue_at + 2 * (whole + 1)
 
     def run(deviation: Vector) -> Vector:
-        x, y, theta, dv, domega, a_theta, a_v, a_omega = deviation[:8].tolist()
+        x, y, theta, dv, domega, *moved = deviation[:queue_at].tolist()
         state = State(*at.in_world(0.0, x, y, theta), v + dv, omega + domega, 0.0, 0.0)
         torques = deque(
             (steady[0] + r, steady[1] + left)
-            for r, left in deviation[8:size].reshape(-1, 2).tolist()
+            for r, left in deviation[queue_at:size].reshape(-1, 2).tolist()
         )
         fix = at.in_world(-late_s, *deviation[size:].tolist())
-        memory = DscState(a_theta, v + a_v, omega + a_omega, *rows, 0.0)
+        fast = tuple(map(add, element.steady, moved))
         pose = (x, y, theta)
         for n in range(periods):
             t = n * h
             if n == tick:
                 pose = at.in_path(t, state.x, state.y, state.theta)
-            reference = Reference(*at.in_world(t, 0.0, 0.0, 0.0), v_bar, omega_bar)
+            s = s_dot * t
             motion = RobotMotion(*fix, state.v, state.omega)
-            out = law.step(memory, motion, reference, along)
-            memory = out.state._replace(theta_1=memory.theta_1, theta_2=memory.theta_2, kappa=0.0)
-            torques.append((out.tau_right, out.tau_left))
+            along = PathVariable(s, s_dot, 0.0)
+            right, left, fast = element.step(fast, motion, path(s), along)
+            torques.append((right, left))
             if part > 0.0:
                 state = _moved(loop.body, state, torques[0], part * h)
             state = _moved(loop.body, state, torques[1], (1.0 - part) * h)
             torques.popleft()
         end = at.in_path(periods * h, state.x, state.y, state.theta)
-        filters = memory.alpha_theta, memory.alpha_v - v, memory.alpha_omega - omega
+        moved = [value - rest for value, rest in zip(fast, element.steady, strict=True)]
         queue = [value - s for pair in torques for value, s in zip(pair, steady, strict=True)]
-        return np.array([*end, state.v - v, state.omega - omega, *filters, *queue, *pose])
+        return np.array([*end, state.v - v, state.omega - omega, *moved, *queue, *pose])
 
     nudges = _NUDGE * np.eye(size + 3)
     return np.array([(run(nudge) - run(-nudge)) / (2.0 * _NUDGE) for nudge in nudges]).T
@@ -209,6 +216,10 @@ class _Frame:
             return self._v * t_s, 0.0, angle
         radius = self._v / self._omega
         return radius * sin(angle), radius * (1.0 - cos(angle)), angle
+
+    def path(self, v_bar: float, omega_bar: float, s_dot: float) -> RobotPath:
+        """The arc by s, at this ṡ > 0."""
+        return lambda s: Reference(*self.in_world(s / s_dot, 0.0, 0.0, 0.0), v_bar, omega_bar)
 
     def in_world(self, t_s: float, x: float, y: float, theta: float) -> tuple[float, float, float]:
         x_0, y_0, angle = self._origin(t_s)

@@ -4,39 +4,44 @@ A torque comes late by the time of its frames on the wire, the firmware's latenc
 current loop and the drive's velocity estimator. With a known delay, half of the speed loop's limit
 is a good gain: k_4 = 0.25 min(m̄)/h where torques come one period late.
 
-The speed loop is looked at for every law that has one (`Law.speed_gain_N_m_s`), the channel for the
-dynamic surface laws: it is built of their filters.
+Both are looked at for every law that tells its part: `Law.speed_gain_N_m_s`, `Law.loop_elements`.
 """
 
 from collections.abc import Iterator
 from dataclasses import replace
 from math import inf
-from typing import Any
 
 import numpy as np
 
+from agents.laws.failure import raised
+from agents.laws.interface import LoopElement
 from bridge.frame import Frame
 from bridge.wire.bits import frame_bits
 from configs.brief import Wheels
+from configs.plugins import Choice
 from configs.resolve import schedule
 from configs.scenario import Scenario
 from configs.sections import Robot
 from fleetloop.check.body import inertias, robot_body
 from fleetloop.check.course import Course
 from fleetloop.check.finding import Finding, Level
-from fleetloop.check.law import is_adaptive_dsc, speed_gain
+from fleetloop.check.law import ANALYSES, loop_gains, offers, speed_gain, speed_gain_key
 from fleetloop.check.loop import (
     Loop,
     bisect,
     channel_radius,
     delay_margin_s,
+    elements,
     largest_gain,
     pole_time_s,
     speed_loop_radius,
-    true_theta,
+    with_gain,
 )
 from fleetloop.check.torque import limits
 
+Arc = tuple[float, float, float]
+"""v̄_d, ω̄_d and ṡ of steady motion."""
+Arcs = list[Arc]
 HELD_M = 0.05
 """A reference that moves on by more than this while a pose is held is said."""
 HELD_PERIODS = 20
@@ -53,46 +58,39 @@ def sampling_findings(scenario: Scenario, courses: list[Course]) -> Iterator[Fin
     known: dict[tuple[object, ...], list[Finding]] = {}
     for course in courses:
         robot, control = course.robot, scenario.control_of(course.robot)
-        found: list[Finding] = []
-        if is_adaptive_dsc(control):
-            loop, arcs = loop_of(scenario, robot), _arcs(course)
-            alike = (
-                loop.law,
-                loop.gains,
-                loop.wheels,
-                scenario.body_of(robot),
-                loop.torque_delay_s,
-                bool(limits(scenario, robot)),
-                tuple(np.round(arcs, 2).ravel().tolist()),
-            )
-            if alike not in known:
-                speed_loop = _speed_loop(scenario, robot, loop.gains.k4)
-                known[alike] = [speed_loop, *_channel(scenario, loop, arcs)]
-            found = known[alike]
-        elif (gain := speed_gain(control)) is not None:
-            found = [_speed_loop(scenario, robot, gain)]
-        yield from (replace(finding, robots=(robot.name,)) for finding in found)
+        loop, arcs = loop_of(scenario, robot), _arcs(course)
+        alike = (
+            control.name,
+            repr(loop.gains),
+            loop.wheels,
+            scenario.body_of(robot),
+            loop.torque_delay_s,
+            bool(limits(scenario, robot)),
+            tuple(np.round(arcs, 2).ravel().tolist()),
+        )
+        if alike not in known:
+            known[alike] = [
+                *_speed_loop(scenario, robot, control),
+                *_channel_of(scenario, control, loop, arcs),
+            ]
+        yield from (replace(finding, robots=(robot.name,)) for finding in known[alike])
         yield from _held_pose(scenario, course)
 
 
 def loop_of(scenario: Scenario, robot: Robot) -> Loop:
-    """The loops of one robot; Θ̂ as it starts."""
+    """The loops of one robot; what adapts is as it starts."""
     control, body = scenario.control_of(robot), scenario.body_of(robot)
     ticks = schedule(scenario)
     external = scenario.localisation.source == "external"
-    gains: Any = control.parameters
-    if hasattr(gains, "torque_limit_wheel_N_m"):  # the channel is what happens close to the path
-        gains = replace(gains, torque_limit_wheel_N_m=inf)
     return Loop(
         control.load(),
-        gains,
+        control.parameters,
         Wheels(body.wheel_radius_m, body.half_track_m),
         robot_body(body),
         ticks.period_s,
         torque_delay_s(scenario),
         ticks.localise_every if external else 1,
         ticks.pose_delay_ticks if external else 0,
-        gains.theta_hat_0,
     )
 
 
@@ -110,7 +108,7 @@ def torque_delay_s(scenario: Scenario) -> float:
     return delay_s
 
 
-def _arcs(course: Course) -> list[tuple[float, float, float]]:
+def _arcs(course: Course) -> Arcs:
     """(v̄_d, ω̄_d, ṡ) of the straightest and of the most curved place, at the final speed."""
     turn = np.abs(course.omega_bar)
     places = dict.fromkeys((int(turn.argmin()), int(turn.argmax())))
@@ -118,49 +116,65 @@ def _arcs(course: Course) -> list[tuple[float, float, float]]:
     return [(float(course.v_bar[n]), float(course.omega_bar[n]), s_dot) for n in places]
 
 
-def _speed_loop(scenario: Scenario, robot: Robot, k4: float) -> Finding:
-    """k_4 against rate and delay; torques with a limit swing, others grow without end."""
+def _speed_loop(scenario: Scenario, robot: Robot, control: Choice) -> Iterator[Finding]:
+    """The speed gain against rate and delay; limited torques swing, others grow without end."""
+    of_law, name = speed_gain(control), speed_gain_key(control)
+    if of_law is None or of_law <= 0.0:
+        return
     h, late_s = schedule(scenario).period_s, torque_delay_s(scenario)
     inertia = min(inertias(scenario.body_of(robot)))
-    gain, delay = k4 * h / inertia, late_s / h
+    gain, delay = of_law * h / inertia, late_s / h
     most = bisect(lambda k: speed_loop_radius(k, delay) < 1.0, 0.0, 4.0, 24)
-    title = "sampled speed loop k4 h / min(m̄)"
+    title = f"sampled speed loop {name or 'k'} h / min(m̄)"
     late = f" with torques {1e3 * late_s:.2g} ms late" if delay else ""
     said = f"{gain:.3g}, stable below {most:.3g}{late}"
     suits = 0.25 * min(most, 1.0) * inertia / h
-    remedy = f"control.k4 = {suits:.3g} suits this rate"
+    key, remedy = "control.law", f"a speed gain of {suits:.3g} suits this rate, not {of_law:.3g}"
+    if name:
+        key = f"control.{name}"
+        remedy = f"{key} = {suits * (getattr(control.parameters, name) / of_law):.3g}"
+        remedy += " suits this rate"
     if all(speed_loop_radius(gain, part * delay) >= 1.0 for part in (0.5, 1.0, 1.5)):
         level: Level = "warning" if limits(scenario, robot) else "error"
         swings = "diverges" if level == "error" else "torques swing between their limits"
-        return Finding(level, title, f"{said}: {swings}; {remedy}", key="control.k4")
-    if gain > 0.5 * most:
-        return Finding(
-            "warning", title, f"{said}, good below half of it; {remedy}", key="control.k4"
-        )
-    return Finding("ok", title, said)
+        yield Finding(level, title, f"{said}: {swings}; {remedy}", key=key)
+    elif gain > 0.5 * most:
+        yield Finding("warning", title, f"{said}, good below half of it; {remedy}", key=key)
+    else:
+        yield Finding("ok", title, said)
 
 
-def _channel(
-    scenario: Scenario, loop: Loop, arcs: list[tuple[float, float, float]]
-) -> Iterator[Finding]:
-    """k_1, k_2, k_3 against the filters, the speed loop and the period."""
-    if min(s_dot for _, _, s_dot in arcs) <= 0.0:
+def _channel_of(scenario: Scenario, control: Choice, loop: Loop, arcs: Arcs) -> list[Finding]:
+    """The channel of a law that tells its part; of a part that fails, the failure."""
+    if not offers(control, "loop_elements") or min(s_dot for _, _, s_dot in arcs) <= 0.0:
+        return []
+    try:
+        return list(_channel(scenario, control, loop, arcs))
+    except (Exception, SystemExit) as error:  # the law's own code
+        text = f"{ANALYSES['loop_elements']}: law {control.name}, loop_elements: {raised(error)}"
+        return [Finding("warning", "not analysed", text, key="control.law")]
+
+
+def _channel(scenario: Scenario, control: Choice, loop: Loop, arcs: Arcs) -> Iterator[Finding]:
+    """The law's gains against its fast states, the speed loop and the period."""
+    parts = elements(loop, *arcs[0])
+    if not parts:
         return
-    title = "channel radius of x_e, y_e, θ_e, filters and speeds"
+    states = f", {parts[0].states} and speeds" if parts[0].states else " and speeds"
+    title = f"channel radius of x_e, y_e, θ_e{states}"
     at_start = [channel_radius(loop, *arc) for arc in arcs]
     worst = int(np.argmax(at_start))
     radius, arc = at_start[worst], arcs[worst]
-    learnt = replace(loop, theta=true_theta(loop.body))
-    later = max(channel_radius(learnt, *arc) for arc in arcs)
-    if radius < 1.0 and later >= 1.0:
-        radius, loop = later, learnt
+    if len(parts) > 1:
+        learnt = replace(loop, learnt=True)
+        later = max(channel_radius(learnt, *arc) for arc in arcs)
+        if radius < 1.0 <= later:
+            radius, loop = later, learnt
     if radius >= 1.0 + 1e-9:
-        if loop.pose_every > HELD_PERIODS:
-            yield Finding("warning", title, _unstable(loop, radius, {}), key=_POSES)
-            return
-        remedies = _remedies(loop, arc)
-        text = _unstable(loop, radius, remedies)
-        yield Finding("warning", title, text, key=f"control.{next(iter(remedies), 'k1')}")
+        remedies = {} if loop.pose_every > HELD_PERIODS else _remedies(loop, arc)
+        key = f"control.{next(iter(remedies), next(iter(_gains(loop)), 'law'))}"
+        key = _POSES if loop.pose_every > HELD_PERIODS else key
+        yield Finding("warning", title, _unstable(loop, parts[0], radius, remedies), key=key)
         return
     slowest_s = pole_time_s(radius, loop.period_s)
     said = f"{radius:.6g} per period, slowest error decays in {slowest_s:.3g} s"
@@ -169,17 +183,24 @@ def _channel(
         margin_s = delay_margin_s(loop, *arc)
         said += f"; tolerates torques {1e3 * margin_s:.3g} ms late"
     if _CYCLES * slowest_s > scenario.duration_s:
-        text = f"{said}: too slow for {scenario.duration_s:g} s; raise the lowest of k1, k2 v_r, k3"
-        yield Finding("warning", title, text, key="control.k2")
+        text = f"{said}: too slow for {scenario.duration_s:g} s"
+        slow = _slowest_gain(loop, arc)
+        text += f"; raise control.{slow}" if slow else ""
+        yield Finding("warning", title, text, key=f"control.{slow or 'law'}")
     elif margin_s < loop.period_s:
-        yield Finding("warning", title, f"{said}: less than a period", key="control.k4")
+        key = f"control.{speed_gain_key(control) or 'law'}"
+        yield Finding("warning", title, f"{said}: less than a period", key=key)
     else:
         yield Finding("ok", title, said)
 
 
-def _remedies(loop: Loop, arc: tuple[float, float, float]) -> dict[str, float]:
+def _gains(loop: Loop) -> tuple[str, ...]:
+    return loop_gains(loop.law, loop.gains)
+
+
+def _remedies(loop: Loop, arc: Arc) -> dict[str, float]:
     """Gains of which lowering one alone is enough, and how far."""
-    found = {name: largest_gain(loop, name, *arc) for name in ("k1", "k3", "k2", "k4")}
+    found = {name: largest_gain(loop, name, *arc) for name in _gains(loop)}
     return {
         name: value
         for name, value in found.items()
@@ -187,21 +208,34 @@ def _remedies(loop: Loop, arc: tuple[float, float, float]) -> dict[str, float]:
     }
 
 
-def _unstable(loop: Loop, radius: float, remedies: dict[str, float]) -> str:
-    gains = loop.gains
-    lags = f"filters of {gains.gamma_1_s:g}, {gains.gamma_2_s:g}, {gains.gamma_3_s:g} s"
+def _slowest_gain(loop: Loop, arc: Arc) -> str:
+    """The gain of which a higher one shortens the slowest decay most; "" if none does."""
+    radii = {
+        name: channel_radius(with_gain(loop, name, 1.2 * getattr(loop.gains, name)), *arc)
+        for name in _gains(loop)
+    }
+    best = min(radii, key=lambda name: radii[name], default="")
+    return best if best and radii[best] < channel_radius(loop, *arc) else ""
+
+
+def _unstable(loop: Loop, part: LoopElement, radius: float, remedies: dict[str, float]) -> str:
+    lags = []
+    if part.time_constants_s:
+        lags.append(f"{part.states} of {', '.join(f'{lag:g}' for lag in part.time_constants_s)} s")
     if loop.pose_every > 1:
-        lags += f", poses held {loop.pose_every * loop.period_s:g} s"
+        lags.append(f"poses held {loop.pose_every * loop.period_s:g} s")
     each = [
-        f"{name} = {0.5 * value:.3g} (it is {getattr(gains, name):g})"
+        f"{name} = {0.5 * value:.3g} (it is {getattr(loop.gains, name):g})"
         for name, value in remedies.items()
     ]
     what = f"control.{' or '.join(each)} suits" if each else "lower the gains together"
     if loop.pose_every > HELD_PERIODS:
         what = 'localisation.source = "fused", or more fixes'
+    lagging = f" with {', '.join(lags)}" if lags else ""
+    shorter = f" with shorter {part.states}" if part.time_constants_s else ""
     return (
-        f"{radius:.4g} per period of {loop.period_s:g} s with {lags}: not below 1, the errors swing"
-        f" and don't vanish; {what}, or a higher rate with shorter filters"
+        f"{radius:.4g} per period of {loop.period_s:g} s{lagging}: not below 1, the errors swing"
+        f" and don't vanish; {what}, or a higher rate{shorter}"
     )
 
 

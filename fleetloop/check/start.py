@@ -1,10 +1,8 @@
 """Findings about the first second, by integrating law and body alone from the start.
 
-    first torque    k_4 k_1 |x_e(0)| / r and the turning part of (34): what no drive has, is cut
-    (35) sampled    Euler's rule with the loop is stable while h Σ k_5 F² < k_4 in both rows of Ω
+    first torque    of the law at the start, k_4 k_1 |x_e(0)| / r of (34): what no drive has, is cut
+    adaptation      the largest ratio of the law's own `AdaptationLimit`: not stable from 1 on
 
-The regressor F has ω² and the filters' rates in it, so it is large where a robot starts far off its
-path or facing away. The robust law divides by 1 + h Σ k_5 F² / (k_4/4) and has no such limit.
 Poses are exact, drives give what the limits of `fleetloop.check.torque` let through at rest.
 """
 
@@ -14,19 +12,19 @@ from math import hypot, inf, isfinite
 
 import numpy as np
 
-from agents.laws.adaptive_dsc import AdaptiveDsc, DscState
 from agents.laws.build import build
-from agents.laws.dsc_terms import path_errors, smoothing
-from agents.laws.failure import failure
-from agents.laws.interface import PathVariable, RobotMotion
+from agents.laws.dsc_terms import path_errors
+from agents.laws.failure import failure, raised
+from agents.laws.interface import AdaptationLimit, PathVariable, RobotMotion
 from configs.brief import Wheels
+from configs.errors import ScenarioError
 from configs.scenario import Scenario
 from configs.sections import Robot
 from fleetloop.check.body import robot_body
 from fleetloop.check.coordination import Forecast
 from fleetloop.check.course import path_of
 from fleetloop.check.finding import Finding
-from fleetloop.check.law import is_adaptive_dsc, normalises
+from fleetloop.check.law import adaptation_limit, saturation
 from fleetloop.check.torque import limits
 from plant.body import State
 from plant.integrate import rk4
@@ -43,33 +41,39 @@ class _Start:
 
     asked_wheel_N_m: float = 0.0
     asked_at_s: float = 0.0
-    ratio: float = 0.0  # h Σ k_5 F² / k_4
+    ratio: float = 0.0  # of the adaptation limit
     ratio_at_s: float = 0.0
     diverged_at_s: float | None = None
     failed: str = ""  # how and why a law or path raised
 
 
 def start_findings(scenario: Scenario, ahead: Forecast) -> Iterator[Finding]:
-    """First torque of every robot, and the sampled adaptation of the paper's law."""
+    """First torque of every robot, and its sampled adaptation."""
     h = scenario.clock.control_period_s
     ticks = round(min(START_S, scenario.duration_s) / h)
     ticks = min(ticks, max(TICKS // len(scenario.robot), 1))
     for n, robot in enumerate(scenario.robot):
-        seen = _start(scenario, robot, ahead, n, ticks)
-        yield _first_torque(scenario, robot, seen)
-        control = scenario.control_of(robot)
-        if is_adaptive_dsc(control) and not normalises(control):
-            yield _adaptation(robot, seen)
+        limit = adaptation_limit(scenario.control_of(robot), h)
+        seen = _start(scenario, robot, ahead, n, ticks, limit)
+        yield _first_torque(scenario, robot, seen, adapts=limit is not None)
+        if limit is not None:
+            yield _adaptation(robot, seen, limit)
 
 
-def _start(scenario: Scenario, robot: Robot, ahead: Forecast, number: int, ticks: int) -> _Start:
+def _start(
+    scenario: Scenario,
+    robot: Robot,
+    ahead: Forecast,
+    number: int,
+    ticks: int,
+    limit: AdaptationLimit | None,
+) -> _Start:
     """Integrate law and body over the first ticks."""
     control, section = scenario.control_of(robot), scenario.body_of(robot)
     body, h = robot_body(section), scenario.clock.control_period_s
     path = path_of(scenario, robot)
     law = build(control, Wheels(section.wheel_radius_m, section.half_track_m), h, path)
-    gains = control.parameters
-    most = min((limit.torque_wheel_N_m for limit in limits(scenario, robot)), default=inf)
+    most = min((bound.torque_wheel_N_m for bound in limits(scenario, robot)), default=inf)
     instants = h * np.arange(ticks)
     places = np.interp(instants, ahead.t_s, ahead.s[:, number]).tolist()
     speeds = np.interp(instants, ahead.t_s, ahead.s_dot[:, number]).tolist()
@@ -89,8 +93,12 @@ def _start(scenario: Scenario, robot: Robot, ahead: Forecast, number: int, ticks
         asked = max(abs(out.tau_right), abs(out.tau_left))
         if asked > seen.asked_wheel_N_m:
             seen.asked_wheel_N_m, seen.asked_at_s = asked, tick * h
-        if isinstance(gains, AdaptiveDsc.Gains):
-            ratio = _ratio(gains, h, memory, out.state, motion)
+        if limit is not None:
+            try:
+                ratio = limit.ratio(memory, out.state, motion)
+            except Exception as error:
+                why = f"control.law = {control.name}: ratio of adaptation_limit: {raised(error)}"
+                raise ScenarioError(why) from error
             if ratio > seen.ratio:
                 seen.ratio, seen.ratio_at_s = ratio, tick * h
         right, left = (min(max(t, -most), most) for t in (out.tau_right, out.tau_left))
@@ -104,33 +112,7 @@ def _start(scenario: Scenario, robot: Robot, ahead: Forecast, number: int, ticks
     return seen
 
 
-def _ratio(
-    gains: AdaptiveDsc.Gains,
-    h: float,
-    before: DscState | None,
-    after: DscState,
-    motion: RobotMotion,
-) -> float:
-    """How large h Σ k_5 F² / k_4 is in the worse row of (32); α' from how far a filter moved."""
-    if before is None:
-        return 0.0
-    rate_v, rate_omega = (
-        (new - old) / (smoothing(h, gamma) * gamma)
-        for new, old, gamma in (
-            (after.alpha_v, before.alpha_v, gains.gamma_2_s),
-            (after.alpha_omega, before.alpha_omega, gains.gamma_3_s),
-        )
-    )
-    v, omega = motion.v, motion.omega
-    rows = (omega * omega, v, omega, rate_v), (v * omega, v, omega, rate_omega)
-    k5 = gains.k5[:4], gains.k5[4:]
-    sizes = [
-        sum(k * f * f for k, f in zip(*pair, strict=True)) for pair in zip(k5, rows, strict=True)
-    ]
-    return h * max(sizes) / gains.k4
-
-
-def _first_torque(scenario: Scenario, robot: Robot, seen: _Start) -> Finding:
+def _first_torque(scenario: Scenario, robot: Robot, seen: _Start, *, adapts: bool) -> Finding:
     title = "first torques"
     x_e, y_e, _ = _errors(scenario, robot)
     off = f"{hypot(x_e, y_e):.3g} m off the path"
@@ -141,27 +123,26 @@ def _first_torque(scenario: Scenario, robot: Robot, seen: _Start) -> Finding:
     if seen.failed:
         text = f"{off}: {seen.failed}, {seen.diverged_at_s:.3g} s after the start"
         return Finding("error", title, text, (robot.name,), "control.law")
-    control = scenario.control_of(robot)
-    if bounds and is_adaptive_dsc(control) and not normalises(control):
+    if seen.diverged_at_s is not None and not adapts:  # or it is said of the adaptation
+        text = f"{off}: the motion diverges {seen.diverged_at_s:.3g} s after the start"
+        return Finding("warning", title, text, (robot.name,), "control.law")
+    harm = saturation(scenario.control_of(robot))
+    if bounds and harm:
         limit = min(bounds, key=lambda one: one.torque_wheel_N_m)
         if seen.asked_wheel_N_m > limit.torque_wheel_N_m:
-            text = (
-                f"{said}, gets {limit.torque_wheel_N_m:.3g} N·m, {limit.words}: the paper's law"
-                ' learns the limit; control.law = "adaptive_dsc_robust" doesn\'t, or start closer'
-            )
+            text = f"{said}, gets {limit.torque_wheel_N_m:.3g} N·m, {limit.words}: {harm}"
             return Finding("warning", title, text, (robot.name,), "control.law")
     return Finding("ok", title, said, (robot.name,))
 
 
-def _adaptation(robot: Robot, seen: _Start) -> Finding:
-    title = "(35) sampled: h Σ k5 F² < k4 at the start"
-    remedy = 'control.law = "adaptive_dsc_robust" normalises it; or lower k5, or start closer'
+def _adaptation(robot: Robot, seen: _Start, limit: AdaptationLimit) -> Finding:
+    title = f"{limit.condition} at the start"
     if seen.diverged_at_s is not None:
-        text = f"diverges {seen.diverged_at_s:.3g} s after the start: {remedy}"
+        text = f"diverges {seen.diverged_at_s:.3g} s after the start: {limit.remedy}"
         return Finding("warning", title, text, (robot.name,), "control.law")
-    said = f"{seen.ratio:.3g} k4 at most, {seen.ratio_at_s:.3g} s after the start"
+    said = f"{seen.ratio:.3g} {limit.unit} at most, {seen.ratio_at_s:.3g} s after the start"
     if seen.ratio >= 1.0:
-        text = f"{said}: not stable there; {remedy}"
+        text = f"{said}: not stable there; {limit.remedy}"
         return Finding("warning", title, text, (robot.name,), "control.law")
     return Finding("ok", title, said, (robot.name,))
 

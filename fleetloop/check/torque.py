@@ -28,7 +28,12 @@ from configs.sections import Robot
 from fleetloop.check.body import inertias, robot_body
 from fleetloop.check.course import Course, Series
 from fleetloop.check.finding import Finding, Level
-from fleetloop.check.law import approach_rate_1_s, speed_gain, torque_limit_wheel_N_m
+from fleetloop.check.law import (
+    approach_rate_1_s,
+    speed_gain,
+    speed_gain_key,
+    torque_limit_wheel_N_m,
+)
 from plant.body import RigidBody
 
 START_S = 0.5
@@ -280,8 +285,9 @@ def _slew(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:
         return
     control, body = scenario.control_of(course.robot), scenario.body_of(course.robot)
     gain = speed_gain(control)
-    if gain is None:
+    if gain is None or gain <= 0.0:
         return
+    name = speed_gain_key(control) or "k"
     lag_s = min(inertias(body)) / gain
     takes_s = float(np.abs(need.torque_wheel_N_m).max()) / slew
     if takes_s > lag_s:
@@ -289,7 +295,7 @@ def _slew(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:
             "warning",
             "host.torque_slew_limit_wheel_N_m_s",
             f"{slew:g} N·m/s take {takes_s:.2g} s to the needed torque; the speed loop's time"
-            f" constant m̄/k4 is {lag_s:.2g} s: the limit is felt as lag, and may swing",
+            f" constant m̄/{name} is {lag_s:.2g} s: the limit is felt as lag, and may swing",
             (course.robot.name,),
             "host.torque_slew_limit_wheel_N_m_s",
         )

@@ -9,22 +9,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.own_files import FILES, replaced, write_own_files
 from support.processes import completed
-from support.snippets import snippets
 
 from fleetloop.record.reader import Record
 
 pytestmark = pytest.mark.system
-FILES = ("my_law.py", "my_shapes.py", "own.toml")
 QUICK = ("--duration", "1", "--allow-unchecked")
 
 
 @pytest.fixture
 def own(tmp_path: Path) -> Path:
     """The folder of the page's files."""
-    for name in FILES:
-        (text,) = (s.text for s in snippets("python", "toml") if s.text.startswith(f"# {name}\n"))
-        (tmp_path / name).write_text(text)
+    write_own_files(tmp_path)
     return tmp_path
 
 
@@ -36,12 +33,6 @@ def fleetloop(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
         text=True,
         timeout=100,
     )
-
-
-def replaced(folder: Path, name: str, old: str, new: str) -> None:
-    text = (folder / name).read_text()
-    assert old in text
-    (folder / name).write_text(text.replace(old, new, 1))
 
 
 def test_the_page_holds_what_it_expects(own: Path) -> None:

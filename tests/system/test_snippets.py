@@ -23,7 +23,7 @@ FROM_AFAR = 'endpoint="tls/lab:7447"'
 FIXTURE = "(fleetloop_plant):"
 SERIAL = 'can.Bus(interface="slcan"'
 POSES = "motion_capture()"  # in test_real_robot.py
-OWN = "# my_law.py", "# my_shapes.py"  # in test_own_laws.py
+OWN = "# my_law.py", "# my_shapes.py", "# my_analysed_law.py"  # in tests of own laws
 
 
 def shown(mark: str) -> list[Snippet]:

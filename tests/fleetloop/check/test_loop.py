@@ -102,7 +102,8 @@ def _offsets(loop: Loop, *, v: float, fixes: int) -> np.ndarray:
         reference = Reference(v * h * tick, 0.0, 0.0, 1.0, 0.0)
         motion = RobotMotion(*fix, state.v, state.omega)
         out = law.step(memory, motion, reference, PathVariable(v * h * tick, v, 0.0))
-        memory = out.state._replace(theta_1=loop.theta[:4], theta_2=loop.theta[4:], kappa=0.0)
+        theta = loop.gains.theta_hat_0
+        memory = out.state._replace(theta_1=theta[:4], theta_2=theta[4:], kappa=0.0)
         state = rk4(loop.body, state, out.tau_right, out.tau_left, 0.0, h)
     return np.array(off)
 

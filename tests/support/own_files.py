@@ -1,0 +1,21 @@
+"""The files of docs/own-laws.md: a law, a path shape, an offset and their scenario."""
+
+from pathlib import Path
+
+from support.snippets import snippets
+
+FILES = ("my_law.py", "my_analysed_law.py", "my_shapes.py", "own.toml")
+
+
+def write_own_files(folder: Path) -> None:
+    """Write the files of the page into a folder, as they are printed."""
+    for name in FILES:
+        (text,) = (s.text for s in snippets("python", "toml") if s.text.startswith(f"# {name}\n"))
+        (folder / name).write_text(text)
+
+
+def replaced(folder: Path, name: str, old: str, new: str) -> None:
+    """Change the first occurrence of a text in one of the files."""
+    text = (folder / name).read_text()
+    assert old in text
+    (folder / name).write_text(text.replace(old, new, 1))
