@@ -77,10 +77,10 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> str:
     notice = link.publisher(keys.notice(name, AGENT.process(robot)))
     agent.guard.announce = lambda text: notice.put(Notice(text).encode())
     link.subscribe(keys.pose(name, robot), "pose")
-    for neighbour in brief.hears:
-        link.subscribe(keys.path(name, neighbour), f"path/{neighbour}")
+    for edge in brief.hears:
+        link.subscribe(keys.path(name, edge.speaker), f"path/{edge.speaker}")
     link.subscribe(keys.go(name), "go")
-    if brief.hears_leader:
+    if brief.leader_link is not None:
         link.subscribe(keys.leader_speed(name), "leader")
 
     hellos = Hellos(brief.schedule.hello_every_s)

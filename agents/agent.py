@@ -70,7 +70,8 @@ class Agent:
         history = POSE_HISTORY_TICKS if brief.schedule.realtime else self._pose_delay
         self._localiser = Localiser(brief.localisation, brief.wheels, history)
         self._neighbours = Neighbours(brief.hears, brief.coordination, self._h)
-        self._coordinator = Coordinator(brief.coordination, self._h, brief.hears_leader)
+        self._coordinator = Coordinator(brief.coordination, self._h)
+        self._leader_weight = brief.leader_link.weight if brief.leader_link else 0.0
         start = brief.coordination
         self._coordination = CoordinationState(start.v_hat_0, start.mu_0, brief.s_0)
         self.feedback_since = self._drives.feedback_since
@@ -83,7 +84,7 @@ class Agent:
         self._start_fix: PoseFix | None = None
         self._fixes: dict[int, PoseFix] = {}  # by tick, until due
         self._path_states: dict[int, dict[str, PathState]] = {}  # by tick, until due
-        self._awaited = set(brief.hears)
+        self._awaited = {edge.speaker for edge in brief.hears}
         self._realtime = brief.schedule.realtime
         self._encoder_check = EncoderCheck(brief.host.encoder_mismatch_limit_wheel_rad, self._h)
         fused = brief.localisation == "fused"
@@ -141,7 +142,7 @@ class Agent:
         missing = [f"the path variable of {robot}" for robot in sorted(self._awaited)]
         if self._start_fix is None:
             missing.append("the localisation system")
-        if self._leader is None and self.brief.hears_leader:
+        if self._leader is None and self.brief.leader_link is not None:
             missing.append("the leader")
         return missing
 
@@ -153,7 +154,11 @@ class Agent:
             missing.append("pose")
         if self._schedule.shares(tick):
             heard = self._path_states.get(tick, {})
-            missing += [f"path state of {r}" for r in self.brief.hears if r not in heard]
+            missing += [
+                f"path state of {edge.speaker}"
+                for edge in self.brief.hears
+                if edge.speaker not in heard
+            ]
         return missing
 
     # --- one period --------------------------------------------------------------------------
@@ -233,9 +238,9 @@ class Agent:
         t_ns = tick * self._schedule.period_ns
         v_hat, mu, s = coordination = self._coordination
         s_dot = mu + v_hat
-        n, sum_s, sum_v = self._neighbours.sums(t_ns)
+        sums = self._neighbours.sums(t_ns)
         v_r = self._leader.speed_at(t_ns) if self._leader is not None else 0.0
-        after = self._coordinator.advance(coordination, n, sum_s, sum_v, v_r)
+        after = self._coordinator.advance(coordination, sums, self._leader_weight, v_r)
         along = _new(PathVariable, (s, s_dot, (after[0] + after[1] - s_dot) / self._h))
         guard = self._guard
         try:
@@ -257,7 +262,7 @@ class Agent:
             self._law_state = None
         self._accept_path_variable(t_ns * 1e-9 + self._h, after)
         x_d, y_d, theta_d, _, _ = reference
-        used = (t_ns * 1e-9, *motion, s, s_dot, mu, v_hat, n, x_d, y_d, theta_d)
+        used = (t_ns * 1e-9, *motion, s, s_dot, mu, v_hat, sums.neighbours, x_d, y_d, theta_d)
         sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
         self._rows.add(tick, (*used, *signals, *sent))
         return frames

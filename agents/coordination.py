@@ -4,20 +4,24 @@
     μ' = −p μ − q Σ a_ij (s − s_j)                                              (45)
     s' = μ + v̂                                                                  (40)
 
-With n = Σ a_ij neighbours, S = Σ a_ij s_j and V = Σ a_ij v̂_j held over a period, this is a constant
-linear system of three states; it is advanced by its matrix exponential, so the only sampling error
-is the change of S and V within a period (see `agents.neighbours`). The coordination does not depend
-on the robot's motion.
+With d = Σ a_ij, S = Σ a_ij s_j and V = Σ a_ij v̂_j held over a period, this is a constant linear
+system of three states; it is advanced by its matrix exponential, so the only sampling error is the
+change of S and V within a period (see `agents.neighbours`). The coordination does not depend on the
+robot's motion.
 
-    v̂ [m/s]   μ [m/s]   s [m]   p [1/s]   q [1/s²]   h_i ∈ {0, 1}
+    v̂ [m/s]   μ [m/s]   s [m]   p [1/s]   q [1/s²]   a_ij, h_i [1/s], 0: not heard
 """
 
 from math import isfinite, nan
 from typing import NamedTuple
 
+from agents.neighbours import Sums
 from configs.sections import Coordination
 
 Matrix = list[list[float]]
+Rows = tuple[tuple[float, ...], ...]
+MOST_MAPS = 256
+"""Maps kept, one for each d and h_i: many neighbours that come and go make more."""
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
@@ -32,23 +36,24 @@ class CoordinationState(NamedTuple):
 class Coordinator:
     """Advances (38), (40), (45) by one control period."""
 
-    __slots__ = ("_coordination", "_hears_leader", "_maps", "_period_s")
+    __slots__ = ("_coordination", "_degree", "_h", "_maps", "_period_s", "_rows")
 
-    def __init__(self, coordination: Coordination, period_s: float, hears_leader: bool) -> None:
+    def __init__(self, coordination: Coordination, period_s: float) -> None:
         self._coordination = coordination
         self._period_s = period_s
-        self._hears_leader = hears_leader
-        self._maps: dict[int, tuple[tuple[float, ...], ...]] = {}
+        self._maps: dict[tuple[float, float], Rows] = {}
+        self._degree = self._h = 0.0
+        self._rows = self._map_of(0.0, 0.0)
 
     def advance(
-        self, state: CoordinationState, n: int, sum_s: float, sum_v: float, v_r: float
+        self, state: CoordinationState, sums: Sums, h: float, v_r: float
     ) -> CoordinationState:
-        """State after one period: n neighbours with Σ s_j and Σ v̂_j, leader speed v_r."""
-        rows = self._maps.get(n)
-        if rows is None:
-            rows = self._maps[n] = self._map(n)
+        """State after one period, heard: the sums over neighbours, and v_r with weight h."""
+        _, degree, sum_s, sum_v = sums
+        if degree != self._degree or h != self._h:
+            self._degree, self._h, self._rows = degree, h, self._map_of(degree, h)
         v_hat, mu, s = state
-        (v_v, v_in, v_r_in), (mu_v, mu_mu, mu_s, mu_V, mu_r, mu_S), last = rows
+        (v_v, v_in, v_r_in), (mu_v, mu_mu, mu_s, mu_V, mu_r, mu_S), last = self._rows
         s_v, s_mu, s_s, s_V, s_r, s_S = last
         after = (
             v_v * v_hat + v_in * sum_v + v_r_in * v_r,
@@ -57,13 +62,21 @@ class Coordinator:
         )
         return _new(CoordinationState, after)
 
-    def _map(self, n: int) -> tuple[tuple[float, ...], ...]:
-        """Rows of exp([A B; 0 0] h) for states (v̂, μ, s) and inputs (V, v_r, S)."""
-        p, q, h = self._coordination.p, self._coordination.q, float(self._hears_leader)
+    def _map_of(self, degree: float, h: float) -> Rows:
+        rows = self._maps.get((degree, h))
+        if rows is None:
+            if len(self._maps) >= MOST_MAPS:
+                self._maps.clear()
+            rows = self._maps[degree, h] = self._map(degree, h)
+        return rows
+
+    def _map(self, degree: float, h: float) -> Rows:
+        """Rows of exp([A B; 0 0] t) for states (v̂, μ, s) and inputs (V, v_r, S)."""
+        p, q = self._coordination.p, self._coordination.q
         t = self._period_s
         generator = [
-            [-(n + h) * t, 0.0, 0.0, 1.0 * t, h * t, 0.0],
-            [0.0, -p * t, -q * n * t, 0.0, 0.0, q * t],
+            [-(degree + h) * t, 0.0, 0.0, 1.0 * t, h * t, 0.0],
+            [0.0, -p * t, -q * degree * t, 0.0, 0.0, q * t],
             [1.0 * t, 1.0 * t, 0.0, 0.0, 0.0, 0.0],
             [0.0] * 6,
             [0.0] * 6,

@@ -12,29 +12,33 @@ received ones and of v_r, with fixed positive weights. So where the leader reach
 v̂ → v_r at any share period, with any delay, on any graph, also on one that changes. Extrapolated by
 its slope, v̂_j would diverge on graphs with cycles and slow shares.
 
-A neighbour silent for longer than `silence_limit_s` leaves the sums until its next path state. Sums
-run in the order of names, so they don't depend on the order of arrival.
+Each counts with its weight a_ij. A neighbour silent for longer than `silence_limit_s` leaves the
+sums until its next path state. Sums run in the order of names, so they don't depend on the order of
+arrival.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from configs.edges import InEdge
 from configs.sections import Coordination
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
 class Sums(NamedTuple):
-    """n = Σ a_ij, Σ a_ij s_j, Σ a_ij v̂_j over the neighbours that are not silent."""
+    """d = Σ a_ij, Σ a_ij s_j, Σ a_ij v̂_j over the neighbours that are not silent."""
 
-    n: int
+    neighbours: int  # these
+    degree: float
     s: float
     v: float
 
 
 @dataclass(slots=True)
 class _Neighbour:
+    weight: float
     t_ns: int = 0
     s: float = 0.0
     v_hat: float = 0.0
@@ -52,8 +56,9 @@ class Neighbours:
         "_silence_limit_s",
     )
 
-    def __init__(self, names: Iterable[str], limits: Coordination, period_s: float) -> None:
-        self._by_name = {name: _Neighbour() for name in sorted(names)}
+    def __init__(self, edges: Iterable[InEdge], limits: Coordination, period_s: float) -> None:
+        weights = {edge.speaker: edge.weight for edge in edges}
+        self._by_name = {name: _Neighbour(weights[name]) for name in sorted(weights)}
         self._in_order = tuple(self._by_name.values())
         self._half_s = 0.5 * period_s
         self._age_limit_s = limits.age_limit_s
@@ -71,8 +76,8 @@ class Neighbours:
 
     def sums(self, now_ns: int) -> Sums:
         """The sums for the period that begins at `now_ns`."""
-        n = 0
-        sum_s = sum_v = 0.0
+        count = 0
+        degree = sum_s = sum_v = 0.0
         half = self._half_s
         for neighbour in self._in_order:
             age = (now_ns - neighbour.t_ns) * 1e-9
@@ -80,7 +85,9 @@ class Neighbours:
                 continue
             if age > self._age_limit_s:
                 age = self._age_limit_s
-            n += 1
-            sum_s += neighbour.s + neighbour.v_hat * (age + half)
-            sum_v += neighbour.v_hat
-        return _new(Sums, (n, sum_s, sum_v))
+            weight = neighbour.weight
+            count += 1
+            degree += weight
+            sum_s += weight * (neighbour.s + neighbour.v_hat * (age + half))
+            sum_v += weight * neighbour.v_hat
+        return _new(Sums, (count, degree, sum_s, sum_v))

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from math import inf
 
 from configs.curves import FormationOffset, ReferencePath
+from configs.edges import InEdge
 from configs.host import Host
 from configs.parameters import Parameters
 from configs.plugins import Choice
@@ -171,8 +172,8 @@ class AgentBrief:
     reach: Reach  # what neighbours can say
     path: ReferencePath
     offset: FormationOffset
-    hears: tuple[str, ...]  # in-neighbours, sorted: a_ij = 1
-    hears_leader: bool  # h_i = 1
+    hears: tuple[InEdge, ...]  # of its in-neighbours, sorted: a_ij
+    leader_link: InEdge | None  # h_i; None: it doesn't hear the leader
     localisation: str  # "fused" | "external" | "odometry"
     schedule: Schedule
     drives: DriveLink

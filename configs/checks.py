@@ -7,8 +7,9 @@ from math import ceil, floor, inf
 from pydantic import ValidationError
 
 from configs.drive_checks import drive_problems
+from configs.edges import LEADER
 from configs.errors import Problem
-from configs.graph import parse_edge
+from configs.graph_checks import edge_problems, graph_problems, no_such_robot
 from configs.paths import Spline, Varying
 from configs.plugins import Recorded
 from configs.scenario import ETSRO, Scenario
@@ -21,9 +22,9 @@ def cross_problems(scenario: Scenario) -> list[Problem]:
     """All problems that no section can see alone."""
     problems = [*_names(scenario), *_laws(scenario), *_periods(scenario), *drive_problems(scenario)]
     problems += [*_host(scenario), *_expects(scenario)]
-    edges = list(_edges(scenario))
+    edges = edge_problems(scenario)
     if not problems and not edges:
-        edges = list(_graph(scenario))
+        edges = list(graph_problems(scenario))
     return problems + edges
 
 
@@ -33,6 +34,9 @@ def _names(scenario: Scenario) -> Iterator[Problem]:
         if robot.name in seen:
             yield Problem("robot.name", robot.name, "two robots have this name; make it unique")
         seen.add(robot.name)
+        if robot.name == LEADER:
+            remedy = "edges have the virtual leader by this name; give the robot another"
+            yield Problem("robot.name", robot.name, remedy)
         known = {ETSRO, *scenario.robot_types}
         if robot.type not in known:
             remedy = f"no such robot type; known: {', '.join(sorted(known))}"
@@ -161,7 +165,7 @@ def _expects(scenario: Scenario) -> Iterator[Problem]:
             yield Problem(f"{where}.signal", expect.signal, remedy)
         for robot in expect.robots or ():
             if robot not in scenario.names:
-                yield Problem(f"{where}.robots", robot, _known(scenario))
+                yield Problem(f"{where}.robots", robot, no_such_robot(scenario))
         yield from _bounds(where, expect)
         yield from _window(where, expect, scenario)
 
@@ -195,48 +199,3 @@ def _window(where: str, expect: Expect, scenario: Scenario) -> Iterator[Problem]
     if expect.to_s is not None and expect.to_s > end_s:
         remedy = f"the run ends before: at most duration_s = {end_s:g}, or leave it out: to the end"
         yield Problem(f"{where}.to_s", expect.to_s, remedy)
-
-
-def _edges(scenario: Scenario) -> Iterator[Problem]:
-    graph = scenario.graph
-    if graph.edges is not None and graph.generator is not None:
-        yield Problem("graph.generator", graph.generator, "give either edges or a generator")
-    for text in graph.edges or ():
-        edge = parse_edge(text)
-        if edge is None:
-            yield Problem("graph.edges", text, 'must read "r1 -> r2": r2 hears r1')
-            continue
-        for robot in edge:
-            if robot not in scenario.names:
-                yield Problem("graph.edges", text, f"{robot}: {_known(scenario)}")
-        if edge[0] == edge[1]:
-            yield Problem("graph.edges", text, "a robot doesn't hear itself")
-    for robot in graph.leader or ():
-        if robot not in scenario.names:
-            yield Problem("graph.leader", robot, _known(scenario))
-    if graph.leader is not None and not graph.leader:
-        yield Problem("graph.leader", [], "at least one robot must hear the leader")
-
-
-def _graph(scenario: Scenario) -> Iterator[Problem]:
-    graph = scenario.topology
-    edges = [f"{a} -> {b}" for a, b in graph.edges]
-    unreached = graph.unreached_from(graph.leader)
-    if unreached:
-        yield Problem(
-            "graph.leader",
-            list(graph.leader),
-            f"the leader does not reach {', '.join(unreached)}: add an edge to them from a robot"
-            " that it reaches, or a leader link",
-        )
-    if not graph.roots():
-        yield Problem(
-            "graph.edges",
-            edges,
-            "no robot reaches all others (the graph has no root), so s_i − s_j would never vanish:"
-            " join the parts by an edge",
-        )
-
-
-def _known(scenario: Scenario) -> str:
-    return f"no such robot; known: {', '.join(dict.fromkeys(scenario.names))}"

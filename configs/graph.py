@@ -1,7 +1,7 @@
 """The directed graph of a fleet: edges between robots, and links to the virtual leader.
 
-    edge "j -> i"    information flows from j to i: i hears j, a_ij = 1
-    L = diag(Σ_j a_ij) − A        H = diag(h_i), h_i = 1 iff i hears the leader
+    edge "j -> i"    information flows from j to i: i hears j, a_ij > 0 (1 if not given)
+    L = diag(Σ_j a_ij) − A        H = diag(h_i), h_i > 0 iff i hears the leader
 
 Two conditions are needed for the robots to move abreast at the leader's speed: the leader reaches
 every robot (L + H is nonsingular), and the robots' own graph is rooted: one robot reaches all
@@ -12,50 +12,99 @@ here a root is a robot that *reaches* all others along the flow of information.
 import itertools
 import random
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
+
+from configs.edges import LEADER, Edge, InEdge
 
 Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class Graph:
-    """Edges and leader links, in the order of the robots."""
+    """Edges and leader links with their weights, in the order of the robots."""
 
     robots: tuple[str, ...]
-    hears: Mapping[str, tuple[str, ...]]  # in-neighbours of each robot, sorted
-    leader: tuple[str, ...]  # robots with h_i = 1
+    hears: Mapping[str, tuple[InEdge, ...]]  # edges to each robot, sorted by speaker
+    links: Mapping[str, InEdge]  # from the leader, by robot: h_i
 
     @classmethod
     def of(
-        cls, robots: Sequence[str], edges: Iterable[tuple[str, str]], leader: Sequence[str]
+        cls,
+        robots: Sequence[str],
+        edges: Iterable[Edge],
+        leader: Sequence[str],
+        weights: Mapping[Edge, float] | None = None,
     ) -> "Graph":
-        """A graph from (speaker, hearer) pairs."""
-        hears: dict[str, set[str]] = {robot: set() for robot in robots}
+        """A graph from (speaker, hearer) pairs and robots that hear the leader.
+
+        Args:
+            robots: all of them.
+            edges: between robots.
+            leader: robots with h_i > 0.
+            weights: a_ij, h_i by edge; 1 if not given.
+        """
+        weight = (weights or {}).get
+        speakers: dict[str, set[str]] = {robot: set() for robot in robots}
         for speaker, hearer in edges:
-            hears[hearer].add(speaker)
-        in_order = {robot: tuple(sorted(heard)) for robot, heard in hears.items()}
-        return cls(tuple(robots), in_order, tuple(leader))
+            speakers[hearer].add(speaker)
+        hears = {
+            robot: tuple(InEdge(other, weight((other, robot), 1.0)) for other in sorted(heard))
+            for robot, heard in speakers.items()
+        }
+        links = {robot: InEdge(LEADER, weight((LEADER, robot), 1.0)) for robot in leader}
+        return cls(tuple(robots), hears, links)
 
     @property
-    def edges(self) -> tuple[tuple[str, str], ...]:
-        """All (speaker, hearer) pairs."""
-        return tuple((speaker, i) for i in self.robots for speaker in self.hears[i])
+    def edges(self) -> tuple[Edge, ...]:
+        """All (speaker, hearer) pairs of robots."""
+        return tuple((edge.speaker, i) for i in self.robots for edge in self.hears[i])
 
     @property
-    def max_in_degree(self) -> int:
-        """The largest number of in-neighbours."""
-        return max(len(heard) for heard in self.hears.values())
+    def leader(self) -> tuple[str, ...]:
+        """Robots that hear the leader."""
+        return tuple(self.links)
+
+    @property
+    def in_neighbours(self) -> dict[str, tuple[str, ...]]:
+        """The robots that each robot hears, sorted."""
+        return {i: tuple(edge.speaker for edge in heard) for i, heard in self.hears.items()}
+
+    @property
+    def max_in_degree(self) -> float:
+        """d_max, the largest in-degree d_i = Σ_j a_ij."""
+        return max(map(self.in_degree, self.robots))
+
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """Weights of all edges and leader links."""
+        edges = (*(edge for heard in self.hears.values() for edge in heard), *self.links.values())
+        return tuple(edge.weight for edge in edges)
+
+    def in_degree(self, robot: str) -> float:
+        """d_i = Σ_j a_ij, summed in the order of names."""
+        return sum((edge.weight for edge in self.hears[robot]), 0.0)
+
+    def normalised(self) -> "Graph":
+        """The same edges with a_ij / d_i, so that every in-degree is 1 or 0."""
+        hears = {
+            robot: tuple(
+                replace(edge, weight=edge.weight / self.in_degree(robot)) for edge in heard
+            )
+            for robot, heard in self.hears.items()
+        }
+        return replace(self, hears=hears)
 
     def adjacency(self) -> Matrix:
-        """A, N × N: a_ij = 1 iff robot i hears robot j."""
+        """A, N × N: a_ij > 0 iff robot i hears robot j."""
         index = {robot: n for n, robot in enumerate(self.robots)}
         matrix = np.zeros((len(self.robots), len(self.robots)))
-        for speaker, hearer in self.edges:
-            matrix[index[hearer], index[speaker]] = 1.0
+        for robot, heard in self.hears.items():
+            for edge in heard:
+                matrix[index[robot], index[edge.speaker]] = edge.weight
         return matrix
 
     def laplacian(self) -> Matrix:
@@ -95,13 +144,7 @@ class Graph:
         return cls.of([str(n) for n in digraph.nodes], edges, leader)
 
 
-def parse_edge(text: str) -> tuple[str, str] | None:
-    """(speaker, hearer) of "r1 -> r2", None if it isn't an edge."""
-    speaker, arrow, hearer = (part.strip() for part in text.partition("->"))
-    return (speaker, hearer) if arrow and speaker and hearer else None
-
-
-def generated(kind: str, robots: Sequence[str]) -> list[tuple[str, str]]:
+def generated(kind: str, robots: Sequence[str]) -> list[Edge]:
     """Edges of a named shape over the robots in their order; the first robot is a root.
 
     chain 1→2→3…, ring (chain closed), tree (binary: n hears n // 2), star (all hear the first),
@@ -122,7 +165,7 @@ def generated(kind: str, robots: Sequence[str]) -> list[tuple[str, str]]:
     raise ValueError(f"no generator {kind!r}")
 
 
-def random_rooted(robots: Sequence[str], *, max_in_degree: int, seed: int) -> list[tuple[str, str]]:
+def random_rooted(robots: Sequence[str], *, max_in_degree: int, seed: int) -> list[Edge]:
     """Edges of a random graph in which the first robot reaches all others.
 
     Every other robot hears one robot before it in a random order, so a tree spans the graph, and up
@@ -137,3 +180,13 @@ def random_rooted(robots: Sequence[str], *, max_in_degree: int, seed: int) -> li
         more = min(draw.randint(0, max_in_degree - len(heard)), len(others))
         edges += [(speaker, robot) for speaker in [*heard, *draw.sample(others, more)]]
     return edges
+
+
+def of_matrix(robots: Sequence[str], rows: Sequence[Sequence[float]]) -> dict[Edge, float]:
+    """Weights of the edges of an adjacency matrix: row i holds a_ij, what robot i hears."""
+    return {
+        (speaker, hearer): weight
+        for hearer, row in zip(robots, rows, strict=True)
+        for speaker, weight in zip(robots, row, strict=True)
+        if weight
+    }

@@ -11,13 +11,15 @@ which makes the JSON Schema of them as well. Processes receive the same objects,
 pydantic is imported by the methods that it calls itself: in a process nothing does.
 """
 
+from collections.abc import Mapping
 from dataclasses import Field, dataclass, field, fields, make_dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Optional, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Optional, TypeVar, get_args
 
 from annotated_types import Ge, Gt, Le
 
 from configs import patterns
+from configs.wording import STATED
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler
@@ -56,6 +58,38 @@ class Tagged:
         from pydantic import Field
 
         return handler(Annotated[source, Field(discriminator=self.key)])
+
+
+@dataclass(frozen=True, slots=True)
+class NameOrTable:
+    """Annotation of a union of names (a `Literal`) and a type of tables.
+
+    Args:
+        remedy: of a value that is neither.
+    """
+
+    remedy: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: "GetCoreSchemaHandler") -> Any:
+        from pydantic import Discriminator, Tag
+
+        names: Any
+        table: Any
+        names, table = get_args(source)
+
+        def kind_of(value: Any) -> str | None:
+            if isinstance(value, Mapping):
+                return "table"
+            return "name" if value in get_args(names) else None
+
+        choice = Discriminator(
+            kind_of,
+            custom_error_type=STATED,
+            custom_error_message="{remedy}",
+            custom_error_context={"remedy": self.remedy},
+        )
+        union: Any = Annotated[names, Tag("name")] | Annotated[table, Tag("table")]
+        return handler(Annotated[union, choice])
 
 
 @dataclass(frozen=True, slots=True)

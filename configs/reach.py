@@ -9,13 +9,14 @@ starts, μ(0), and the time τ that they need to agree on a speed:
 
     s(t) ∈ [min s(0) − m + v_min t,  max s(0) + m + v_max t]
     m = 1 + 2 A (max s(0) − min s(0) + |μ(0)|/p + τ (v_max − v_min))    [m]
-    τ = max(1/p, 1/√q, p/q)
+    τ = max(1/p, 1/√(q a), p/(q a))
 
-A ≥ 1 is how much an underdamped chain (ζ < 1, ζ = p / (2 √(q n)) with n neighbours) amplifies from
-robot to robot: coth(π ζ / (2 √(1 − ζ²))) each, `MOST_AMPLIFIED` in all. 0 is in the hull because a
-path variable may stand still; v̂ is allowed as much again beyond it. The margins are generous: of
-1,100 random scenarios whose coordination settles none used more than four tenths of m, and v̂ never
-left the hull.
+with a ≤ 1 the least weight of an edge. A ≥ 1 is how much an underdamped chain (ζ < 1,
+ζ = p / (2 √(q d)) with in-degree d ≥ 1) amplifies from robot to robot:
+coth(π ζ / (2 √(1 − ζ²))) each, `MOST_AMPLIFIED` in all. 0 is in the hull because a path variable
+may stand still; v̂ is allowed as much again beyond it. The margins are generous: of 1,100 random
+scenarios whose coordination settles none used more than four tenths of m, and v̂ never left the
+hull.
 """
 
 from collections.abc import Sequence
@@ -29,6 +30,7 @@ POSITION_LIMIT_M = 1e7
 HEADING_LIMIT_RAD = 1e6
 """No heading, which need not be wrapped, is beyond this."""
 _LEAST_DAMPING = 1e-3
+_LEAST_PULL_1_S2 = 1e-300  # what can be divided by
 _LEAST_SPEED_MARGIN_M_S = 0.1
 
 
@@ -71,7 +73,8 @@ def reach_of(
     mu_0: float,
     p: float,
     q: float,
-    most_heard: int,
+    max_in_degree: float,
+    least_weight: float = 1.0,
 ) -> Reach:
     """The bounds of a scenario.
 
@@ -81,13 +84,15 @@ def reach_of(
         mu_0: μ(0), of all robots [m/s].
         p: of (45) [1/s].
         q: of (45) [1/s²].
-        most_heard: in-neighbours of the robot that has most.
+        max_in_degree: the largest Σ_j a_ij.
+        least_weight: of all edges and leader links.
     """
     v_min, v_max = min(0.0, *speeds_m_s), max(0.0, *speeds_m_s)
-    agreed_s = min(max(1.0 / p, 1.0 / sqrt(q), p / q), LONGEST_S)
+    pull = max(q * min(least_weight, 1.0), _LEAST_PULL_1_S2)
+    agreed_s = min(max(1.0 / p, 1.0 / sqrt(pull), p / pull), LONGEST_S)
     apart_m = max(starts_m) - min(starts_m)
     apart_m += min(abs(mu_0) / p, abs(mu_0) * LONGEST_S) + agreed_s * (v_max - v_min)
-    margin_m = 1.0 + 2.0 * _amplified(p, q, most_heard, len(starts_m) - 1) * apart_m
+    margin_m = 1.0 + 2.0 * _amplified(p, q, max_in_degree, len(starts_m) - 1) * apart_m
     return Reach(
         s_min_m=min(starts_m) - margin_m,
         s_max_m=max(starts_m) + margin_m,
@@ -97,9 +102,9 @@ def reach_of(
     )
 
 
-def _amplified(p: float, q: float, heard: int, hops: int) -> float:
+def _amplified(p: float, q: float, degree: float, hops: int) -> float:
     """A of `hops` robots in a row."""
-    damping = max(p / (2.0 * sqrt(q) * sqrt(max(heard, 1))), _LEAST_DAMPING)
+    damping = max(p / (2.0 * sqrt(q) * sqrt(max(degree, 1.0))), _LEAST_DAMPING)
     if damping >= 1.0:
         return 1.0
     gain = 1.0 / tanh(pi * damping / (2.0 * sqrt(1.0 - damping * damping)))

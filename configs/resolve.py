@@ -85,7 +85,7 @@ def agent_brief(
         path=reference_path(scenario.path),
         offset=formation_offset(robot.offset),
         hears=graph.hears[name],
-        hears_leader=name in graph.leader,
+        leader_link=graph.links.get(name),
         localisation=scenario.localisation.source,
         schedule=ticks,
         drives=_drive_link(scenario, robot, drive),
@@ -103,14 +103,15 @@ def signals_of(scenario: Scenario, robot: sections.Robot) -> tuple[Signal, ...]:
 
 def reach(scenario: Scenario) -> Reach:
     """Bounds of the path variables and speed estimates of a run."""
-    coordination, leader = scenario.coordination, scenario.leader
+    coordination, leader, graph = scenario.coordination, scenario.leader, scenario.topology
     return reach_of(
         [robot.s_0 for robot in scenario.robot],
         [coordination.v_hat_0, leader.speed_m_s, *(step.speed_m_s for step in leader.steps)],
         mu_0=coordination.mu_0,
         p=coordination.p,
         q=coordination.q,
-        most_heard=max(map(len, scenario.topology.hears.values())),
+        max_in_degree=graph.max_in_degree,
+        least_weight=min(graph.weights, default=1.0),
     )
 
 

@@ -4,15 +4,17 @@
 run is; a deployment defines where its processes and buses are.
 """
 
-from collections.abc import Sequence
-from typing import Annotated, Literal
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Annotated, Any, Literal, Self
 
 from annotated_types import Len
 from pydantic import BaseModel, ConfigDict, Field
 
 from configs.choices import chosen_anew, shared_part
 from configs.drives import Drive
-from configs.graph import Graph, generated, parse_edge, random_rooted
+from configs.edges import Edge, parse_edge
+from configs.graph import Graph, generated, of_matrix, random_rooted
 from configs.host import Host
 from configs.parameters import Name, Seconds, Seed, changed
 from configs.paths import Cosine, PathShape
@@ -78,6 +80,12 @@ class Scenario(BaseModel):
     robot: Annotated[tuple[Robot, ...], Len(1, 256)]
     expect: tuple[Expect, ...] = ()
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with these sections instead of its own; what was made of the old ones goes."""
+        copied = super().model_copy(update=update, deep=deep)
+        copied.__dict__.pop("topology", None)
+        return copied
+
     @property
     def ends_at_s(self) -> float:
         """Scenario time at which the run ends."""
@@ -115,11 +123,17 @@ class Scenario(BaseModel):
             self.drive.left_node + step if left is None else left,
         )
 
-    @property
+    @cached_property
     def topology(self) -> Graph:
-        """The directed graph, its generator carried out."""
-        leader = self.graph.leader if self.graph.leader is not None else self.names[:1]
-        return Graph.of(self.names, self._edges(), leader)
+        """The directed graph with its weights, its generator carried out."""
+        graph, names = self.graph, self.names
+        leader = graph.leader if graph.leader is not None else names[:1]
+        if graph.adjacency is not None:
+            weights = of_matrix(names, graph.adjacency)
+            made = Graph.of(names, weights, leader, weights)
+        else:
+            made = Graph.of(names, self._edges(), leader, self._weights())
+        return made.normalised() if graph.weights == "normalised" else made
 
     def body_of(self, robot: Robot) -> Body:
         """The body of a robot: its type's, with what the robot says differently."""
@@ -138,7 +152,13 @@ class Scenario(BaseModel):
         """How a robot's drives are mounted: the fleet's, with what the robot says differently."""
         return changed(self.mounting, robot.mounting)
 
-    def _edges(self) -> Sequence[tuple[str, str]]:
+    def _weights(self) -> dict[Edge, float]:
+        table = self.graph.weights
+        if isinstance(table, str):
+            return {}
+        return {edge: a for text, a in table.items() if (edge := parse_edge(text)) is not None}
+
+    def _edges(self) -> Sequence[Edge]:
         graph = self.graph
         if graph.edges is not None:
             return [edge for text in graph.edges if (edge := parse_edge(text)) is not None]

@@ -140,10 +140,10 @@ class InProcessRun:
         self._agents = [
             Agent(brief, rows) for brief, rows in zip(agents, self._telemetry, strict=True)
         ]
-        self._hearers = {
-            brief.robot: [agent for agent in self._agents if brief.robot in agent.brief.hears]
-            for brief in agents
-        }
+        self._hearers: dict[str, list[Agent]] = {brief.robot: [] for brief in agents}
+        for agent in self._agents:
+            for edge in agent.brief.hears:
+                self._hearers[edge.speaker].append(agent)
         for agent in self._agents:
             agent.guard.announce = partial(on_notice, agent.brief.robot)
         period_ns = plant.schedule.period_ns
@@ -167,7 +167,7 @@ class InProcessRun:
         self._buses = build_buses(plant, self._robots, port, begin, taps)
         self._steps = [bus.steps() for bus in self._buses.values()]
         for agent in self._agents:
-            if agent.brief.hears_leader:
+            if agent.brief.leader_link is not None:
                 agent.receive_leader_speed(LeaderSpeed(leader.speed_steps))
         self.ticks = 0
         self.wall_s = 0.0

@@ -8,7 +8,7 @@ these by the graph:
     ρ(v̂)     spectral radius of the speed estimates' map: below 1, v̂ → v_r
     ρ(s, μ)   the same of the path variables', without the eigenvalue 1 of all s together
 
-Delay of received values, the own value fresh: with D the in-degrees, a root ±jω of
+Delay of received values, the own value fresh: with D the in-degrees Σ a_ij, a root ±jω of
 det(λ² + p λ + q D − q A e^(−λT)) = 0 gives the smallest T at which (45) oscillates.
 """
 
@@ -148,18 +148,18 @@ def _one_step(graph: Graph, p: float, q: float, step_s: float, *, ageing: bool) 
     tables = {}
     rows = []
     for robot in graph.robots:
-        kind = len(graph.hears[robot]), robot in graph.leader
+        link = graph.links.get(robot)
+        kind = graph.in_degree(robot), link.weight if link else 0.0
         if kind not in tables:
             tables[kind] = _map(*kind, p, q, step_s, ageing=ageing)
         rows.append(tables[kind])
     return np.array(rows)
 
 
-def _map(heard: int, leader: bool, p: float, q: float, step_s: float, *, ageing: bool) -> Matrix:
-    h = float(leader)
+def _map(degree: float, h: float, p: float, q: float, step_s: float, *, ageing: bool) -> Matrix:
     generator = np.zeros((6, 6))
-    generator[0, [0, 3, 5]] = -(heard + h), 1.0, h
-    generator[1, [1, 2, 4]] = -p, -q * heard, q
+    generator[0, [0, 3, 5]] = -(degree + h), 1.0, h
+    generator[1, [1, 2, 4]] = -p, -q * degree, q
     generator[2, :2] = 1.0
     generator[4, 3] = float(ageing)
     return np.array(matrix_exponential((generator * step_s).tolist()))[:3]

@@ -2,9 +2,9 @@
 
     (46)   p²/q > max Im(ζ)² / Re(ζ) over the eigenvalues ζ ≠ 0 of L; exact for a fixed graph
 
-p² ≥ 2 q d_max (d_max: largest in-degree) is enough for any delay, p² ≥ 4 q d_max for any switching
-between graphs whose union is rooted. Values shared now and then are held in between: what that
-makes of it is `fleetloop.check.coordination`'s.
+p² ≥ 2 q d_max (d_max: largest in-degree Σ_j a_ij) is enough for any delay, p² ≥ 4 q d_max for any
+switching between graphs whose union is rooted. Values shared now and then are held in between: what
+that makes of it is `fleetloop.check.coordination`'s.
 """
 
 from math import inf, isfinite, isnan
@@ -102,7 +102,8 @@ def _positive(graph: Graph, p: float, q: float) -> bool:
 
 def _right_side(graph: Graph) -> float:
     eigenvalues = np.linalg.eigvals(graph.laplacian())
-    sides = [z.imag**2 / z.real for z in eigenvalues if z.real > 1e-9]
+    largest = np.abs(eigenvalues).max()
+    sides = [z.imag**2 / z.real for z in eigenvalues if z.real > 1e-9 * largest]
     return float(max(sides, default=0.0))
 
 

@@ -115,7 +115,7 @@ def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.
     return access.plan(
         run,
         scenario.names,
-        graph.hears,
+        graph.in_neighbours,
         graph.leader,
         buses=scenario.buses,
         real_robots=[robot for robot in scenario.names if not deployment.emulates(robot)],

@@ -5,21 +5,23 @@ from math import exp
 import numpy as np
 import pytest
 
-from agents.coordination import CoordinationState, Coordinator, matrix_exponential
-from agents.neighbours import Neighbours
+from agents.coordination import MOST_MAPS, CoordinationState, Coordinator, matrix_exponential
+from agents.neighbours import Neighbours, Sums
 from configs.loading import load
 from configs.scenario import Scenario
 from configs.sections import Coordination
 
 GAINS = Coordination(p=2.0, q=1.0, mu_0=0.0, v_hat_0=0.0, age_limit_s=2.0, silence_limit_s=2.0)
 H = 0.001
+NOBODY = Sums(0, 0.0, 0.0, 0.0)
 
 
 def fleet(scenario: Scenario, share_every: int, ticks: int) -> np.ndarray:
     """(ticks + 1, robots, 3): v̂, μ, s of the coordination alone, sharing every so many ticks."""
     graph = scenario.topology
     ears = {r: Neighbours(graph.hears[r], GAINS, H) for r in graph.robots}
-    minds = {r: Coordinator(GAINS, H, r in graph.leader) for r in graph.robots}
+    minds = {r: Coordinator(GAINS, H) for r in graph.robots}
+    links = {r: graph.links[r].weight if r in graph.leader else 0.0 for r in graph.robots}
     states = {r: CoordinationState(0.0, 0.0, 0.0) for r in graph.robots}
     history = [[states[r] for r in graph.robots]]
     for tick in range(ticks):
@@ -28,7 +30,7 @@ def fleet(scenario: Scenario, share_every: int, ticks: int) -> np.ndarray:
             for speaker, hearer in graph.edges:
                 ears[hearer].receive(speaker, now_ns, states[speaker].s, states[speaker].v_hat)
         sums = {r: ears[r].sums(now_ns) for r in graph.robots}
-        states = {r: minds[r].advance(states[r], *sums[r], 0.6) for r in graph.robots}
+        states = {r: minds[r].advance(states[r], sums[r], links[r], 0.6) for r in graph.robots}
         history.append([states[r] for r in graph.robots])
     return np.array(history)
 
@@ -38,7 +40,7 @@ def exact(scenario: Scenario, ticks: int) -> np.ndarray:
     graph = scenario.topology
     n = len(graph.robots)
     laplacian = graph.laplacian()
-    links = np.diag([float(robot in graph.leader) for robot in graph.robots])
+    links = np.diag([graph.links[r].weight if r in graph.leader else 0.0 for r in graph.robots])
     zero, one = np.zeros((n, n)), np.eye(n)
     generator = np.block(
         [
@@ -60,9 +62,23 @@ def exact(scenario: Scenario, ticks: int) -> np.ndarray:
     return np.array(history)[:, : 3 * n].reshape(-1, 3, n).transpose(0, 2, 1)
 
 
-@pytest.mark.parametrize("name", ["paper", "paper_ring", "paper_tree", "paper_star", "paper_extra"])
-def test_with_fresh_data_every_tick_the_fleet_follows_the_exact_solution(name: str) -> None:
-    scenario = load(name)
+WEIGHTS = (
+    "graph.weights={'r1 -> r2'=0.5, 'r2 -> r4'=0.3, 'r1 -> r3'=1.7, 'leader -> r1'=2.0}",
+    "graph.weights='normalised'",
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        *((f"paper{kind}", ()) for kind in ("", "_ring", "_tree", "_star", "_extra")),
+        *(("paper_tree", (weights,)) for weights in WEIGHTS),
+    ],
+)
+def test_with_fresh_data_every_tick_the_fleet_follows_the_exact_solution(
+    name: str, changes: tuple[str, ...]
+) -> None:
+    scenario = load(name, changes)
     ours, truth = fleet(scenario, 1, 15_000), exact(scenario, 15_000)
     assert np.abs(ours[:, :, 0] - truth[:, :, 0]).max() < 1e-3  # v̂
     # v̂_j held over a tick is half a tick old: 0.3 mm per hop, and once round the ring.
@@ -82,17 +98,17 @@ def test_shared_at_50_hz_the_chains_spread_peaks_within_2_percent_of_the_exact_o
 
 
 def test_alone_with_the_leader_the_estimate_is_a_first_order_lag() -> None:
-    mind = Coordinator(GAINS, H, hears_leader=True)
+    mind = Coordinator(GAINS, H)
     state = CoordinationState(0.0, 0.0, 0.0)
     for _ in range(2000):
-        state = mind.advance(state, 0, 0.0, 0.0, 0.6)
+        state = mind.advance(state, NOBODY, 1.0, 0.6)
     assert state.v_hat == pytest.approx(0.6 * (1 - exp(-2.0)), rel=1e-12)
     assert state.s == pytest.approx(0.6 * (2.0 - (1 - exp(-2.0))), rel=1e-11)
 
 
 def test_without_anybody_to_hear_the_estimate_stays_and_mu_decays() -> None:
-    mind = Coordinator(GAINS, H, hears_leader=False)
-    state = mind.advance(CoordinationState(0.3, 1.0, 5.0), 0, 0.0, 0.0, 0.6)
+    mind = Coordinator(GAINS, H)
+    state = mind.advance(CoordinationState(0.3, 1.0, 5.0), NOBODY, 0.0, 0.6)
     assert state.v_hat == 0.3
     assert state.mu == pytest.approx(exp(-2.0 * H))
 
@@ -102,3 +118,13 @@ def test_the_exponential_of_a_rotation_is_cosine_and_sine() -> None:
         np.array([[np.cos(2), -np.sin(2)], [np.sin(2), np.cos(2)]]), abs=1e-13
     )
     assert matrix_exponential([[-30.0]])[0][0] == pytest.approx(exp(-30.0), rel=1e-9)
+
+
+def test_maps_are_kept_for_some_sums_of_weights_only() -> None:
+    mind = Coordinator(GAINS, H)
+    state = CoordinationState(0.3, 0.1, 5.0)
+    kinds = [(0.1 * n, h) for n in range(MOST_MAPS) for h in (0.0, 1.0)]
+    first = [mind.advance(state, Sums(n, d, 2.0, 0.5), h, 0.6) for n, (d, h) in enumerate(kinds)]
+    assert len(mind._maps) <= MOST_MAPS
+    again = [mind.advance(state, Sums(n, d, 2.0, 0.5), h, 0.6) for n, (d, h) in enumerate(kinds)]
+    assert again == first

@@ -3,6 +3,7 @@
 import pytest
 
 from agents.neighbours import Neighbours
+from configs.edges import InEdge
 from configs.sections import Coordination
 
 LIMITS = Coordination(p=2.0, q=1.0, mu_0=0.0, v_hat_0=0.0, age_limit_s=0.5, silence_limit_s=1.0)
@@ -11,7 +12,7 @@ HALF = 0.0005
 
 
 def ears(*names: str) -> Neighbours:
-    return Neighbours(names, LIMITS, 0.001)
+    return Neighbours([InEdge(name) for name in names], LIMITS, 0.001)
 
 
 def test_a_value_is_carried_on_by_its_age_to_the_middle_of_the_period() -> None:
@@ -31,15 +32,15 @@ def test_a_silent_neighbour_leaves_the_sums_and_comes_back_when_it_speaks() -> N
     heard = ears("r2", "r3")
     heard.receive("r2", 0, 1.0, 0.5)
     heard.receive("r3", 0, 2.0, 0.5)
-    assert heard.sums(1000 * MS).n == 2
+    assert heard.sums(1000 * MS).neighbours == 2
     heard.receive("r3", 1000 * MS, 3.0, 0.5)
-    assert heard.sums(1001 * MS).n == 1
+    assert heard.sums(1001 * MS).neighbours == 1
     heard.receive("r2", 1002 * MS, 4.0, 0.5)
-    assert heard.sums(1002 * MS).n == 2
+    assert heard.sums(1002 * MS).neighbours == 2
 
 
 def test_who_has_not_spoken_yet_does_not_count() -> None:
-    assert ears("r2", "r3").sums(0) == (0, 0.0, 0.0)
+    assert ears("r2", "r3").sums(0) == (0, 0.0, 0.0, 0.0)
 
 
 def test_old_and_repeated_messages_change_nothing() -> None:
@@ -67,3 +68,27 @@ def test_the_speed_estimate_is_held_as_received() -> None:
     heard.receive("r2", 20 * MS, 0.0, 0.52)
     assert heard.sums(30 * MS).v == 0.52
     assert heard.sums(300 * MS).v == 0.52
+
+
+def test_each_neighbour_counts_with_its_weight() -> None:
+    heard = Neighbours([InEdge("r2", 0.5), InEdge("r3", 2.0)], LIMITS, 0.001)
+    heard.receive("r2", 0, 1.0, 0.6)
+    assert heard.sums(0) == (1, 0.5, 0.5 * (1.0 + 0.6 * HALF), 0.5 * 0.6)
+    heard.receive("r3", 0, 4.0, 0.25)
+    both = heard.sums(0)
+    assert both[:2] == (2, 2.5)
+    assert both.s == pytest.approx(0.5 * (1.0 + 0.6 * HALF) + 2.0 * (4.0 + 0.25 * HALF))
+    assert both.v == pytest.approx(0.5 * 0.6 + 2.0 * 0.25)
+
+
+def test_a_weight_of_one_changes_no_bit_of_the_sums() -> None:
+    said = [("r2", 0.1, 0.6), ("r3", 0.7, 0.5), ("r4", 1e-9, 0.3)]
+    heard = ears(*(name for name, _, _ in said))
+    for name, s, v in said:
+        heard.receive(name, 0, s, v)
+    age = 7 * MS * 1e-9
+    sum_s = sum_v = 0.0
+    for _, s, v in said:
+        sum_s += s + v * (age + HALF)
+        sum_v += v
+    assert heard.sums(7 * MS) == (3, 3.0, sum_s, sum_v)

@@ -14,6 +14,7 @@ import pytest
 
 from agents.coordination import CoordinationState, Coordinator
 from agents.neighbours import Neighbours
+from configs.edges import InEdge
 from configs.sections import Coordination
 
 P, Q = 2.0, 1.0
@@ -32,18 +33,19 @@ def one_robot(heard: int, hears_leader: bool, share_every: int) -> np.ndarray:
 
     Columns: (v̂, μ, s), then (v̂_j, s_j) of each heard, then what each had said the share before.
     """
-    mind = Coordinator(LIMITS, H_S, hears_leader)
+    mind = Coordinator(LIMITS, H_S)
     period_ns, tick_ns = round(share_every * H_S * 1e9), round(H_S * 1e9)
     columns = []
     for unit in np.eye(7):
         names = [f"r{n}" for n in range(heard)]
-        ears = Neighbours(names, LIMITS, H_S)
+        ears = Neighbours([InEdge(name) for name in names], LIMITS, H_S)
         for name in names:
             ears.receive(name, 0, unit[6] / heard, unit[5] / heard)
             ears.receive(name, period_ns, unit[4] / heard, unit[3] / heard)
         state = CoordinationState(*unit[:3])
         for tick in range(share_every):
-            state = mind.advance(state, *ears.sums(period_ns + tick * tick_ns), 0.0)
+            sums = ears.sums(period_ns + tick * tick_ns)
+            state = mind.advance(state, sums, float(hears_leader), 0.0)
         columns.append(state)
     return np.array(columns).T
 

@@ -5,14 +5,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from configs.graph import Graph, generated, parse_edge, random_rooted
+from configs.brief import NetworkLink
+from configs.edges import LEADER, InEdge, parse_edge
+from configs.graph import Graph, generated, of_matrix, random_rooted
+from configs.loading import load, loads, to_toml
+from configs.resolve import agent_brief
 
 FOUR = ("r1", "r2", "r3", "r4")
+EXTRA = ["r1 -> r2", "r2 -> r3", "r3 -> r4", "r2 -> r4"]
 
 
 def test_an_edge_says_who_is_heard_by_whom() -> None:
     graph = Graph.of(("r1", "r2"), [("r1", "r2")], ("r1",))
-    assert graph.hears == {"r1": (), "r2": ("r1",)}
+    assert graph.in_neighbours == {"r1": (), "r2": ("r1",)}
     assert graph.adjacency().tolist() == [[0, 0], [1, 0]]
     assert graph.laplacian().tolist() == [[0, 0], [-1, 1]]
     assert graph.leader == ("r1",)
@@ -93,3 +98,55 @@ def test_random_graphs_are_rooted_bounded_and_reproducible(n: int, degree: int, 
 def test_graphml_carries_a_graph_there_and_back() -> None:
     graph = Graph.of(FOUR, generated("tree", FOUR), ("r1", "r3"))
     assert Graph.from_graphml(graph.to_graphml()) == graph
+
+
+def test_the_rows_of_an_adjacency_matrix_hear_its_columns() -> None:
+    rows = [[0.0, 0.0, 0.25], [2.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
+    weights = of_matrix(FOUR[:3], rows)
+    assert weights == {("r3", "r1"): 0.25, ("r1", "r2"): 2.0, ("r2", "r3"): 0.5}
+    graph = Graph.of(FOUR[:3], weights, (), weights)
+    assert graph.adjacency().tolist() == rows
+    assert graph.max_in_degree == 2.0
+    assert graph.laplacian().sum(axis=1).tolist() == [0.0, 0.0, 0.0]
+
+
+def test_normalised_weights_make_every_in_degree_one() -> None:
+    weights = {("r1", "r3"): 3.0, ("leader", "r1"): 2.0}
+    edges = [("r1", "r3"), ("r2", "r3"), ("r3", "r2")]
+    graph = Graph.of(FOUR[:3], edges, ["r1"], weights).normalised()
+    assert graph.adjacency().tolist() == [[0, 0, 0], [0, 0, 1], [0.75, 0.25, 0]]
+    assert graph.links["r1"].weight == 2.0
+
+
+@pytest.mark.parametrize(
+    ("graph", "row"),
+    [
+        ("weights={'r2 -> r4'=0.5, 'leader -> r1'=2.0}", [0.0, 0.5, 1.0, 0.0]),
+        ("weights='normalised'", [0.0, 0.5, 0.5, 0.0]),
+        ("weights='unit'", [0.0, 1.0, 1.0, 0.0]),
+    ],
+)
+def test_a_scenario_gives_weights_and_keeps_them_when_it_is_written(graph: str, row: list) -> None:
+    scenario = load("paper_extra", [f"graph={{edges={EXTRA}, {graph}}}"])
+    assert scenario.topology.adjacency()[3].tolist() == row
+    again = loads("again", to_toml(scenario))
+    assert again.topology == scenario.topology
+    link = agent_brief(again, "r1", network=NetworkLink("", "", "", ""), bus=()).leader_link
+    assert link == InEdge(LEADER, 2.0 if "leader" in graph else 1.0)
+
+
+def test_a_scenario_gives_an_adjacency_matrix_instead_of_edges() -> None:
+    matrix = [[0, 0, 0, 0], [0.5, 0, 0, 0], [0, 1, 0, 0], [0, 0.25, 0.75, 0]]
+    scenario = load("paper", [f"graph={{adjacency={matrix}}}"])
+    assert scenario.topology.adjacency().tolist() == matrix
+    brief = agent_brief(scenario, "r4", network=NetworkLink("", "", "", ""), bus=())
+    assert brief.hears == (InEdge("r2", 0.25), InEdge("r3", 0.75))
+    assert brief.leader_link is None
+    assert loads("again", to_toml(scenario)).topology == scenario.topology
+
+
+def test_a_copy_with_another_graph_has_its_topology() -> None:
+    scenario = load("paper")
+    assert len(scenario.topology.edges) == 3
+    ring = load("paper_ring").graph
+    assert len(scenario.model_copy(update={"graph": ring}).topology.edges) == 4

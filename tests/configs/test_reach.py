@@ -43,7 +43,7 @@ def test_a_path_variable_may_stand_still_for_ever() -> None:
 def test_a_chain_that_amplifies_has_room_for_it() -> None:
     def room(p: float, robots: int) -> float:
         starts = [1.0] + [0.0] * (robots - 1)
-        return reach_of(starts, [0.0], mu_0=0.0, p=p, q=1.0, most_heard=1).s_max_m - 1.0
+        return reach_of(starts, [0.0], mu_0=0.0, p=p, q=1.0, max_in_degree=1.0).s_max_m - 1.0
 
     assert room(2.0, 8) == pytest.approx(1.0 + 2.0)
     assert room(0.5, 2) < room(0.5, 8)
@@ -53,6 +53,6 @@ def test_a_chain_that_amplifies_has_room_for_it() -> None:
 @pytest.mark.parametrize("p", [1e-308, 1e308])
 @pytest.mark.parametrize("q", [1e-308, 1e308])
 def test_absurd_gains_give_bounds_that_are_numbers(p: float, q: float) -> None:
-    bounds: Reach = reach_of([0.0, 1.0], [0.0, 0.6], mu_0=1.0, p=p, q=q, most_heard=1)
+    bounds: Reach = reach_of([0.0, 1.0], [0.0, 0.6], mu_0=1.0, p=p, q=q, max_in_degree=1.0)
     assert bounds.beyond(0.0, 0.5, 0.3) is None
     assert bounds.beyond(0.0, 1e12, 0.3) is not None

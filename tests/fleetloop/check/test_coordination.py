@@ -28,7 +28,8 @@ def driven(scenario: Scenario, ticks: int) -> np.ndarray:
     every = round(scenario.clock.share_period_s / h)
     briefs = [agent_brief(scenario, r, network=NOWHERE, bus=()) for r in graph.robots]
     ears = {b.robot: Neighbours(b.hears, b.coordination, h) for b in briefs}
-    minds = {b.robot: Coordinator(b.coordination, h, b.hears_leader) for b in briefs}
+    minds = {b.robot: Coordinator(b.coordination, h) for b in briefs}
+    links = {b.robot: b.leader_link.weight if b.leader_link else 0.0 for b in briefs}
     states = {
         b.robot: CoordinationState(b.coordination.v_hat_0, b.coordination.mu_0, b.s_0)
         for b in briefs
@@ -41,12 +42,21 @@ def driven(scenario: Scenario, ticks: int) -> np.ndarray:
                 ears[hearer].receive(speaker, now_ns, states[speaker].s, states[speaker].v_hat)
         rows.append([states[robot].s for robot in graph.robots])
         speed = scenario.leader.speed_m_s
-        states = {r: minds[r].advance(states[r], *ears[r].sums(now_ns), speed) for r in states}
+        states = {
+            r: minds[r].advance(states[r], ears[r].sums(now_ns), links[r], speed) for r in states
+        }
     return np.array(rows)
 
 
-@pytest.mark.parametrize("share_s", [0.02, 0.5, 3.0])
-def test_the_forecast_is_what_the_controllers_will_do(share_s: float) -> None:
+WEIGHTS = "graph.weights={'r1 -> r2'=0.5, 'r4 -> r2'=0.2, 'leader -> r1'=3.0}"
+
+
+@pytest.mark.parametrize(
+    ("share_s", "changes"), [(0.02, ()), (0.5, ()), (3.0, ()), (0.5, (WEIGHTS,))]
+)
+def test_the_forecast_is_what_the_controllers_will_do(
+    share_s: float, changes: tuple[str, ...]
+) -> None:
     scenario = load(
         "paper_extra",
         (
@@ -54,6 +64,7 @@ def test_the_forecast_is_what_the_controllers_will_do(share_s: float) -> None:
             "coordination.silence_limit_s=4.0",
             "duration_s=12.0",
             "expect=[]",
+            *changes,
         ),
     )
     ahead = forecast(scenario)
@@ -67,6 +78,10 @@ def test_complete_graphs_have_the_delay_margin_of_the_frequency_sweep(
     robots: int, margin_s: float
 ) -> None:
     assert isclose(delay_margin_s(shape("complete", robots), 2.0, 1.0), margin_s, rel_tol=0.03)
+
+
+def test_normalised_weights_make_a_complete_graph_stand_any_delay() -> None:
+    assert delay_margin_s(shape("complete", 11).normalised(), 2.0, 1.0) == inf
 
 
 def test_a_chain_stands_any_delay() -> None:

@@ -34,6 +34,16 @@ def test_the_papers_gains_fail_on_twenty_robots_that_hear_their_three_predecesso
     assert "4.46" in finding.text
 
 
+def test_weights_scale_both_eigenvalues_and_in_degrees() -> None:
+    # ζ scales with a, so does Im²/Re; normalised, the circulant that fails above has 4.46/3.
+    ring = circulant(3, 1)
+    half = Graph.of(ring.robots, ring.edges, (), dict.fromkeys(ring.edges, 0.5))
+    assert "1 > 0.25" in synchronisation(half, p=1.0, q=1.0).text
+    assert "8 ≥ 4" in delay_class(half, p=2.0, q=1.0).text
+    finding = synchronisation(circulant(20, 3).normalised(), p=2.0, q=1.0)
+    assert (finding.level, finding.text) == ("ok", "4 > 1.487")
+
+
 def test_in_degree_decides_how_much_delay_is_stood() -> None:
     assert "any switching" in delay_class(circulant(4, 1), p=2.0, q=1.0).text
     assert "any delay" in delay_class(circulant(4, 2), p=2.0, q=1.0).text
