@@ -11,9 +11,10 @@ and learns the rest. Angles are radians, wheels in the order (right, left), time
 nanoseconds.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf
 
+from configs.connections import NetworkLink, Settings
 from configs.curves import FormationOffset, ReferencePath
 from configs.edges import InEdge
 from configs.host import Host
@@ -23,12 +24,7 @@ from configs.powertrain import Encoder, Motor, Supply
 from configs.reach import Reach
 from configs.sections import Body, Bus, Coordination, Disturbance, Mounting, Pose
 from configs.signals import Signal
-from configs.tls import TlsFiles
 
-Settings = tuple[tuple[str, str | int | float | bool], ...]
-"""Keyword arguments as sorted pairs, so that a brief stays hashable and immutable."""
-OURS = "fleetloop"
-"""The python-can interface of the buses that the plant's process holds."""
 LEAD_TICKS = 16
 """In lockstep a bus may be this many ticks ahead of the slowest."""
 
@@ -130,33 +126,6 @@ class HostLimits(Host):
     rearm_after_ns: int = 500_000_000
     rearm_limit_ns: int = 1_000_000_000
     bus_error_limit_ns: int = 0  # 0: an error of the bus ends the controller
-
-
-LEASE_S = 1.0
-"""A peer on another machine that is silent for this long is gone."""
-LOCAL_LEASE_S = 3600.0
-"""On one machine a peer that is gone closes its connection; one that is silent is stopped, and may
-go on (Ctrl-Z and `fg`)."""
-
-
-@dataclass(frozen=True, slots=True)
-class NetworkLink:
-    """Address of the router, and the identity of one process at it."""
-
-    run: str  # the run's name in every key: fleetloop/<run>/...
-    endpoint: str  # e.g. tcp/127.0.0.1:40001
-    user: str
-    password: str = field(repr=False)
-    tls: TlsFiles | None = None
-    lease_s: float = LEASE_S  # the router waits so long for a word of it
-
-
-@dataclass(frozen=True, slots=True)
-class Outside:
-    """Where the router listens for roles on other machines."""
-
-    endpoint: str
-    tls: TlsFiles | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from configs import patterns
-from configs.brief import OURS, Settings
 from configs.complaints import complaints, refusal
+from configs.connections import OURS, Settings
 from configs.errors import Complaint, Problem, ScenarioError
 from configs.files import expanded
 from configs.parameters import FilePath, Name, Parameters, Pattern, as_tuples, parameter

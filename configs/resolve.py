@@ -4,23 +4,21 @@ from math import inf
 
 from configs import sections
 from configs.brief import (
-    OURS,
     AgentBrief,
     DriveLink,
     DriveModel,
     HostLimits,
     LeaderBrief,
     MotorModel,
-    NetworkLink,
     PlantBrief,
     PowertrainModel,
     RobotBrief,
     Schedule,
-    Settings,
     WheelDisturbance,
     Wheels,
     WireModel,
 )
+from configs.connections import OURS, NetworkLink, Settings
 from configs.curves import formation_offset, reference_path
 from configs.drives import Drive
 from configs.parameters import extended

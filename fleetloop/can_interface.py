@@ -8,7 +8,9 @@ if TYPE_CHECKING:
     from bridge.can_bus.interface import FleetloopBus
 else:
     FleetloopBus = load_own(
-        "bridge.can_bus.interface", "bridge.can_bus.zenoh_transport"
+        "bridge.can_bus.interface",
+        "bridge.can_bus.credentials",
+        "bridge.can_bus.zenoh_transport",
     ).FleetloopBus
 
 __all__ = ["FleetloopBus"]

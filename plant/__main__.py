@@ -29,7 +29,8 @@ from bridge.process.lifecycle import (
     settle_memory,
 )
 from bridge.process.profile import Sampler
-from configs.brief import PlantBrief, Settings
+from configs.brief import PlantBrief
+from configs.connections import Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError
 from configs.roles import PLANT
 from plant.herald import Herald

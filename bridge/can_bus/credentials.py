@@ -16,17 +16,14 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from can.util import cast_from_string
-
+from bridge.can_bus.options import TLS, as_option
 from bridge.network.tls import check_tls
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.errors import ScenarioError
 from configs.files import expanded
 from configs.tls import TlsFiles
 from configs.users import read_users
 
-_TLS = ("ca", "certificate", "private_key")
-OPTIONS = frozenset({"endpoint", "user", "password", "users", *_TLS})
 _ENDPOINT = re.compile(r"(tcp|tls)/.+:\d+")
 
 
@@ -40,12 +37,12 @@ def network_of(options: Mapping[str, str]) -> NetworkLink:
     if not endpoint or not user:
         raise ScenarioError(
             "from another machine give endpoint and user, with password or users over tcp, with"
-            f" {', '.join(_TLS)} over tls; given: {', '.join(sorted(options))}"
+            f" {', '.join(TLS)} over tls; given: {', '.join(sorted(options))}"
         )
     if not _ENDPOINT.fullmatch(endpoint):
         raise ScenarioError(f"endpoint = {endpoint!r}: must be tcp/HOST:PORT or tls/HOST:PORT")
     secure = endpoint.startswith("tls/")
-    needed, others = (_TLS, ("password", "users")) if secure else (("password",), _TLS)
+    needed, others = (TLS, ("password", "users")) if secure else (("password",), TLS)
     if wrong := [name for name in others if name in options]:
         raise ScenarioError(f"{wrong[0]} doesn't go with {endpoint}: give {', '.join(needed)}")
     if secure:
@@ -53,24 +50,11 @@ def network_of(options: Mapping[str, str]) -> NetworkLink:
     return NetworkLink("", endpoint, user, _password(options, user))
 
 
-def as_option(value: object) -> str:
-    """An option of `can.Bus` as text, whether or not it came through python-can.
-
-    python-can makes numbers and truth values of texts: "0123" becomes 123, "1.50" 1.5, "true" True.
-    The router knows guests' passwords by what this makes of them: "123", "1.5", "true".
-    """
-    try:
-        read = cast_from_string(value) if isinstance(value, str) else value
-    except ValueError:  # more digits than Python makes a number of
-        read = value
-    return str(read).lower() if isinstance(read, bool) else str(read)
-
-
 def _tls(options: Mapping[str, str], user: str) -> TlsFiles:
-    for name in _TLS:
+    for name in TLS:
         if name not in options:
-            raise ScenarioError(f"{name} = (missing): over tls give {', '.join(_TLS)}")
-    files = TlsFiles(**{name: Path(options[name]) for name in _TLS})
+            raise ScenarioError(f"{name} = (missing): over tls give {', '.join(TLS)}")
+    files = TlsFiles(**{name: Path(options[name]) for name in TLS})
     check_tls(files, user)
     return files
 

@@ -8,7 +8,7 @@ right whichever comes first.
 """
 
 from bridge.frame import Frame
-from configs.brief import Settings
+from configs.connections import Settings
 
 ECHOING = frozenset({"udp_multicast"})
 """Interfaces that can't but hand back what is sent."""

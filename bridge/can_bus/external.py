@@ -28,7 +28,7 @@ from bridge.can_bus.pythoncan import open_bus, to_frame, to_message
 from bridge.frame import Frame
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.waiting import readable
-from configs.brief import Settings
+from configs.connections import Settings
 from configs.errors import InfrastructureError
 
 REOPEN_S = 1.0

@@ -35,7 +35,6 @@ import can
 from can.typechecking import AutoDetectedConfig, CanFilters
 
 from bridge.can_bus import options, sockets
-from bridge.can_bus.credentials import OPTIONS, as_option
 from bridge.can_bus.packet import (
     BATCHED,
     BYE,
@@ -105,9 +104,13 @@ class FleetloopBus(can.BusABC):
         fd: bool = False,
         **kwargs: Any,
     ) -> None:
-        remote = {key: as_option(kwargs.pop(key)) for key in OPTIONS if kwargs.get(key) is not None}
-        if unknown := sorted(kwargs.keys() - _IGNORED - OPTIONS):
-            known = ", ".join(sorted({*_KEYWORDS, *OPTIONS}))
+        remote = {
+            key: options.as_option(kwargs.pop(key))
+            for key in options.REMOTE
+            if kwargs.get(key) is not None
+        }
+        if unknown := sorted(kwargs.keys() - _IGNORED - options.REMOTE):
+            known = ", ".join(sorted({*_KEYWORDS, *options.REMOTE}))
             raise TypeError(
                 f"the fleetloop interface has no option {', '.join(unknown)} (it has {known})"
             )

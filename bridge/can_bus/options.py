@@ -7,13 +7,28 @@ python-can's configuration files hold text, so text is accepted for every type. 
 from math import isfinite
 
 import can
+from can.util import cast_from_string
 
-from bridge.can_bus.credentials import as_option
-
+TLS = ("ca", "certificate", "private_key")
+REMOTE = frozenset({"endpoint", "user", "password", "users", *TLS})
+"""Options of a client on another machine: see `bridge.can_bus.credentials`."""
 LONGEST_S = 1e6
 """Longer times are cut to this: the kernel's own have a bound."""
 _TRUTHS = {"true": True, "1": True, "yes": True, "on": True, "": False}
 _TRUTHS |= {"false": False, "0": False, "no": False, "off": False, "none": False}
+
+
+def as_option(value: object) -> str:
+    """An option of `can.Bus` as text, whether or not it came through python-can.
+
+    python-can makes numbers and truth values of texts: "0123" becomes 123, "1.50" 1.5, "true" True.
+    The router knows guests' passwords by what this makes of them: "123", "1.5", "true".
+    """
+    try:
+        read = cast_from_string(value) if isinstance(value, str) else value
+    except ValueError:  # more digits than Python makes a number of
+        read = value
+    return str(read).lower() if isinstance(read, bool) else str(read)
 
 
 def truth(name: str, value: object) -> bool:

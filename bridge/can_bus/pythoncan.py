@@ -10,7 +10,7 @@ from typing import Any
 import can
 
 from bridge.frame import EFF, ERR, ID_MASK_11, ID_MASK_29, MAX_DATA, RTR, Frame, flaw
-from configs.brief import Settings
+from configs.connections import Settings
 from configs.errors import InfrastructureError
 
 _Message = can.Message

@@ -30,7 +30,7 @@ from bridge.can_bus.packet import (
 from bridge.network import keys
 from bridge.network.client import open_client
 from bridge.process.clock import SYSTEM_CLOCK
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.errors import InfrastructureError
 
 BACKLOG = 100_000

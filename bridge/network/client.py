@@ -20,7 +20,7 @@ from bridge.network.zenoh_link import POLLED_DEPTH, PolledLink, ZenohLink
 from bridge.process.clock import SYSTEM_CLOCK
 from bridge.process.lifecycle import Stop
 from bridge.process.waiting import readable
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.errors import InfrastructureError
 
 _PROBE_S = 1.0

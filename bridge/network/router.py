@@ -30,7 +30,7 @@ from bridge.network.session import (
 )
 from bridge.network.session_errors import taken
 from bridge.network.zenoh_link import ZenohLink
-from configs.brief import LEASE_S, Outside
+from configs.connections import LEASE_S, Outside
 from configs.errors import InfrastructureError
 from configs.roles import AGENT
 

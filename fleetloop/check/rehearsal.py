@@ -12,7 +12,7 @@ import numpy as np
 
 from bridge.network.messages import Progress
 from bridge.process.lifecycle import Stop
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.errors import FleetloopError
 from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of
 from configs.scenario import Scenario

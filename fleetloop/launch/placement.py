@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from bridge.network import access
-from configs.brief import NetworkLink, Outside, PlantBrief, Settings
+from configs.brief import PlantBrief
+from configs.connections import NetworkLink, Outside, Settings
 from configs.deployment import Deployment, NetworkSection, passwords
 from configs.errors import ScenarioError
 from configs.roles import LOCALISATION, identity_of
@@ -99,7 +100,7 @@ def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
 
 def _as_option(password: str) -> str:
     # Imports python-can, which a run without guests does without.
-    from bridge.can_bus.credentials import as_option
+    from bridge.can_bus.options import as_option
 
     return as_option(password)
 

@@ -26,7 +26,8 @@ from bridge.network.messages import Progress
 from bridge.network.telemetry import PLANT_ROW, RowBuffer
 from bridge.process.clock import SYSTEM_CLOCK
 from bridge.process.lifecycle import Stop, go_realtime, keep_to_itself, name_process, settled_memory
-from configs.brief import NetworkLink, PlantBrief, Settings
+from configs.brief import PlantBrief
+from configs.connections import NetworkLink, Settings
 from configs.deployment import Deployment, load_deployment
 from configs.errors import ExitStatus, ScenarioError
 from configs.loading import load

@@ -24,7 +24,7 @@ from bridge.network.messages import Go, LeaderSpeed, Progress
 from bridge.network.router import RouterLink, open_router
 from bridge.process.clock import SYSTEM_CLOCK, Clock, process_cpu_ns, wall_of
 from bridge.process.lifecycle import Stop
-from configs.brief import LEASE_S, LOCAL_LEASE_S, NetworkLink
+from configs.connections import LEASE_S, LOCAL_LEASE_S, NetworkLink
 from configs.deployment import Deployment
 from configs.errors import InfrastructureError
 from configs.resolve import leader_brief, schedule

@@ -8,7 +8,7 @@ from pathlib import Path
 from bridge.network.messages import Progress
 from bridge.process.clock import SYSTEM_CLOCK
 from bridge.process.lifecycle import Stop, keep_to_itself
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.deployment import Deployment, load_deployment
 from configs.errors import ExitStatus, InfrastructureError, ScenarioError
 from configs.loading import load, to_toml

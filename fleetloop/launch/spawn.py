@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bridge.can_bus import sockets
-from configs.brief import AgentBrief, NetworkLink, PlantBrief, RecorderBrief
+from configs.brief import AgentBrief, PlantBrief, RecorderBrief
+from configs.connections import NetworkLink
 from configs.deployment import Deployment
 from configs.loading import to_toml
 from configs.resolve import agent_brief, plant_brief, schedule, signals_of

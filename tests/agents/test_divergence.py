@@ -13,7 +13,7 @@ from support.robot_bench import SCENARIO, ZERO, Bench, set_points
 from agents.guard import Phase
 from agents.laws.dsc_terms import Projection
 from bridge.network.messages import PathState
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.curves import SplinePath
 from configs.paths import AT_CENTRE
 from configs.plugins import LAWS

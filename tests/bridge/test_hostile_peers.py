@@ -20,7 +20,7 @@ from bridge.network import access, keys
 from bridge.network.client import open_client, open_polled
 from bridge.network.messages import MOST_BYTES, PathState
 from bridge.network.zenoh_link import POLLED_DEPTH, ZenohLink
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.roles import AGENT
 
 pytestmark = pytest.mark.system
@@ -44,7 +44,7 @@ DEAF = """
 import sys, threading
 import zenoh
 from bridge.network.client import _login_config
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 
 run, endpoint, user, password, key = sys.argv[1:]
 login = NetworkLink(run, endpoint, user, password)

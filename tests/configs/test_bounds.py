@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.deployment import check_deployment
 from configs.errors import ScenarioError
 from configs.files import expanded

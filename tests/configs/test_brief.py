@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from configs import brief, curves
+from configs import brief, connections, curves
 from configs.drives import Drive
 from configs.parameters import Parameters
 from configs.scenario import Scenario
@@ -50,7 +50,7 @@ SECTIONS = {
 KEYS = {field.name for section in SECTIONS for field in dataclasses.fields(section)}
 BRIEFS = [
     kind
-    for module in (brief, curves)
+    for module in (brief, connections, curves)
     for _, kind in inspect.getmembers(module, dataclasses.is_dataclass)
     if kind.__module__ == module.__name__
 ]

@@ -4,7 +4,8 @@ from math import inf
 
 import pytest
 
-from configs.brief import HostLimits, NetworkLink
+from configs.brief import HostLimits
+from configs.connections import NetworkLink
 from configs.errors import ScenarioError
 from configs.loading import load
 from configs.resolve import agent_brief, plant_brief

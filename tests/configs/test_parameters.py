@@ -120,6 +120,13 @@ def test_changes_have_the_same_keys_bounds_and_words_and_no_defaults() -> None:
     assert pickle.loads(pickle.dumps(heavier)) == heavier
 
 
+def test_a_client_of_a_bus_imports_no_section_of_a_scenario() -> None:
+    """Every `can.Bus` of a program pays for what it imports."""
+    heavy = "{'annotated_types', 'configs.brief', 'configs.parameters', 'zenoh'}"
+    code = f"import sys, bridge.can_bus.interface; assert not {heavy} & sys.modules.keys()"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=30)
+
+
 @pytest.mark.parametrize(
     "modules",
     ["configs.sections, configs.host, configs.powertrain", "agents.__main__", "plant.__main__"],

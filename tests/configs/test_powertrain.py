@@ -6,7 +6,8 @@ import pytest
 from support.scenario_text import changed
 
 from bridge.drives.odrive.model import AxisModel
-from configs.brief import NetworkLink, PowertrainModel, RobotBrief
+from configs.brief import PowertrainModel, RobotBrief
+from configs.connections import NetworkLink
 from configs.errors import ScenarioError
 from configs.loading import load, loads
 from configs.resolve import plant_brief

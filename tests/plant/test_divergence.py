@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisError, AxisState, Command, identifier
 from bridge.frame import Frame
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief
 from plant.robot import EmulatedRobot, diverged_robots, emulated_robot

@@ -8,7 +8,7 @@ from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisState, Command, identifier
 from bridge.drives.odrive.load import cyclic_messages
 from bridge.frame import Frame
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief, robot_briefs
 from configs.scenario import Scenario

@@ -6,7 +6,7 @@ from bridge.drives import protocol
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import Command, identifier
 from bridge.frame import Frame
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.loading import load
 from configs.resolve import agent_brief, plant_brief
 from plant.robot import EmulatedRobot, emulated_robot

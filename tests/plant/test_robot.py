@@ -7,7 +7,7 @@ import pytest
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import Command, identifier
 from bridge.frame import Frame
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief
 from configs.signals import PLANT_SIGNALS

@@ -4,7 +4,8 @@ from dataclasses import replace
 from random import Random
 from typing import Any
 
-from configs.brief import MotorModel, NetworkLink, PowertrainModel
+from configs.brief import MotorModel, PowertrainModel
+from configs.connections import NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief
 from plant.encoder import Encoder

@@ -10,7 +10,8 @@ from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import Frame
 from bridge.network.messages import PathState, PoseFix
 from bridge.network.telemetry import RowBuffer, row_of
-from configs.brief import AgentBrief, NetworkLink
+from configs.brief import AgentBrief
+from configs.connections import NetworkLink
 from configs.loading import load
 from configs.resolve import agent_brief, plant_brief
 from configs.signals import controller_signals

@@ -213,7 +213,7 @@ INTRUDER = """
 import sys
 from bridge.network import keys
 from bridge.network.client import open_client
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 with open_client(NetworkLink("", sys.argv[1], "bench", "word"), 10.0) as link:
     for _ in range(5):
         link.publisher(keys.report(sys.argv[2], "agent/r1")).put(b"forged")

@@ -17,7 +17,7 @@ from bridge.network import keys
 from bridge.network.client import open_client
 from bridge.network.messages import PathState, Rows
 from bridge.network.zenoh_link import ZenohLink
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.roles import AGENT, identity_of
 from fleetloop.record.reader import Record
 

@@ -7,7 +7,7 @@ import pytest
 from agents.laws.adaptive_dsc import AdaptiveDsc, DscState
 from agents.laws.interface import PathVariable, Reference, RobotMotion
 from agents.paths import robot_path
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.curves import reference_path
 from configs.loading import load
 from configs.paths import World

@@ -8,7 +8,7 @@ import pytest
 from agents.laws.adaptive_dsc_robust import AdaptiveDscRobust
 from agents.laws.interface import PathVariable, RobotMotion
 from agents.paths import robot_path
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.curves import reference_path
 from configs.loading import load
 from configs.paths import AT_CENTRE

@@ -12,7 +12,7 @@ from agents.laws.dsc_terms import path_errors
 from agents.laws.fixed_dsc import PAPER_THETA, FixedDsc
 from agents.laws.interface import PathVariable, RobotMotion, Wheels
 from agents.paths import robot_path
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.curves import reference_path
 from configs.loading import load
 from configs.paths import World

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.certificates import certificates
 
-from bridge.can_bus.credentials import as_option, network_of
+from bridge.can_bus.credentials import network_of
+from bridge.can_bus.options import as_option
 from configs.errors import ScenarioError
 from configs.tls import TlsFiles
 

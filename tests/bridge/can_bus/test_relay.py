@@ -14,7 +14,7 @@ from bridge.frame import Frame
 from bridge.network import keys
 from bridge.network.client import open_client
 from bridge.network.zenoh_link import ZenohLink
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from support.second_drive.tools import PlainSection
 from bridge.drives import protocol
 from bridge.frame import Frame
 from bridge.process.lifecycle import Stop
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.drives import DRIVES
 from configs.errors import ScenarioError
 from configs.loading import load, loads, to_toml

@@ -12,7 +12,7 @@ from bridge.network import access, keys
 from bridge.network.client import open_client
 from bridge.network.router import RouterLink, open_router
 from bridge.network.zenoh_link import ZenohLink
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.errors import InfrastructureError
 from configs.roles import AGENT, LAUNCHER, LOCALISATION, PLANT
 

@@ -18,7 +18,7 @@ from bridge.network import access
 from bridge.network import keys
 from bridge.network.client import open_client
 from bridge.network.router import open_router
-from configs.brief import NetworkLink, Outside
+from configs.connections import NetworkLink, Outside
 from configs.errors import InfrastructureError
 from configs.tls import TlsFiles
 

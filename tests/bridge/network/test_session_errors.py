@@ -13,7 +13,7 @@ from support.certificates import certificates
 from bridge.network import access
 from bridge.network.client import open_client
 from bridge.network.router import RouterLink, open_router
-from configs.brief import NetworkLink, Outside
+from configs.connections import NetworkLink, Outside
 from configs.errors import InfrastructureError
 from configs.tls import TlsFiles
 

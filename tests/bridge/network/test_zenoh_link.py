@@ -17,7 +17,7 @@ from bridge.network import access
 from bridge.network import keys
 from bridge.network.client import open_client
 from bridge.network.router import open_router
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.roles import AGENT
 
 folder = Path(sys.argv[1])
@@ -88,7 +88,7 @@ from pathlib import Path
 from bridge.network import access
 from bridge.network.client import open_client
 from bridge.network.router import open_router
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.roles import AGENT
 from configs.errors import InfrastructureError
 plan = access.plan("test", ("r1",), {"r1": ()}, ("r1",))

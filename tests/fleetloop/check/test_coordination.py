@@ -7,7 +7,7 @@ import pytest
 
 from agents.coordination import CoordinationState, Coordinator
 from agents.neighbours import Neighbours
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.graph import Graph, generated
 from configs.loading import load
 from configs.resolve import agent_brief

@@ -9,7 +9,8 @@ from support.controller_rows import ROW, SIGNALS
 from bridge.network.link import Arrival
 from bridge.network.messages import Rows
 from bridge.network.telemetry import PLANT_ROW
-from configs.brief import NetworkLink, RecorderBrief
+from configs.brief import RecorderBrief
+from configs.connections import NetworkLink
 from fleetloop.record.reader import Record
 from fleetloop.record.recorder import _Recorder
 from fleetloop.record.run_record import RunRecord

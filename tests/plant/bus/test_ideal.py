@@ -5,7 +5,7 @@ from support.manual_port import ManualPort
 from bridge.drives.odrive.frames import Command, identifier
 from bridge.frame import RTR, Frame
 from bridge.network.telemetry import no_tap
-from configs.brief import NetworkLink
+from configs.connections import NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief
 from plant.bus.ideal import MOST_A_TICK, IdealBus

@@ -12,7 +12,8 @@ from bridge.frame import Frame
 from bridge.network.telemetry import no_tap
 from bridge.wire.node import NodeState
 from bridge.wire.queues import Endless
-from configs.brief import NetworkLink, PlantBrief
+from configs.brief import PlantBrief
+from configs.connections import NetworkLink
 from configs.loading import load, loads
 from configs.resolve import plant_brief
 from plant.bus.build import timed_bus
