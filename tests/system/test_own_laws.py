@@ -3,19 +3,19 @@
 Nothing is installed: the files are beside the scenario, and processes import them from there.
 """
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support.command_line import fleetloop
 from support.own_files import FILES, replaced, write_own_files
 from support.processes import completed
 
 from fleetloop.record.reader import Record
 
 pytestmark = pytest.mark.system
-QUICK = ("--duration", "1", "--allow-unchecked")
+IN_PROCESS = ("--in-process",)
+QUICK = ("--duration", "1", "--allow-unchecked", "--no-report")
 
 
 @pytest.fixture
@@ -25,18 +25,8 @@ def own(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def fleetloop(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "fleetloop", *words],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=100,
-    )
-
-
 def test_the_page_holds_what_it_expects(own: Path) -> None:
-    done = fleetloop(own, "run", "own.toml", "--in-process", "--out", "a")
+    done = fleetloop(own, "run", "own.toml", *IN_PROCESS, "--no-report", "--out", "a")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "held         distance_m of r1, r2" in done.stdout
 
@@ -140,20 +130,27 @@ def test_a_robots_gains_are_not_judged_by_the_default_law_when_the_fleets_is_los
 
 
 @pytest.mark.parametrize(
-    ("new", "said"),
+    ("mode", "new", "said"),
     [
+        ((), "(hypot(dx, dy),) if along.s < 0.01 else dx[0]", ": TypeError: 'float'"),
         (
-            "(hypot(dx, dy),) if along.s < 0.01 else None[0]",
-            ": TypeError: 'NoneType'",
+            IN_PROCESS,
+            "(hypot(dx, dy),) if along.s < 0.01 else ()",
+            "step returned 0 signals, SIGNALS has 1",
         ),
-        ("(hypot(dx, dy),) if along.s < 0.01 else ()", "step returned 0 signals, SIGNALS has 1"),
-        ("(hypot(dx, dy),)) if along.s < 0.01 else (1, 2", "step must return (tau_right"),
-        ("(hypot(dx, dy) / (along.s < 0.01),)", "diverged at s = 0.01"),
+        (
+            IN_PROCESS,
+            "(hypot(dx, dy),)) if along.s < 0.01 else (1, 2",
+            "step must return (tau_right",
+        ),
+        (IN_PROCESS, "(hypot(dx, dy) / (along.s < 0.01),)", "diverged at s = 0.01"),
     ],
 )
-def test_a_law_that_fails_stops_its_own_robots_and_no_other(own: Path, new: str, said: str) -> None:
+def test_a_law_that_fails_stops_its_own_robots_and_no_other(
+    own: Path, mode: tuple[str, ...], new: str, said: str
+) -> None:
     replaced(own, "my_law.py", "(hypot(dx, dy),)", new)
-    done = fleetloop(own, "run", "own.toml", "--force", "--out", "a", *QUICK)
+    done = fleetloop(own, "run", "own.toml", "--force", "--out", "a", *mode, *QUICK)
     assert "STOPPED r1" in done.stdout
     assert said in " ".join(done.stdout.split())
     assert "STOPPED r3" not in done.stdout

@@ -3,12 +3,11 @@
 import asyncio
 import json
 import os
-import resource
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import can
@@ -19,8 +18,10 @@ from odrive_can.odrive import DriveError
 
 from fleetloop.testing import EmulatedPlant, PlantError
 
-pytestmark = [pytest.mark.system, pytest.mark.wall_clock]
+pytestmark = pytest.mark.system
 PLANT = (sys.executable, "-m", "fleetloop", "plant")
+PERIOD_S = 0.002
+"""Of the scenario two_robots."""
 
 
 async def until(holds: Callable[[], bool], act: Callable[[], None] = lambda: None) -> None:
@@ -78,10 +79,8 @@ def test_a_client_that_falls_silent_is_disarmed_by_the_watchdog(fleetloop_plant)
     with can.Bus(**plant.buses["r1"]) as bus:
         send(bus, 0x007, bytes([8, 0, 0, 0]))
         send(bus, 0x00E, bytes.fromhex("cdcccc3d"))  # 0.1 N·m
-        states = [m.data[4] for m in messages(bus, 1.0) if m.arbitration_id == 0x001]
-    assert states[:1] in ([1], [8])
-    assert 8 in states
-    assert states[-1] == 1
+        for state in (8, 1):
+            await_state(bus, state)
     assert plant.poses()["r1"].torque_right_wheel_N_m == 0.0
 
 
@@ -90,9 +89,9 @@ def test_an_absurd_set_point_ends_the_motion_of_its_robot_alone() -> None:
         with can.Bus(**plant.buses["r1"]) as one, can.Bus(**plant.buses["r2"]) as other:
             send(one, 0x007, bytes([8, 0, 0, 0]))
             send(one, 0x00E, bytes.fromhex("ffff7f7f"))
-            beats = [m.data for m in messages(one, 0.5) if m.arbitration_id == 0x001]
-            assert len(messages(other, 0.2)) > 100
-        assert beats[-1][:5] == bytes([8, 0, 0, 0, 1])  # MISSING_ESTIMATE, idle
+            beats = (m.data[:5] for m in heard(one, 20.0) if m.arbitration_id == 0x001)
+            assert bytes([8, 0, 0, 0, 1]) in beats  # MISSING_ESTIMATE, idle
+            assert sum(1 for _ in heard(other, 0.2)) > 10
         assert plant.poses()["r1"].v_m_s == 0.0
         said = plant.stop()
     assert "STOPPED r1: tick " in said
@@ -105,27 +104,32 @@ def send(bus: can.BusABC, identifier: int, data: bytes) -> None:
     bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
 
 
-def messages(bus: can.BusABC, seconds: float) -> list[can.Message]:
+def await_state(bus: can.BusABC, state: int) -> None:
+    """Return when the right drive says that it is in this state; at most 20 s of bus time."""
+    assert any(m.arbitration_id == 0x001 and m.data[4] == state for m in heard(bus, 20.0))
+
+
+def heard(bus: can.BusABC, seconds: float) -> Iterator[can.Message]:
     """What comes within so many seconds of bus time."""
-    first = bus.recv(5.0)
-    found = [first]
-    while (message := bus.recv(5.0)) is not None and message.timestamp < first.timestamp + seconds:
-        found.append(message)
-    return found
+    first = message = bus.recv(5.0)
+    while message is not None and message.timestamp <= first.timestamp + seconds:
+        yield message
+        message = bus.recv(5.0)
 
 
-def children_cpu_s() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
-
-
-def test_it_is_ready_and_gone_for_less_than_a_second_of_a_processor() -> None:
-    took: list[float] = []
-    while len(took) < 5 and not any(seconds < 1.0 for seconds in took):  # others fill the caches
-        before = children_cpu_s()
-        EmulatedPlant("two_robots").stop()
-        took.append(children_cpu_s() - before)
-    assert min(took) < 1.0, took
+def test_it_starts_without_the_libraries_of_runs_and_their_records() -> None:
+    python, *plant = PLANT
+    done = subprocess.run(
+        [python, "-X", "importtime", *plant, "two_robots", "--duration", "0.1"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0, done.stderr
+    modules = (line.rpartition("|")[2].strip() for line in done.stderr.splitlines())
+    loaded = {module.partition(".")[0] for module in modules}
+    assert "plant" in loaded
+    assert not loaded & {"matplotlib", "mcap", "zstandard"}
 
 
 def test_only_the_named_robots_have_a_bus(fleetloop_plant) -> None:
@@ -162,7 +166,7 @@ def test_it_ends_when_the_process_that_started_it_is_killed(runtime_folder: Path
     ) as owner:
         plant = psutil.Process(int(owner.stdout.readline()))
         owner.kill()
-    plant.wait(5.0)
+    plant.wait(60.0)
     assert not runtime_folder.exists()
 
 
@@ -178,7 +182,7 @@ def test_a_signal_ends_it_well_and_it_says_what_crossed_its_buses(
         with can.Bus(interface="fleetloop", channel=channel) as bus:
             assert bus.recv(5.0).arbitration_id in (0x001, 0x009, 0x021, 0x029)
         process.send_signal(number)
-        _, said = process.communicate(timeout=10)
+        _, said = process.communicate(timeout=60)
     assert process.returncode == 0
     assert "frames: r1 " in said
     assert "right node 0, left node 1" in lines[1]
@@ -207,7 +211,17 @@ def test_an_unknown_request_is_answered_with_those_that_are_known(fleetloop_plan
 
 def test_bus_time_keeps_the_wall_clocks_pace(fleetloop_plant) -> None:
     plant = fleetloop_plant("two_robots")
+
+    def reading() -> tuple[float, float, float]:
+        """Bus time between two instants of the wall clock."""
+        earliest_s = time.monotonic()
+        bus_s = plant.time_s()
+        return earliest_s, bus_s, time.monotonic()
+
     with can.Bus(**plant.buses["r1"]) as bus:
-        before_s, wall_s = plant.time_s(), time.monotonic()
-        messages(bus, 1.0)
-        assert plant.time_s() - before_s == pytest.approx(time.monotonic() - wall_s, abs=0.2)
+        before = reading()
+        assert sum(1 for _ in heard(bus, 1.0)) > 10
+        after = reading()
+    passed_s = after[1] - before[1]
+    assert passed_s <= after[2] - before[0] + PERIOD_S
+    assert passed_s > 0.5 * (after[0] - before[2])

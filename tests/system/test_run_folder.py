@@ -30,7 +30,7 @@ def test_a_folder_that_vanishes_is_named_at_once(
             folder.rename(tmp_path / "elsewhere")
         else:
             shutil.rmtree(folder)
-        status, out = run.end(within_s=10.0)
+        status, out = run.end()
     finally:
         run.kill()
     assert status == 3, out
@@ -54,7 +54,7 @@ def test_a_run_that_is_interrupted_before_it_begins_leaves_no_folder(
             assert time.monotonic() < deadline
             run.wait(0.002)
         run.send(signal.SIGINT)
-        status, out = run.end(within_s=10.0)
+        status, out = run.end()
     finally:
         run.kill()
     assert status == 130, out

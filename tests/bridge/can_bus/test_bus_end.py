@@ -57,16 +57,14 @@ def test_who_is_behind_when_the_bus_ends_still_gets_all_of_it_and_the_reason(run
     assert heard == list(range(5000))
 
 
-@pytest.mark.wall_clock
 def test_who_does_not_read_delays_the_end_of_the_bus_by_a_bound(running, join) -> None:
-    import time
-
     join()
     for _ in range(3000):
         running.deliver(Frame(1, b""))
-    began = time.monotonic()
-    running.close()
-    assert time.monotonic() - began < 3.0
+    closer = threading.Thread(target=running.close)
+    closer.start()
+    closer.join(20.0)
+    assert not closer.is_alive()
 
 
 @pytest.mark.parametrize("wait_s", [None, 0.04, 60.0])

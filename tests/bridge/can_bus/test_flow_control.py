@@ -1,5 +1,8 @@
 """The window of a line: nobody runs ahead of what was given, and nobody waits for ever."""
 
+from collections import deque
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -41,6 +44,25 @@ def test_all_packets_get_through_in_bounded_room_whatever_the_receivers_pace(
             case 2:
                 assert sender.grant(rooms.pop(0))
         assert sum(map(cost, held)) <= INITIAL_CREDIT_BYTES + MAX_BYTES
+
+
+@pytest.mark.parametrize("way_s", [0.001, 0.01, 0.013])
+def test_the_window_is_wide_enough_for_a_full_bus_at_the_far_end_of_a_slow_way(
+    way_s: float,
+) -> None:
+    # 1 Mbit/s carries a frame of 4 bytes in 79 bit times at least.
+    period_s, frame = 79e-6, encode_frames(0, 0, (Frame(1, b"1234"),))
+    sender, receiver = Sender(), Receiver()
+    on_the_way: deque[tuple[float, bytes]] = deque()
+    for n in range(20_000):
+        now_s = n * period_s
+        while on_the_way and on_the_way[0][0] <= now_s:
+            assert sender.grant(on_the_way.popleft()[1])
+        assert sender.has_credit(), n
+        sender.spend(frame)
+        assert receiver.arrive(frame)
+        if (credit := receiver.consume(frame)) is not None:
+            on_the_way.append((now_s + 2.0 * way_s, credit))
 
 
 def test_who_runs_ahead_is_found_out() -> None:

@@ -16,6 +16,7 @@ from support.cut_proxy import CutProxy
 from support.hub_running import Running
 
 from bridge.can_bus import connection, flow_control, zenoh_transport
+from bridge.can_bus.flow_control import INITIAL_CREDIT_BYTES, LEAST_BYTES
 from bridge.frame import Frame
 
 OPEN = """
@@ -194,7 +195,6 @@ def test_a_guest_that_is_killed_has_left(running: Running) -> None:
         assert running.until(lambda: running.hub.clients() == 0)
 
 
-@pytest.mark.wall_clock
 def test_a_guest_that_was_frozen_is_told_and_has_held_up_nobody(running: Running) -> None:
     with (
         program(
@@ -208,23 +208,21 @@ def test_a_guest_that_was_frozen_is_told_and_has_held_up_nobody(running: Running
     ):
         assert running.until(lambda: running.hub.clients() == 2)
         process.send_signal(signal.SIGSTOP)
-        waits = []
-        for n in range(100_000):
-            began = time.monotonic()
-            running.deliver(Frame(1, n.to_bytes(4, "big")))
-            assert other.recv(5.0) is not None
-            waits.append(time.monotonic() - began)
-            if running.hub.clients() == 1:
-                break
+        heard = 0
+        while running.hub.clients() == 2 and heard < 1_000_000:
+            running.deliver(*(Frame(1, n.to_bytes(4, "big")) for n in range(100)))
+            for _ in range(100):
+                assert other.recv(5.0) is not None
+            heard += 100
         assert running.hub.clients() == 1
-        assert max(waits) < 0.9  # of the second in which its end is noticed
+        # Before its end is noticed, the other one hears more than the frozen one has credit for.
+        assert heard > 2 * INITIAL_CREDIT_BYTES // LEAST_BYTES
         process.send_signal(signal.SIGCONT)
         said, _ = process.communicate(timeout=20.0)
         assert "router has gone, or the network to it" in said
 
 
-@pytest.mark.wall_clock
-def test_a_killed_router_is_an_error_within_seconds_and_not_a_wait_for_ever(tmp_path: Path) -> None:
+def test_a_killed_router_is_an_error_and_not_a_wait_for_ever(tmp_path: Path) -> None:
     (tmp_path / "w").mkdir()
     path = os.pathsep.join(sys.path)
     with subprocess.Popen(
@@ -248,13 +246,14 @@ def test_a_killed_router_is_an_error_within_seconds_and_not_a_wait_for_ever(tmp_
         waiting = threading.Thread(target=wait, daemon=True)
         waiting.start()
         host.kill()
-        assert told.wait(5.0)
-        assert "router has gone, or the network to it" in error_within(bus, 1.0)
+        assert told.wait(30.0)
+        assert "router has gone, or the network to it" in error_within(bus, 30.0)
         with pytest.raises(can.CanOperationError, match="router has gone"):
             bus.send(frame(0), timeout=1.0)
-        began = time.monotonic()
-        bus.shutdown()
-        assert time.monotonic() - began < 3.0
+        closer = threading.Thread(target=bus.shutdown, daemon=True)
+        closer.start()
+        closer.join(20.0)
+        assert not closer.is_alive()
 
 
 @pytest.fixture
@@ -264,17 +263,11 @@ def slow_way(running: Running) -> Iterator[CutProxy]:
     proxy.close()
 
 
-@pytest.mark.wall_clock
-def test_over_a_slow_way_nothing_is_lost_and_the_window_is_wide_enough_for_a_full_bus(
-    running: Running, slow_way: CutProxy
-) -> None:
+def test_over_a_slow_way_nothing_is_lost(running: Running, slow_way: CutProxy) -> None:
     with running.open(endpoint=f"tcp/127.0.0.1:{slow_way.port}") as guest:
-        began = time.monotonic()
         for n in range(4000):
             guest.send(frame(n), timeout=5.0)
         assert numbers(running.taken(4000)) == list(range(4000))
-        # 1 Mbit/s carries at most 1 Mbit/s / 79 bit = 12,700 frames of 4 bytes a second.
-        assert 4000 / (time.monotonic() - began) > 3000
         for n in range(4000):
             running.deliver(Frame(1, n.to_bytes(4, "big")))
         assert [int.from_bytes(guest.recv(5.0).data, "big") for _ in range(4000)] == list(
@@ -282,16 +275,13 @@ def test_over_a_slow_way_nothing_is_lost_and_the_window_is_wide_enough_for_a_ful
         )
 
 
-@pytest.mark.wall_clock
-def test_a_silent_cut_is_an_error_at_the_guest_and_a_goodbye_at_the_hub_within_seconds(
+def test_a_silent_cut_is_an_error_at_the_guest_and_a_goodbye_at_the_hub(
     running: Running, slow_way: CutProxy
 ) -> None:
     guest = running.open(endpoint=f"tcp/127.0.0.1:{slow_way.port}")
     assert running.until(lambda: running.hub.clients() == 1)
     slow_way.cut()
-    began = time.monotonic()
-    assert "router has gone, or the network to it" in error_within(guest, 10.0)
-    assert time.monotonic() - began < 5.0
+    assert "router has gone, or the network to it" in error_within(guest, 30.0)
     assert running.until(lambda: running.hub.clients() == 0)
     with pytest.raises(can.CanOperationError, match="gone"):
         guest.send(frame(0))

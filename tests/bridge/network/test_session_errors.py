@@ -1,7 +1,6 @@
 """Causes of a failed session with a router: reported at once and by name."""
 
 import socket
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -52,13 +51,18 @@ def router(plan: access.AccessPlan, outside: Outside, tmp_path: Path) -> Iterato
         yield link
 
 
-def refusal(link: NetworkLink, within_s: float = 20.0) -> str:
-    """Why there is no session; a refusal doesn't take as long as there is to wait."""
-    began = time.monotonic()
+def failure(link: NetworkLink, within_s: float) -> str:
+    """The cause of a session that did not open."""
     with pytest.raises(InfrastructureError) as caught:
         open_client(link, within_s)
-    assert time.monotonic() - began < 10.0
     return str(caught.value)
+
+
+def refusal(link: NetworkLink) -> str:
+    """The cause, reported at once: of a wait that was used up the text has the length."""
+    said = failure(link, 60.0)
+    assert "within 60 s" not in said
+    return said
 
 
 @pytest.mark.parametrize(("user", "word"), [("agent-r1", "wrong"), ("stranger", "word")])
@@ -92,14 +96,14 @@ def test_a_router_that_is_not_there_yet_is_waited_for(
     plan: access.AccessPlan, tmp_path: Path
 ) -> None:
     nowhere = NetworkLink(RUN, f"tcp/127.0.0.1:{free_port()}", "agent-r1", "word")
-    said = refusal(nowhere, 0.5)
+    said = failure(nowhere, 0.5)
     assert said.endswith("within 0.5 s: no program listens there (Connection refused)")
 
 
 def test_who_listens_and_says_nothing_or_hangs_up_is_told_apart(outside: Outside) -> None:
     with socket.create_server(("127.0.0.1", 0)) as silent:
         login = NetworkLink(RUN, f"tcp/127.0.0.1:{silent.getsockname()[1]}", "agent-r1", "word")
-        assert refusal(login, 0.5).endswith("no answer from there")
+        assert failure(login, 0.5).endswith("no answer from there")
 
 
 @contextmanager
@@ -145,7 +149,7 @@ def test_whoever_means_it_gets_in_though_more_wait_than_may(
 
 def test_plain_tcp_to_a_listener_with_tls_is_named(router: RouterLink, outside: Outside) -> None:
     plain = outside.endpoint.replace("tls/", "tcp/")
-    said = refusal(NetworkLink(RUN, plain, "agent-r1", "word"), 0.5)
+    said = failure(NetworkLink(RUN, plain, "agent-r1", "word"), 0.5)
     assert "or tcp/ instead of tls/" in said
 
 
