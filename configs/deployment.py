@@ -24,7 +24,7 @@ from configs.files import expanded
 from configs.parameters import FilePath, Name, Parameters, Pattern, as_tuples, parameter
 from configs.roles import AGENT, ROLES, STARTED, identity_of, processes_of
 from configs.scenario import Scenario
-from configs.tls import TlsFiles
+from configs.tls import ROUTER, TlsFiles, files_in
 from configs.users import read_users
 from configs.wording import MISSING
 
@@ -74,7 +74,10 @@ class NetworkSection(Parameters):
         None,
         "lines identity:password, all of them at the router, its own on a robot",
     )
-    tls: TlsFiles | None = parameter(None, "certificates instead of passwords")
+    certificates: FilePath | None = parameter(
+        None, "the folder of `fleetloop certs`, or of this machine's files from it"
+    )
+    tls: TlsFiles | None = parameter(None, "certificates of another authority")
     guests: dict[Name, tuple[str, ...]] = field(
         default_factory=dict,
         metadata={
@@ -82,6 +85,12 @@ class NetworkSection(Parameters):
             ' another machine; "*" for all'
         },
     )
+
+    def tls_of(self, identity: str | None) -> TlsFiles | None:
+        """The files of mutual TLS of an identity, of the router if None; None: passwords."""
+        if self.certificates is None:
+            return self.tls
+        return files_in(self.certificates, identity or ROUTER)
 
 
 class Deployment(BaseModel):
@@ -164,7 +173,7 @@ def check_deployment(
 def passwords(network: NetworkSection | None, identities: tuple[str, ...]) -> dict[str, str]:
     """The passwords of these identities from the deployment's file.
 
-    With TLS the certificate proves the identity, and the password is the name again.
+    With certificates of another authority they prove the identity: the password is the name again.
 
     Raises:
         ScenarioError: the file can't be read, is readable by others, or lacks an identity.
@@ -177,7 +186,7 @@ def passwords(network: NetworkSection | None, identities: tuple[str, ...]) -> di
     if path is None:
         raise ScenarioError(
             "network.users = (missing): name a file with a line identity:password for each of"
-            f" {', '.join(identities)}, or give network.tls"
+            f" {', '.join(identities)}, or give network.certificates"
         )
     known = read_users(path, "network.users")
     if absent := [identity for identity in identities if not known.get(identity)]:
@@ -219,6 +228,7 @@ def _problems(deployment: Deployment, scenario: Scenario) -> list[Problem]:
         ]
         if user in identities or user.startswith(f"{AGENT.name}-"):
             problems.append(Problem(f"network.guests.{user}", user, "is a role's name"))
+    problems += _network_problems(deployment.network)
     places: dict[tuple[object, object], str] = {}
     for robot, section in deployment.robot.items():
         key = f"robot.{robot}"
@@ -233,6 +243,20 @@ def _problems(deployment: Deployment, scenario: Scenario) -> list[Problem]:
         if other != robot:
             remedy = f"{other} is there with the same node ids; give each robot a bus of its own"
             problems.append(Problem(f"{key}.bus.channel", bus.channel, remedy))
+    return problems
+
+
+def _network_problems(network: NetworkSection | None) -> list[Problem]:
+    if network is None or (network.tls is None and network.certificates is None):
+        return []
+    problems = [
+        Problem(f"network.{name}", at, "must be tls/HOST:PORT: certificates are of no use over tcp")
+        for name, at in (("endpoint", network.endpoint), ("listen", network.listen))
+        if at is not None and not at.startswith("tls/")
+    ]
+    if network.tls is not None and network.certificates is not None:
+        remedy = "leave out network.tls or network.certificates"
+        problems.append(Problem("network.certificates", str(network.certificates), remedy))
     return problems
 
 
@@ -281,6 +305,9 @@ def _beside(deployment: Deployment, folder: Path) -> Deployment:
     changes: dict[str, Any] = {}
     if network.users is not None:
         changes["users"] = folder / expanded(network.users, "network.users")
+    if network.certificates is not None:
+        path = expanded(network.certificates, "network.certificates")
+        changes["certificates"] = folder / path
     if network.tls is not None:
         files = {
             file.name: folder

@@ -14,6 +14,7 @@ import typer
 from configs.errors import ExitStatus, FleetloopError
 from fleetloop import numbers
 from fleetloop.can.app import app as can_app
+from fleetloop.certificates.app import app as certs_app
 from fleetloop.options import (
     ClockOption,
     DeploymentOption,
@@ -40,6 +41,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 app.add_typer(can_app, name="can")
+app.add_typer(certs_app, name="certs")
 
 
 @app.command()

@@ -2,7 +2,7 @@
 
     option         what
     endpoint       tcp/HOST:PORT, or tls/HOST:PORT for mutual TLS
-    user           a guest of the run's deployment; with TLS its certificate's common name
+    user           a guest of the run's deployment; with TLS whom its certificate is for
     password       with tcp: the one in the deployment's file of users,
     users          or a file of the program's own with the line USER:PASSWORD
     ca             with tls: the authority of the router's certificate and the guest's, PEM
@@ -46,17 +46,16 @@ def network_of(options: Mapping[str, str]) -> NetworkLink:
     if wrong := [name for name in others if name in options]:
         raise ScenarioError(f"{wrong[0]} doesn't go with {endpoint}: give {', '.join(needed)}")
     if secure:
-        return NetworkLink("", endpoint, user, user, _tls(options, user))
+        files = _tls(options)
+        return NetworkLink("", endpoint, user, check_tls(files, user), files)
     return NetworkLink("", endpoint, user, _password(options, user))
 
 
-def _tls(options: Mapping[str, str], user: str) -> TlsFiles:
+def _tls(options: Mapping[str, str]) -> TlsFiles:
     for name in TLS:
         if name not in options:
             raise ScenarioError(f"{name} = (missing): over tls give {', '.join(TLS)}")
-    files = TlsFiles(**{name: Path(options[name]) for name in TLS})
-    check_tls(files, user)
-    return files
+    return TlsFiles(**{name: Path(options[name]) for name in TLS})
 
 
 def _password(options: Mapping[str, str], user: str) -> str:

@@ -10,8 +10,10 @@ open is the relay's decision.
 
 Plant and controllers may watch the launcher's token and hear its last word: on other machines that
 is how they learn that the run is over, and why. A process on another machine has a password that
-was agreed on before, or a certificate whose common name is the identity; then the password is no
-secret and proves nothing. The plant hears the poses of the robots that it doesn't emulate.
+was agreed on before, or a certificate: the rules are bound to its common name, which says the
+identity and for which of its keys (`configs.tls`). Then the password is that name once more: no
+secret, but a client with a revoked key is refused at its login. The plant hears the poses of the
+robots that it doesn't emulate.
 
 A right has limits of length and rate: the router drops what is
 longer than anything honest on that key (`bridge.network.messages.MOST_BYTES`). In real time, where
@@ -61,6 +63,9 @@ class AccessPlan:
     passwords: Mapping[str, str] = field(repr=False)
     certified: frozenset[str] = frozenset()  # identities that must show a certificate
     most_hz: Mapping[str, float] = field(default_factory=dict)  # by key; others at any rate
+    kept_out: Mapping[str, str] = field(default_factory=dict)  # identities without rights, and why
+    expiries: Mapping[int, str] = field(default_factory=dict)
+    """Identities of the authority's certificates, by their last second since 1970 UTC."""
 
     def dictionary(self) -> str:
         """Zenoh's user dictionary: `user:password` lines."""
@@ -76,7 +81,7 @@ class AccessPlan:
             policies.append({"rules": [rule["id"] for rule in own], "subjects": [user]})
         subjects = [
             {"id": user, "usernames": [user]}
-            | ({"cert_common_names": [user]} if user in self.certified else {})
+            | ({"cert_common_names": [self.passwords[user]]} if user in self.certified else {})
             for user in self.rights
         ]
         return json.dumps(
@@ -128,6 +133,7 @@ def plan(
     guests: Mapping[str, str] | None = None,
     bus_guests: Collection[str] = (),
     certified: bool = False,
+    kept_out: Mapping[str, str] | None = None,
     share_period_s: float | None = None,
     localisation_period_s: float | None = None,
 ) -> AccessPlan:
@@ -135,8 +141,9 @@ def plan(
 
     What crosses the `buses` is recorded. `real_robots` aren't emulated: their poses come from the
     localisation system. `guests` are the passwords of identities on other machines (all others are
-    given random ones), who must show a certificate with their identity as its common name if
-    `certified`. Periods are of real time; with one, what comes much more often is dropped.
+    given random ones), who must show a certificate with the password as its common name if
+    `certified`. Identities that are `kept_out` have no rights, for the reason named. Periods are of
+    real time; with one, what comes much more often is dropped.
     """
     graph = _Graph(run, robots, hears, leader, buses, real_robots)
     rights: dict[str, Rights] = {}
@@ -159,7 +166,8 @@ def plan(
         if period_s is not None
         for key in (key_of(run, robot) for robot in robots)
     }
-    return AccessPlan(rights, passwords, frozenset(known if certified else ()), most_hz)
+    certificates = frozenset(known if certified else ())
+    return AccessPlan(rights, passwords, certificates, most_hz, dict(kept_out or {}))
 
 
 class _Graph(NamedTuple):

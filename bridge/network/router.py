@@ -78,7 +78,8 @@ def open_router(
     Raises:
         InfrastructureError: an endpoint is taken or can't be listened on.
     """
-    denials = Denials()
+    present = {user: access.passwords[user] for user in access.certified}
+    denials = Denials(present, access.kept_out, access.expiries)
     zenoh_log.begin(directives(every_message=outside is not None))
     dictionary = folder / "users"
     dictionary.touch(mode=0o600)

@@ -1,9 +1,17 @@
 """Refusals by the router, counted from Zenoh's log, their only source.
 
-    login    wrong password, unknown user, no login; on TLS the identity is unknown, only the cause
-    unread   a client that read nothing while others waited to send to it: the router disconnects it
-             before all other clients stand still
-    rights   a certificate of another identity; puts and subscriptions without the right to them
+    login        wrong password, unknown user, no login, a revoked certificate
+    certificate  TLS that failed: expired, another authority's, none; a certificate of another
+                 identity
+    rights       puts and subscriptions without the right to them
+    flood        a client that said too much, or `MOST_DENIED` times what it has no right to:
+                 nothing more is taken from it, now and when it comes again
+    unread       a client that read nothing while others waited to send to it: the router
+                 disconnects it before all other clients stand still
+
+Zenoh doesn't say whose certificate it refused, nor from where: an expired one is known by its last
+second, one of another authority by nothing. A flooder is known by what it proved: its certificate's
+name if it has one, else its user's name.
 
 A login is a sequence of lines about one connection (TLS, InitSyn, OpenSyn); the last one has the
 user's name. Zenoh looks up rights once when a key is declared, without a log line, and again for
@@ -13,14 +21,19 @@ is bounded.
 
 import re
 from collections import Counter
-from collections.abc import Callable
-from typing import TypeVar
+from collections.abc import Callable, Mapping
+from typing import NamedTuple, TypeVar
+
+from configs.tls import identity_and_number
 
 _LOGINS = "zenoh_transport::unicast::establishment::accept=trace,zenoh_link_tls::unicast=debug"
 _DEAFNESS = "zenoh_transport::unicast::universal::tx=error"
 _RIGHTS = "zenoh::net::routing::interceptor::access_control"
 MOST = 50
-"""Kinds of refusals that are told apart."""
+"""Texts of refusals that are told apart."""
+MOST_DENIED = 1000
+"""Denied messages of one connection that are taken before it is cut off."""
+LOGIN, CERTIFICATE, RIGHTS, FLOOD, UNREAD = "login", "certificate", "rights", "flood", "unread"
 _REMEMBERED = 4096
 _LINE = re.compile(r"\S+Z +(?P<level>[A-Z]+) +(?P<thread>.*?ThreadId\(\d+\)) (?P<where>\S+): ")
 _TLS = re.compile(r"Accepted TLS connection on \S+: (?P<peer>\S+)\. Common Name: (?P<name>.+)\.$")
@@ -34,6 +47,8 @@ _WHY = {
     "Expected extension": "no user and password given",
 }
 _HANDSHAKE = re.compile(r"(?P<why>.+?)\. Hint: increase the system open file limit")
+_EXPIRED = re.compile(r"certificate expired: .* is not valid after (?P<at>\d{1,18})\b")
+_VERIFIED_AT = re.compile(r": verification time \d+ .*")
 _STRANGER = re.compile(r"(?P<zid>[0-9a-f]+) did not match any configured ACL subject")
 _DEAF = re.compile(r"Unable to push non droppable network message to (?P<zid>[0-9a-f]+)\.")
 _DENIED = re.compile(
@@ -61,11 +76,34 @@ def is_ours(line: str) -> bool:
     )
 
 
-class Denials:
-    """Counts them; one for each router."""
+class Refusal(NamedTuple):
+    """One kind of refusal of one identity."""
 
-    def __init__(self) -> None:
-        self._counts: Counter[str] = Counter()
+    kind: str
+    identity: str  # as it was claimed or proved; "" if it is unknown
+    text: str
+
+
+class Denials:
+    """Counts them; one for each router.
+
+    Args:
+        certified: the common names that prove identities at present.
+        kept_out: identities without rights, and why.
+        expiries: identities of the authority's certificates, by their last second since 1970.
+    """
+
+    def __init__(
+        self,
+        certified: Mapping[str, str] | None = None,
+        kept_out: Mapping[str, str] | None = None,
+        expiries: Mapping[int, str] | None = None,
+    ) -> None:
+        self._certified = dict(certified or {})
+        self._kept_out = dict(kept_out or {})
+        self._expiries = dict(expiries or {})
+        self._counts: Counter[Refusal] = Counter()
+        self._denied: Counter[str] = Counter()  # messages, by peer
         self._new: list[str] = []
         self._names: dict[str, str] = {}  # common name of a certificate, by peer
         self._zids: dict[str, str] = {}  # by peer
@@ -75,7 +113,7 @@ class Denials:
         self.cut_off: set[str] = set()
         """Users one of whose sessions was cut off because it did not read."""
         self.flooders: set[str] = set()
-        """Users one of whose sessions was cut off because it said too much."""
+        """What those proved whose session was cut off because it said too much."""
         self.turn_away: Callable[[str], None] = lambda _: None
         """Called, on the log's thread, with the address of a returning flooder."""
         self._caching: dict[str, str] = {}  # the key whose permissions a thread looks up in advance
@@ -94,19 +132,29 @@ class Denials:
             if accepted := _TLS.match(text):
                 _remember(self._names, accepted["peer"], accepted["name"])
             elif failed := _HANDSHAKE.match(text):
-                self._count(f"refused a connection over TLS: {failed['why']}")
+                self._take_handshake(failed["why"])
         elif syn := _SYN.match(text):
             self._take_syn(syn["kind"], syn["peer"], text)
         elif wrong := _WRONG.match(text):
             user, peer = self._latest
             self._users = {zid: at for zid, at in self._users.items() if at != (user, peer)}
             who = f"the login of {_shown(user)}" if user else "a login"
-            self._count(f"refused {who} from {_host(peer)}: {_WHY[wrong['why']]}")
+            why = self._why(user, peer) or _WHY[wrong["why"]]
+            self._count(LOGIN, user, f"refused {who} from {_host(peer)}: {why}")
 
     def notes(self) -> list[str]:
         """All refusals so far, each with its count if it is more than one."""
         counts = list(self._counts.items())  # at once: the log's thread may add to them
-        return [f"{text} ({count} times)" if count > 1 else text for text, count in counts]
+        return [f"{it.text} ({count} times)" if count > 1 else it.text for it, count in counts]
+
+    def counts(self) -> dict[str, dict[str, int]]:
+        """How many refusals there were so far, by kind and identity."""
+        found: dict[str, dict[str, int]] = {}
+        for (kind, identity, _), count in list(self._counts.items()):
+            of_kind = found.setdefault(kind, {})
+            who = _plain(identity) or "unknown"
+            of_kind[who] = of_kind.get(who, 0) + count
+        return found
 
     def news(self) -> list[str]:
         """The kinds of refusals that are new since the last call."""
@@ -120,10 +168,12 @@ class Denials:
 
     def note_flood(self, user: str, peer: str) -> None:
         """A user was cut off because it sent too much."""
-        self.flooders.add(user)
+        self.flooders.add(self._proof(user, peer))
         self._count(
+            FLOOD,
+            user,
             f"cut off {_shown(user)} from {_host(peer)}: it said far more than the schedule lets"
-            " any controller say"
+            " any controller say",
         )
 
     def logins_of(self, user: str) -> list[str]:
@@ -139,9 +189,10 @@ class Denials:
         login = _LOGIN.search(text)
         user = _user_of(bytes.fromhex(login["bytes"].replace(", ", ""))) if login else ""
         self._latest = (user, peer)
-        if user in self.flooders:
+        if self._proof(user, peer) in self.flooders:
             self.turn_away(peer)
-            self._count(f"turned away {_shown(user)} from {_host(peer)}: it was cut off before")
+            text = f"turned away {_shown(user)} from {_host(peer)}: it was cut off before"
+            self._count(FLOOD, user, text)
         if (zid_of_peer := self._zids.pop(peer, "")) and user:
             _remember(self._users, zid_of_peer, (user, peer))
 
@@ -152,8 +203,10 @@ class Denials:
             user, peer = self._users.get(zid, ("", ""))
             self.cut_off.add(user)
             self._count(
+                UNREAD,
+                user,
                 f"cut off {_shown(user)} from {_host(peer)}: it did not read what it asked for, and"
-                " all other clients would have waited for it"
+                " all other clients would have waited for it",
             )
 
     def _take_rights(self, thread: str, text: str) -> None:
@@ -164,22 +217,61 @@ class Denials:
             name = self._names.get(peer)
             came = f"with the certificate of {_shown(name)}" if name else "without a right"
             self._count(
-                f"{_shown(user)} from {_host(peer)} came {came}: may neither say nor hear anything"
+                CERTIFICATE if name else RIGHTS,
+                identity_and_number(name)[0] if name else user,
+                f"{_shown(user)} from {_host(peer)} came {came}: may neither say nor hear anything",
             )
         elif denied := _DENIED.search(text):
             if denied["at_first"] and self._caching.get(thread) == denied["key"]:
                 return
             user, peer = self._users.get(denied["zid"], ("", ""))
             what = f"{_DOING[denied['what']]} {_plain(denied['key'])}"
-            self._count(f"denied to {_shown(user)} from {_host(peer)}: {what}")
+            self._count(RIGHTS, user, f"denied to {_shown(user)} from {_host(peer)}: {what}")
+            self._count_denied(user, peer)
 
-    def _count(self, text: str) -> None:
-        if text not in self._counts:
+    def _count_denied(self, user: str, peer: str) -> None:
+        """Cut off a client that goes on with what it has no right to."""
+        if len(self._denied) >= _REMEMBERED and peer not in self._denied:
+            del self._denied[next(iter(self._denied))]
+        self._denied[peer] += 1
+        if self._denied[peer] == MOST_DENIED and user:
+            self.flooders.add(self._proof(user, peer))
+            self.turn_away(peer)
+            text = f"cut off {_shown(user)} from {_host(peer)}: it went on with what it may not do"
+            self._count(FLOOD, user, text)
+
+    def _take_handshake(self, why: str) -> None:
+        identity = ""
+        if expired := _EXPIRED.search(why):
+            identity = self._expiries.get(int(expired["at"]), "")
+            whose = _shown(identity) if identity else "an unknown identity"
+            why = f"the certificate of {whose} has expired"
+        text = _VERIFIED_AT.sub("", why)
+        self._count(CERTIFICATE, identity, f"refused a connection over TLS: {text}")
+
+    def _why(self, user: str, peer: str) -> str:
+        """Why an identity with a certificate was refused, "" if it is no such identity."""
+        if user in self._kept_out:
+            return self._kept_out[user]
+        present, shown = self._certified.get(user), self._names.get(peer)
+        if present is None or shown is None:
+            return ""
+        identity, number = identity_and_number(shown)
+        if identity == user and number < identity_and_number(present)[1]:
+            return f"its certificate is revoked: it is that of {_shown(shown)}"
+        return f"it showed the certificate of {_shown(shown)}"
+
+    def _proof(self, user: str, peer: str) -> str:
+        return self._names.get(peer, user)
+
+    def _count(self, kind: str, identity: str, text: str) -> None:
+        refusal = Refusal(kind, identity, text)
+        if refusal not in self._counts:
             if len(self._counts) >= MOST:
-                text = "refused much else"
-            if text not in self._counts:
-                self._new.append(text)
-        self._counts[text] += 1
+                refusal = Refusal(kind, "", "refused much else")
+            if refusal not in self._counts:
+                self._new.append(refusal.text)
+        self._counts[refusal] += 1
 
 
 def _remember(known: dict[str, _Value], key: str, value: _Value) -> None:

@@ -14,7 +14,10 @@ class Obstacle(NamedTuple):
     final: bool
 
 
-_REFUSED = "it refused the login: not the password of {user!r}, or no identity of its run"
+_REFUSED = (
+    "it refused the login: not the password or present certificate of {user!r}, or no identity of"
+    " its run"
+)
 _OBSTACLES = (
     (r"close message \(reason (?:GENERIC|0)\)", _REFUSED, True),
     (r"close message \(reason ([\w ]+)\)", "it refused the session ({0})", False),
@@ -52,7 +55,7 @@ _TAKEN = (
     (r"\[(\S+:\d+): Cannot assign requested address", "{0} is no address of this machine"),
     (r"\[(\S+:\d+): Permission denied", "{0} is not for this user: ports below 1024 are root's"),
     (r"(Name or service not known|No address associated)", "no such host ({0})"),
-    (r"Missing TLS", "tls/ needs certificates: network.tls of a deployment"),
+    (r"Missing TLS", "tls/ needs certificates: network.certificates of a deployment"),
 )
 
 

@@ -22,6 +22,7 @@ def stats_of(outcome: Outcome, *, realtime: bool, period_s: float) -> RunStats:
         startup_s=outcome.startup_s,
         teardown_s=outcome.teardown_s,
         machine=outcome.machine,
+        refused=outcome.refused,
     )
     stats.cpu_s["launcher"] = round(outcome.cpu_ns * 1e-9, 3)
     for process, report in outcome.reports.items():

@@ -1,7 +1,8 @@
 """Scenario and deployment → the place of each role: its buses, its network, its credentials."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 
 from bridge.network import access
 from configs.brief import PlantBrief
@@ -10,7 +11,6 @@ from configs.deployment import Deployment, NetworkSection, passwords
 from configs.errors import ScenarioError
 from configs.roles import LOCALISATION, identity_of
 from configs.scenario import Scenario
-from configs.tls import TlsFiles
 
 
 def robots_of_plant(brief: PlantBrief, deployment: Deployment) -> PlantBrief:
@@ -56,20 +56,28 @@ def check_credentials(scenario: Scenario, deployment: Deployment) -> None:
     """Refuse a run whose router could not authenticate its clients, before any start.
 
     Raises:
-        ScenarioError: a password or a file of TLS is missing or wrong; the text names key and file.
+        ScenarioError: a password or a file of TLS is missing, wrong or revoked; the text names key
+            and file.
     """
     guests(scenario, deployment)
     if deployment.network is not None:
-        _tls(deployment.network, None)
+        host = deployment.network.endpoint.partition("/")[2].rpartition(":")[0]
+        _proved_name(deployment.network, None, host.strip("[]"))
 
 
-def _tls(network: NetworkSection, identity: str | None) -> TlsFiles | None:
-    files = network.tls
-    if files is not None:
-        from bridge.network.tls import check_tls
+def _proved_name(network: NetworkSection, identity: str | None, host: str = "") -> str:
+    """The common name of the certificate by which this machine proves an identity; "" without."""
+    files = network.tls_of(identity)
+    if files is None:
+        return ""
+    from bridge.network.tls import check_tls
 
-        check_tls(files, identity, "network.tls.")
-    return files
+    if network.certificates is None:
+        return check_tls(files, identity, "network.tls.", host)
+    try:
+        return check_tls(files, identity, "", host)
+    except ScenarioError as error:
+        raise ScenarioError(f"network.certificates: {error}") from error
 
 
 def outside(deployment: Deployment) -> Outside | None:
@@ -77,12 +85,27 @@ def outside(deployment: Deployment) -> Outside | None:
     network = deployment.network
     if network is None:
         return None
-    return Outside(network.listen or network.endpoint, network.tls)
+    return Outside(network.listen or network.endpoint, network.tls_of(None))
 
 
 def bus_guests(deployment: Deployment) -> Mapping[str, tuple[str, ...]]:
-    """Access to buses from other machines, by identity."""
-    return {} if deployment.network is None else deployment.network.guests
+    """Access to buses from other machines, by identity; none for a revoked one."""
+    if deployment.network is None:
+        return {}
+    revoked = kept_out(deployment)
+    return {user: may for user, may in deployment.network.guests.items() if user not in revoked}
+
+
+def kept_out(deployment: Deployment) -> Mapping[str, str]:
+    """The guests whose certificate is revoked, and why they have no rights."""
+    network = deployment.network
+    if network is None or network.certificates is None or not network.guests:
+        return {}
+    from fleetloop.certificates.folder import CertificateFolder
+
+    folder = CertificateFolder(network.certificates)
+    revoked = [user for user in network.guests if folder.is_revoked(folder.certificate(user))]
+    return dict.fromkeys(revoked, "its certificate is revoked")
 
 
 def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
@@ -94,8 +117,22 @@ def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
     identities = [identity_of(role) for role in deployment.elsewhere(scenario)]
     if any(not deployment.emulates(robot) for robot in scenario.names):
         identities.append(LOCALISATION.name)
-    known = passwords(deployment.network, (*identities, *bus_guests(deployment)))
+    identities += bus_guests(deployment)
+    if deployment.network is not None and deployment.network.certificates is not None:
+        return _proved_names(deployment.network.certificates, identities)
+    known = passwords(deployment.network, tuple(identities))
     return known | {user: _as_option(known[user]) for user in bus_guests(deployment)}
+
+
+def _proved_names(certificates: Path, identities: Iterable[str]) -> Mapping[str, str]:
+    """The common names that prove these identities at present, from the authority's folder."""
+    from fleetloop.certificates.folder import CertificateFolder
+
+    folder = CertificateFolder(certificates)
+    try:
+        return {identity: folder.proved_name(identity) for identity in identities}
+    except ScenarioError as error:
+        raise ScenarioError(f"network.certificates: {error}") from error
 
 
 def _as_option(password: str) -> str:
@@ -113,7 +150,7 @@ def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.
     """
     graph, network, clock = scenario.topology, deployment.network, scenario.clock
     realtime = clock.mode == "realtime"
-    return access.plan(
+    planned = access.plan(
         run,
         scenario.names,
         graph.in_neighbours,
@@ -122,10 +159,16 @@ def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.
         real_robots=[robot for robot in scenario.names if not deployment.emulates(robot)],
         guests=guests(scenario, deployment),
         bus_guests=tuple(bus_guests(deployment)),
-        certified=network is not None and network.tls is not None,
+        certified=network is not None and network.tls_of(None) is not None,
+        kept_out=kept_out(deployment),
         share_period_s=clock.share_period_s if realtime else None,
         localisation_period_s=clock.localisation_period_s if realtime else None,
     )
+    if network is None or network.certificates is None:
+        return planned
+    from fleetloop.certificates.folder import CertificateFolder
+
+    return replace(planned, expiries=CertificateFolder(network.certificates).expiries())
 
 
 def network_link(scenario: Scenario, deployment: Deployment, role: str) -> NetworkLink:
@@ -140,6 +183,8 @@ def network_link(scenario: Scenario, deployment: Deployment, role: str) -> Netwo
             f"{role} on its own needs a deployment with [network] endpoint: where its router is"
         )
     user = identity_of(role)
+    run, tls = network.run or scenario.name, network.tls_of(user)
+    if tls is not None:
+        return NetworkLink(run, network.endpoint, user, _proved_name(network, user), tls)
     (password,) = passwords(network, (user,)).values()
-    run = network.run or scenario.name
-    return NetworkLink(run, network.endpoint, user, password, _tls(network, user))
+    return NetworkLink(run, network.endpoint, user, password)

@@ -228,6 +228,7 @@ class ProcessRun:
         outcome.machine = self._machine.report()
         if refusals := link.denials.notes():
             outcome.notices["router"] = refusals
+        outcome.refused = link.denials.counts()
         words.note_dropped(link.dropped())
         if refusals := words.refusals.lines():
             outcome.notices.setdefault(LAUNCHER.name, []).extend(refusals)

@@ -84,7 +84,7 @@ def run_scenario(source: str, options: RunOptions) -> int:
     deployment = _deployment(scenario, options)
     if not options.in_process:
         keep_to_itself()
-    placement.check_credentials(scenario, deployment)
+    _check_credentials(scenario, deployment)
     if long := wall_time.warning(scenario, speed=options.speed, in_process=options.in_process):
         note(long)
     for line in out_of_reach(scenario):
@@ -147,6 +147,13 @@ def _look_ahead(source: str, scenario: Scenario, options: RunOptions) -> None:
         note(f"{finding.level}: {titled(finding)}: {finding.text}")
     if worst(found) == "error" and not options.force:
         raise ScenarioError(f"{source}: would not work as it is; --force runs it all the same")
+
+
+def _check_credentials(scenario: Scenario, deployment: Deployment) -> None:
+    """Refuse what can't be authenticated, and name the guests that are kept out."""
+    placement.check_credentials(scenario, deployment)
+    for user, why in placement.kept_out(deployment).items():
+        note(f"{user}: kept out: {why}")
 
 
 def _deployment(scenario: Scenario, options: RunOptions) -> Deployment:

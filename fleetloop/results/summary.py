@@ -39,6 +39,7 @@ class RunStats:
     waits_s: dict[str, dict[str, float]] = field(default_factory=dict)
     stopped_robots: dict[str, str] = field(default_factory=dict)
     notices: dict[str, list[str]] = field(default_factory=dict)
+    refused: dict[str, dict[str, int]] = field(default_factory=dict)  # by kind, by identity
     machine: dict[str, Any] = field(default_factory=dict)  # of `fleetloop.launch.machine`
     bus_troubles: dict[str, str] = field(default_factory=dict)
     left_early: dict[str, str] = field(default_factory=dict)  # robots told to stop, by whom
@@ -92,6 +93,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
             if robot in stats.stopped_robots
         },
         "notices": stats.notices,
+        "refused": stats.refused,
         "overruns": stats.overruns,
         "machine": stats.machine or None,
         "frames_per_bus": stats.frames_per_bus,

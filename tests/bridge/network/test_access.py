@@ -174,11 +174,13 @@ def test_a_liveliness_token_comes_and_goes_with_its_session(
 
 
 def test_guests_keep_their_passwords_and_show_certificates_if_they_must() -> None:
-    plan = access.plan(RUN, ROBOTS, HEARS, ("r1",), guests={"agent-r2": "agreed"}, certified=True)
-    assert plan.passwords["agent-r2"] == "agreed"
+    plan = access.plan(
+        RUN, ROBOTS, HEARS, ("r1",), guests={"agent-r2": "agent-r2#2"}, certified=True
+    )
+    assert plan.passwords["agent-r2"] == "agent-r2#2"
     assert len(plan.passwords["agent-r1"]) >= 32
     subjects = {s["id"]: s for s in json.loads(plan.access_control())["subjects"]}
-    assert subjects["agent-r2"]["cert_common_names"] == ["agent-r2"]
+    assert subjects["agent-r2"]["cert_common_names"] == ["agent-r2#2"]
     assert "cert_common_names" not in subjects["agent-r1"]
 
 

@@ -35,9 +35,10 @@ def files(name):
         private_key=folder / f"{name}.key",
     )
 
-plan = access.plan("t", ("r1", "r2"), {"r1": (), "r2": ()}, ("r1",), certified=sys.argv[2] == "tls",
-                   guests={"agent-r1": "one", "agent-r2": "two"})
 tls = sys.argv[2] == "tls"
+words = ("agent-r1", "agent-r2") if tls else ("one", "two")
+plan = access.plan("t", ("r1", "r2"), {"r1": (), "r2": ()}, ("r1",), certified=tls,
+                   guests=dict(zip(("agent-r1", "agent-r2"), words)))
 outside = Outside(f"{sys.argv[2]}/localhost:{port}", files("router") if tls else None)
 
 def login(user, word, certificate=None):
@@ -86,10 +87,10 @@ said(router)
 CERTIFICATES = """
 with open_router(None, plan, folder, outside) as router:
     router.subscribe(keys.path("t", "r2"), "path")
-    with login("agent-r2", "two", certificate="agent-r1") as link:
+    with login("agent-r2", "agent-r2", certificate="agent-r1") as link:
         link.publisher(keys.path("t", "r2")).put(b"by r1")
-    denied("agent-r2", "two", certificate="stranger")
-    with login("agent-r2", "two") as link:
+    denied("agent-r2", "agent-r2", certificate="stranger")
+    with login("agent-r2", "agent-r2") as link:
         mouth = link.publisher(keys.path("t", "r2"))
         while (heard := router.receive(0.05)) is None:
             mouth.put(b"by r2")
@@ -181,6 +182,32 @@ def test_no_line_whatever_breaks_the_reader_and_what_it_keeps_is_bounded() -> No
     assert len(denials.notes()) == MOST + 1
     assert denials.notes()[-1] == f"refused much else ({2 * MOST} times)"
     assert denials.news() and not denials.news()
+
+
+DENIED = """
+from bridge.network.router_refusals import MOST_DENIED
+with open_router(None, plan, folder, outside) as router:
+    router.subscribe(keys.path("t", "r2"), "r2")
+    with login("agent-r1", "one") as flooder, login("agent-r2", "two") as other:
+        def flood():
+            for _ in range(100):
+                flooder._session.put("anything/at/all", b"flood")
+        until(lambda: flood() or router.denials.flooders)
+        with login("agent-r1", "one"):
+            until(lambda: any(note.startswith("turned away") for note in router.denials.notes()))
+        mouth = other.publisher(keys.path("t", "r2"))
+        until(lambda: mouth.put(b"honest") or router.receive(0.0))
+said(router)
+counts = router.denials.counts()
+print(counts["flood"], counts["rights"]["agent-r1"] >= MOST_DENIED)
+"""
+
+
+def test_who_goes_on_with_what_he_may_not_do_is_cut_off_and_the_others_go_on(tmp_path) -> None:
+    lines, _ = notes(DENIED, tmp_path, "tcp")
+    cut = "cut off 'agent-r1' from 127.0.0.1: it went on with what it may not do"
+    assert cut in lines
+    assert lines[-1] == "{'agent-r1': 2} True"
 
 
 FLOODS = """

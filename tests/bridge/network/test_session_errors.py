@@ -72,7 +72,7 @@ def test_a_wrong_login_is_refused_at_once_and_by_whom(
     said = refusal(NetworkLink(RUN, router.endpoint, user, word))
     assert said == (
         f"{user}: no session with the router at {router.endpoint}: it refused the login: not the"
-        f" password of {user!r}, or no identity of its run"
+        f" password or present certificate of {user!r}, or no identity of its run"
     )
 
 
@@ -158,7 +158,7 @@ def test_plain_tcp_to_a_listener_with_tls_is_named(router: RouterLink, outside: 
     [
         ("tcp/192.0.2.1:7447", "192.0.2.1:7447 is no address of this machine"),
         ("tcp/nosuch.invalid:7447", "no such host (Name or service not known)"),
-        ("tls/127.0.0.1:7447", "tls/ needs certificates: network.tls of a deployment"),
+        ("tls/127.0.0.1:7447", "tls/ needs certificates: network.certificates of a deployment"),
     ],
 )
 def test_why_nobody_can_listen_there_is_told_apart(

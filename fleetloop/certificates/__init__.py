@@ -1,0 +1,1 @@
+"""Certificates of a fleet: an authority, and what it signs; `fleetloop certs`."""
