@@ -20,6 +20,9 @@ anything goes out. An error frame (`is_error_frame`) on a bus with bit timing is
 order: it destroys the frame on the wire, and the nodes count it; where frames take no time it
 goes to the other clients.
 
+Waits end with a packet or with the kernel's timer, so the time that is left of one is read from the
+system's clock: no other clock could shorten it.
+
 What a program doesn't read is kept for it within bounds; what is lost beyond them is counted in
 `lost`, logged, and told by the error with which the bus ends.
 """

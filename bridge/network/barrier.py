@@ -53,18 +53,19 @@ def await_hellos(
     name: str,
     within_s: float,
     stop: Stop,
+    clock: Clock = SYSTEM_CLOCK,
 ) -> None:
     """Say hello and deliver arrivals until nothing is missing.
 
     Raises:
         InfrastructureError: something was still missing after `within_s`; the text names it.
     """
-    clock = AwakeClock(held=launcher_stopped)
-    deadline = clock.now() + within_s
+    awake = AwakeClock(held=launcher_stopped, clock=clock)
+    deadline = awake.now() + within_s
     while absent := tuple(missing()):
         if stop.requested:
             return
-        if clock.now() > deadline:
+        if awake.now() > deadline:
             raise InfrastructureError(
                 f"{name}: not ready after {within_s:g} s: heard nothing of {', '.join(absent)}"
             )

@@ -1,7 +1,8 @@
 """Client sessions: how a process connects to the router of its run.
 
 A refused login is reported at once; a router that isn't there yet is waited for. Zenoh names the
-reason of a refusal to peers only, so a refused client asks again as a peer.
+reason of a refusal to peers only, so a refused client asks again as a peer. Attempts take Zenoh's
+time, so their bound is kept by the system's clock: another one would change nothing.
 """
 
 import zenoh

@@ -17,7 +17,7 @@ from zenoh.handlers import Callback, RingChannel
 
 from bridge.network.link import ROOM_BYTES, Arrival, Dropped, Inbox, Publisher
 from bridge.network.session import keep
-from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.clock import SYSTEM_CLOCK, Clock
 
 CLOSE_S = 1.0
 POLLED_DEPTH = 1 << 15
@@ -156,9 +156,9 @@ class PolledLink(ZenohLink):
     others, then with pauses that grow.
     """
 
-    def __init__(self, session: zenoh.Session, depth: int) -> None:
+    def __init__(self, session: zenoh.Session, depth: int, *, clock: Clock = SYSTEM_CLOCK) -> None:
         super().__init__(session)
-        self._depth = depth
+        self._depth, self._clock = depth, clock
         self._polled: list[tuple[str, str, Callable[[], zenoh.Sample | None]]] = []
         self.receive = self._receive
 
@@ -176,13 +176,14 @@ class PolledLink(ZenohLink):
     def _receive(self, timeout_s: float) -> Arrival | None:
         if (arrival := self._look()) is not None or timeout_s <= 0.0:
             return arrival
-        deadline = SYSTEM_CLOCK.monotonic_s() + timeout_s
+        clock = self._clock
+        deadline = clock.monotonic_s() + timeout_s
         looks, pause_s = 0, _PAUSE_S
-        while (left_s := deadline - SYSTEM_CLOCK.monotonic_s()) > 0.0:
+        while (left_s := deadline - clock.monotonic_s()) > 0.0:
             if looks < _YIELDS:
                 os.sched_yield()
             else:
-                SYSTEM_CLOCK.sleep(min(pause_s, left_s))
+                clock.sleep(min(pause_s, left_s))
                 pause_s = min(1.5 * pause_s, _LONGEST_PAUSE_S)
             looks += 1
             if (arrival := self._look()) is not None:

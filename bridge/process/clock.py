@@ -7,6 +7,7 @@ is converted once, on arrival: what the wall clock does afterwards moves nothing
 """
 
 import time
+from datetime import datetime
 from typing import Protocol
 
 
@@ -37,6 +38,11 @@ class SystemClock:
 
 
 SYSTEM_CLOCK: Clock = SystemClock()
+
+
+def local_date(wall_ns: int) -> datetime:
+    """A reading of the wall clock [ns] as a date in this machine's time zone."""
+    return datetime.fromtimestamp(wall_ns // 1_000_000_000).astimezone()
 
 
 def process_cpu_ns() -> int:

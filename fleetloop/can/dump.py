@@ -4,7 +4,8 @@
     log (-L)   (0000000012.345678) r1 009#0000803F00000000
 
 Times are bus time: seconds since the bus was powered up. Ends with the run, after `count` frames or
-a silence, when the reader closes, or by a signal (exit status 130).
+a silence, when the reader closes, or by a signal (exit status 130). A silence is waited for in the
+kernel, by the system's clock.
 """
 
 import contextlib
@@ -13,13 +14,12 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
 from typing import TextIO
 
 from bridge.can_bus import sockets
 from bridge.drives.interface import DriveProtocol
 from bridge.frame import EFF, Frame
-from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.clock import SYSTEM_CLOCK, local_date
 from configs.errors import ExitStatus, ScenarioError
 from fleetloop.can import error_frames, filters, text
 from fleetloop.can.client import Heard, Listener, open_bus
@@ -81,7 +81,7 @@ class Stamps:
             return f"({seconds:03}.{self._fraction(rest_ns)}) "
         seconds, rest_ns = divmod(stamp_ns, 1_000_000_000)
         if kind == "A":
-            date = datetime.fromtimestamp(seconds).astimezone()
+            date = local_date(stamp_ns)
             return f"({date:%Y-%m-%d %H:%M:%S}.{self._fraction(rest_ns)}) "
         return f"({seconds:010}.{self._fraction(rest_ns)}) "
 

@@ -58,7 +58,7 @@ def write_endpoints(
 
 
 def ask(bus: FleetloopBus, name: str, within_s: float, file: EndpointFile) -> Versions:
-    """The versions of a drive on a bus.
+    """The versions of a drive on a bus; time passes in `bus.recv` alone, by the system's clock.
 
     Raises:
         InfrastructureError: none is heard or answers in time, or the bus ended.

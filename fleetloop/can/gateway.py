@@ -20,7 +20,7 @@ import can
 
 from bridge.can_bus.interface import BusClosedError
 from bridge.can_bus.pythoncan import to_frame, to_message
-from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.clock import SYSTEM_CLOCK, Clock
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.echo import EchoGuard
@@ -84,6 +84,7 @@ class Gateway:
     over: threading.Event = field(default_factory=threading.Event)
     near_gone: can.CanError | None = None
     far_gone: str = ""
+    clock: Clock = SYSTEM_CLOCK
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def run(self) -> None:
@@ -126,7 +127,7 @@ class Gateway:
 
     def _send_out(self, message: can.Message) -> None:
         frame = to_frame(message)
-        now_s = SYSTEM_CLOCK.monotonic_s()
+        now_s = self.clock.monotonic_s()
         with self._lock:
             self.guard.sent(frame, now_s)
         # A message of its own: some interfaces take the channel from the message.
@@ -174,7 +175,7 @@ class Gateway:
         except ValueError:
             counters.no_frames += 1
             return
-        now_s = SYSTEM_CLOCK.monotonic_s()
+        now_s = self.clock.monotonic_s()
         with self._lock:
             echo = self.guard.is_echo(frame, now_s)
         if echo:
@@ -192,14 +193,21 @@ class Gateway:
 
 
 @interruptible
-def join(channel: str, far_bus: FarBus, *, retry_s: float = 0.0, with_rates: bool = False) -> int:
+def join(
+    channel: str,
+    far_bus: FarBus,
+    *,
+    retry_s: float = 0.0,
+    with_rates: bool = False,
+    clock: Clock = SYSTEM_CLOCK,
+) -> int:
     """Join a bus to another until its run ends or a signal comes; return the exit status.
 
     Raises:
         InfrastructureError: one of the buses can't be opened.
     """
     ways = GatewayCounters(), GatewayCounters()
-    start = SYSTEM_CLOCK.monotonic_s()
+    start = clock.monotonic_s()
     with contextlib.ExitStack() as until_joined:
         far = until_joined.enter_context(far_bus.open())
         near = open_bus(channel)
@@ -207,10 +215,10 @@ def join(channel: str, far_bus: FarBus, *, retry_s: float = 0.0, with_rates: boo
     with near:
         note(f"joined {channel} and {far_bus.name}; Ctrl-C ends it")
         try:
-            status = _pass_on(near, far, far_bus, ways, retry_s)
+            status = _pass_on(near, far, far_bus, ways, retry_s, clock)
         except KeyboardInterrupt:
             status = ExitStatus.INTERRUPTED
-    wall_s = SYSTEM_CLOCK.monotonic_s() - start
+    wall_s = clock.monotonic_s() - start
     names = (f"{channel} → {far_bus.name}", f"{far_bus.name} → {channel}")
     for name, counters in zip(names, ways, strict=True):
         rates = f"; {counters.passed / wall_s:.0f}/s, at most {counters.most_per_s} in a second"
@@ -224,20 +232,22 @@ def _pass_on(
     far_bus: FarBus,
     ways: tuple[GatewayCounters, GatewayCounters],
     retry_s: float,
+    clock: Clock,
 ) -> int:
     """Pass frames on, over as many openings of the far bus as it takes; the exit status."""
     reopened: can.BusABC | None = far
     try:
         while reopened is not None:
             with reopened as current:
-                gateway = Gateway(near, current, EchoGuard(echoes=far_bus.echoes), *ways)
+                guard = EchoGuard(echoes=far_bus.echoes)
+                gateway = Gateway(near, current, guard, *ways, clock=clock)
                 gateway.run()
             if gateway.near_gone is not None:
                 raise gateway.near_gone
             note(f"fleetloop: {far_bus.name}: {gateway.far_gone}")
             if gateway.guard.storm:
                 return ExitStatus.INFRASTRUCTURE
-            reopened = _reopen(far_bus, near, ways[0], retry_s)
+            reopened = _reopen(far_bus, near, ways[0], retry_s, clock)
     except can.CanError as gone:
         note(f"fleetloop: {gone}")
         return ExitStatus.OK if isinstance(gone, BusClosedError) else ExitStatus.INFRASTRUCTURE
@@ -253,11 +263,11 @@ def drain(bus: can.BusABC) -> int:
 
 
 def _reopen(
-    far_bus: FarBus, near: can.BusABC, outward: GatewayCounters, retry_s: float
+    far_bus: FarBus, near: can.BusABC, outward: GatewayCounters, retry_s: float, clock: Clock
 ) -> can.BusABC | None:
-    deadline = SYSTEM_CLOCK.monotonic_s() + retry_s
-    while SYSTEM_CLOCK.monotonic_s() < deadline:
-        threading.Event().wait(RETRY_EVERY_S)
+    deadline = clock.monotonic_s() + retry_s
+    while clock.monotonic_s() < deadline:
+        clock.sleep(RETRY_EVERY_S)
         outward.lost += drain(near)
         try:
             far = far_bus.open()

@@ -69,7 +69,10 @@ def list_buses(
 
 
 def survey(seconds: float, bit_rate: int, drives: DriveProtocol) -> list[BusReport]:
-    """Listen to all buses at once; one that doesn't answer costs a little more time."""
+    """Listen to all buses at once; one that doesn't answer costs a little more time.
+
+    Time passes in `listen` alone, which waits for sockets: it is the system clock's.
+    """
     clients = connections(Path("/proc/net/unix"))  # before this process adds its own
     paths = sockets.live_buses()
     problems: dict[str, str] = {}

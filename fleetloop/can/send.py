@@ -4,12 +4,12 @@ A frame goes to all other clients and the drives of the bus, as from any node. R
 deadlines of the wall clock, so the mean rate holds.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import can
 
 from bridge.can_bus.pythoncan import to_message
-from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.clock import SYSTEM_CLOCK, Clock
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can import text
 from fleetloop.can.client import open_bus
@@ -26,7 +26,7 @@ def send(
     *,
     count: int = 1,
     gap_s: float = 0.0,
-    wait: Callable[[float], object] = SYSTEM_CLOCK.sleep,
+    clock: Clock = SYSTEM_CLOCK,
 ) -> int:
     """Send frames in order, `count` times, a gap between them; return the exit status.
 
@@ -37,16 +37,12 @@ def send(
     messages = [to_message(*text.parse(frame)) for frame in frames]
     with open_bus(channel) as bus:
         sent = 0
-        start = SYSTEM_CLOCK.monotonic_s()
+        start = clock.monotonic_s()
         try:
             for _ in range(count):
                 for message in messages:
-                    if (
-                        sent
-                        and gap_s
-                        and (left := start + sent * gap_s - SYSTEM_CLOCK.monotonic_s()) > 0
-                    ):
-                        wait(left)
+                    if gap_s and (left_s := start + sent * gap_s - clock.monotonic_s()) > 0.0:
+                        clock.sleep(left_s)
                     bus.send(message, FULL_S)
                     sent += 1
         except can.CanOperationError as error:

@@ -2,11 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 
 from bridge.network.messages import Progress
-from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.clock import SYSTEM_CLOCK, local_date
 from bridge.process.lifecycle import Stop, keep_to_itself
 from configs.connections import NetworkLink
 from configs.deployment import Deployment, load_deployment
@@ -90,8 +89,8 @@ def run_scenario(source: str, options: RunOptions) -> int:
     for line in out_of_reach(scenario):
         note(f"{scenario.name}: {line}")
     _look_ahead(source, scenario, options)
-    started = datetime.now(UTC).astimezone()
-    created = run_folder.create(scenario.name, options.out, now=started)
+    started_ns = SYSTEM_CLOCK.wall_ns()
+    created = run_folder.create(scenario.name, options.out, started_ns)
     folder = created.path
     with (
         stop_on_signals() as stop,
@@ -131,7 +130,7 @@ def run_scenario(source: str, options: RunOptions) -> int:
         run_folder.discard(created)
         note(f"{stats.ended}: {stats.reason}; the run did not begin")
         return EXIT_STATUS[stats.ended]
-    stats.started = started.isoformat(timespec="seconds")
+    stats.started = local_date(started_ns).isoformat()
     return _finish(scenario, folder, stats, options)
 
 

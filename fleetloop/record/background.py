@@ -11,7 +11,7 @@ from queue import Queue
 from types import TracebackType
 from typing import Self
 
-from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.clock import SYSTEM_CLOCK, Clock
 from fleetloop.record.run_record import RunRecord
 from fleetloop.record.writer import Source
 
@@ -22,8 +22,8 @@ _MAX_BLOCKS = 256
 class BackgroundWriter:
     """Feeds a `RunRecord` from a thread of its own; a context manager that waits for it."""
 
-    def __init__(self, record: RunRecord) -> None:
-        self._record = record
+    def __init__(self, record: RunRecord, *, clock: Clock = SYSTEM_CLOCK) -> None:
+        self._record, self._clock = record, clock
         self._blocks: Queue[Callable[[], None] | None] = Queue(_MAX_BLOCKS)
         self._failure: Exception | None = None
         self._thread = threading.Thread(target=self._write, daemon=True)
@@ -63,7 +63,7 @@ class BackgroundWriter:
                 continue
             try:
                 write()
-                if (now_s := SYSTEM_CLOCK.monotonic_s()) >= look_s:
+                if (now_s := self._clock.monotonic_s()) >= look_s:
                     look_s = now_s + LOOK_EVERY_S
                     self._record.check_place()
             except Exception as error:  # raised in the thread that fills

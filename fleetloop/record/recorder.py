@@ -137,7 +137,10 @@ class _Recorder:
 
 
 def run(brief: RecorderBrief, stop: Stop) -> str:
-    """Record until every source said its last, or until told to stop and nothing comes any more."""
+    """Record until every source said its last, or until told to stop and nothing comes any more.
+
+    The time between arrivals is the network's, so it is read from the system's clock.
+    """
     with (
         open_client(brief.network, brief.start_deadline_s) as link,
         RunRecord(

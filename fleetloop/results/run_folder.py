@@ -2,10 +2,10 @@
 
 import contextlib
 import os
-from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
+from bridge.process.clock import local_date
 from configs.errors import ExitStatus, FleetloopError, InfrastructureError, ScenarioError
 from fleetloop.record.reader import Record
 from fleetloop.record.run_record import CAN_FOLDER
@@ -29,15 +29,16 @@ class Created(NamedTuple):
     new: tuple[Path, ...]  # it and its parents, innermost first, as far as they weren't there
 
 
-def create(scenario_name: str, out: Path | None, *, now: datetime) -> Created:
-    """Make the run's folder.
+def create(scenario_name: str, out: Path | None, started_ns: int) -> Created:
+    """Make the run's folder; `started_ns` of the wall clock is in its name.
 
     Raises:
         ScenarioError: `out` exists and holds something already.
         InfrastructureError: the folder can't be made or written.
     """
+    date = local_date(started_ns)
     folder = (
-        out if out is not None else _fresh(Path("runs"), f"{now:%Y%m%d-%H%M%S}-{scenario_name}")
+        out if out is not None else _fresh(Path("runs"), f"{date:%Y%m%d-%H%M%S}-{scenario_name}")
     )
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):

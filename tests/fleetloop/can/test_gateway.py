@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import can
 import pytest
+from support.clocks import ManualClock
 
 from bridge.frame import EFF, RTR, Frame
 from configs.errors import InfrastructureError, ScenarioError
@@ -196,6 +197,18 @@ def test_a_lost_far_bus_is_opened_again_within_the_time_given(
     out = capsys.readouterr().out
     assert "r1 → breaking x: 1 frames, 1 lost; " in out
     assert "/s, at most 1 in a second" in out
+
+
+def test_a_far_bus_that_stays_away_is_tried_again_for_as_long_as_asked(
+    buses, joined, breaking
+) -> None:
+    clock = ManualClock()
+    thread, statuses = joined(breaking, retry_s=10.0, clock=clock)
+    assert buses.until(lambda: Breaking.opened == 1)
+    Breaking.broken = True
+    thread.join(10.0)
+    assert statuses == [3]
+    assert clock.monotonic_s() == 10.0
 
 
 def test_a_far_bus_that_cannot_be_opened_is_named(buses) -> None:

@@ -1,6 +1,7 @@
 """`send` on a bus in this process."""
 
 import pytest
+from support.clocks import ManualClock
 
 from bridge.frame import EFF, RTR, Frame
 from configs.errors import InfrastructureError, ScenarioError
@@ -17,11 +18,22 @@ def test_frames_arrive_in_order_as_often_as_asked(buses) -> None:
     assert buses.taken(6) == once * 2
 
 
+class LateClock(ManualClock):
+    """Wakes a sleeper a second late."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sleeps: list[float] = []
+
+    def sleep(self, seconds: float) -> None:
+        self.sleeps.append(seconds)
+        super().sleep(seconds + 1.0)
+
+
 def test_a_gap_is_kept_against_absolute_deadlines(buses) -> None:
-    waits: list[float] = []
-    assert send("r1", ["123#"], count=4, gap_s=10.0, wait=waits.append) == 0
-    # Nobody waited, so each deadline is one gap further away.
-    assert [round(left) for left in waits] == [10, 20, 30]
+    clock = LateClock()
+    assert send("r1", ["123#"], count=4, gap_s=10.0, clock=clock) == 0
+    assert clock.sleeps == [10.0, 9.0, 9.0]
     assert len(buses.taken(4)) == 4
 
 
@@ -32,5 +44,9 @@ def test_nothing_is_sent_if_one_text_is_no_frame(buses) -> None:
 
 
 def test_a_bus_that_ends_meanwhile_is_named(buses) -> None:
+    class Ending(ManualClock):
+        def sleep(self, seconds: float) -> None:  # noqa: ARG002
+            buses.end()
+
     with pytest.raises(InfrastructureError, match=r"is gone: end of the run, after 1 frames"):
-        send("r1", ["123#"], count=2, gap_s=10.0, wait=lambda _: buses.end())
+        send("r1", ["123#"], count=2, gap_s=10.0, clock=Ending())
