@@ -81,8 +81,7 @@ class Graph:
     @property
     def weights(self) -> tuple[float, ...]:
         """Weights of all edges and leader links."""
-        edges = (*(edge for heard in self.hears.values() for edge in heard), *self.links.values())
-        return tuple(edge.weight for edge in edges)
+        return tuple(edge.weight for robot in self.robots for edge in self._all_to(robot))
 
     def in_degree(self, robot: str) -> float:
         """d_i = Σ_j a_ij, summed in the order of names."""
@@ -125,23 +124,17 @@ class Graph:
         return tuple(robot for robot in self.robots if robot not in reached)
 
     def digraph(self) -> "nx.DiGraph":
-        """The graph as networkx has it, arrows along the flow of information."""
+        """The graph as networkx has it, weights on its edges, the leader a node like the robots."""
         digraph = nx.DiGraph()
-        digraph.add_nodes_from((robot, {"leader": robot in self.leader}) for robot in self.robots)
-        digraph.add_edges_from(self.edges)
+        digraph.add_nodes_from((LEADER, *self.robots))
+        for robot in self.robots:
+            for edge in self._all_to(robot):
+                digraph.add_edge(edge.speaker, robot, weight=edge.weight)
         return digraph
 
-    def to_graphml(self) -> str:
-        """GraphML text; nodes carry `leader`."""
-        return "\n".join(nx.generate_graphml(self.digraph()))
-
-    @classmethod
-    def from_graphml(cls, text: str) -> "Graph":
-        """The graph of a GraphML text; self-edges are dropped, parallel edges are one."""
-        digraph = nx.DiGraph(nx.parse_graphml(text))
-        leader = [str(n) for n, data in digraph.nodes(data=True) if data.get("leader")]
-        edges = [(str(a), str(b)) for a, b in digraph.edges if a != b]
-        return cls.of([str(n) for n in digraph.nodes], edges, leader)
+    def _all_to(self, robot: str) -> tuple[InEdge, ...]:
+        link = self.links.get(robot)
+        return self.hears[robot] if link is None else (*self.hears[robot], link)
 
 
 def generated(kind: str, robots: Sequence[str]) -> list[Edge]:

@@ -17,6 +17,7 @@ from pydantic import ValidationError
 from configs.checks import cross_problems
 from configs.complaints import complaints, refusal, salvage
 from configs.errors import Complaint, Problem, ScenarioError
+from configs.graph_inclusion import included_graph
 from configs.overrides import Override
 from configs.parameters import as_tuples
 from configs.scenario import Scenario
@@ -75,6 +76,8 @@ def loads(
             found.append(done)
         else:
             applied.append(done)
+    if (wrong := included_graph(data, Path(folder))) is not None:
+        found.append(blamed(name, wrong, applied))
     context = {"folder": str(Path(folder).resolve()), "recorded": recorded}
     return _check(name, data, applied, found, context)
 

@@ -15,6 +15,7 @@ from configs.drives import DEFAULT, DRIVES, Drive
 from configs.edges import Weight
 from configs.parameters import (
     MOST_S,
+    FilePath,
     Finite,
     Name,
     NameOrTable,
@@ -175,7 +176,8 @@ else:
 class GraphSection(Parameters):
     """The directed graph: "r1 -> r2" means that r2 hears r1 (a_21 > 0).
 
-    Its edges are given by one of `edges`, `generator`, `adjacency`; without any it is a chain.
+    Its edges are given by one of `edges`, `generator`, `adjacency`, `file`; without any it is a
+    chain.
     """
 
     edges: tuple[str, ...] | None = None
@@ -186,6 +188,11 @@ class GraphSection(Parameters):
         None,
         "rows of a_ij, robots in their order, instead of edges: row i holds the weights of what"
         " robot i hears, 0 of whom it doesn't",
+    )
+    file: FilePath | None = parameter(
+        None,
+        "GraphML or DOT, relative to the scenario, instead of edges: its edges, weights and leader"
+        " links are taken when the scenario is loaded",
     )
     weights: Weights = field(
         default="unit",

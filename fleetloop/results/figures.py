@@ -7,23 +7,21 @@
 Robots differ by dash pattern and by lightness, so the figures stay readable in grey.
 """
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
-import networkx as nx
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from configs.scenario import Scenario
 from fleetloop.record.reader import Record
+from fleetloop.results.graph_drawing import drawn
 from fleetloop.settling import settled_from
 
 WIDTH_IN, HEIGHT_IN, DPI = 6.4, 3.6, 150
-LEADER = "leader"
 _COLOURS = ("#08306b", "#d95f02", "#1b9e77", "#9e2a8c", "#7f7f7f", "#b8860b")
 _DASHES: tuple[object, ...] = ("-", (0, (6, 2)), (0, (2, 1.2)), (0, (7, 2, 1.5, 2)))
 _POINTS = 1500
@@ -63,43 +61,9 @@ def all_figures(record: Record, scenario: Scenario) -> list[Captioned]:
 
 
 def graph(_: Record, scenario: Scenario) -> Figure:
-    """The directed graph: arrows along the flow of information, layers by leader distance."""
-    topology = scenario.topology
-    digraph = nx.DiGraph(list(topology.edges))
-    digraph.add_nodes_from(topology.robots)
-    digraph.add_edges_from((LEADER, robot) for robot in topology.leader)
-    depths = nx.single_source_shortest_path_length(digraph, LEADER)
-    for node in digraph:
-        digraph.nodes[node]["layer"] = depths.get(node, 0)
-    places = nx.multipartite_layout(digraph, subset_key="layer", align="vertical")
-    widest = max(Counter(depths.values()).values())
-    figure, axes = _axes(height_in=min(7.0, 1.2 + 0.9 * widest))
-    nodes = [node for node in digraph if node != LEADER]
-    style = {"ax": axes, "node_size": 900, "edgecolors": "black"}
-    nx.draw_networkx_nodes(digraph, places, nodelist=nodes, node_color="white", **style)
-    nx.draw_networkx_nodes(
-        digraph, places, nodelist=[LEADER], node_color="#dddddd", node_shape="s", **style
-    )
-    nx.draw_networkx_labels(digraph, places, ax=axes, font_size=8)
-    links = [(LEADER, robot) for robot in topology.leader]
-    for edges, dash in ((list(topology.edges), "solid"), (links, "dashed")):
-        nx.draw_networkx_edges(
-            digraph,
-            places,
-            ax=axes,
-            edgelist=edges,
-            style=dash,
-            arrowsize=14,
-            node_size=900,
-            connectionstyle="arc3,rad=0.15" if dash == "solid" else "arc3",
-        )
-    axes.set_title(f"Directed graph of {scenario.name}: arrows from sender to receiver")
-    heights = [float(place[1]) for place in places.values()]
-    room = 0.3 * max(max(heights) - min(heights), 0.5)  # for nodes and bent arrows
-    axes.set_ylim(min(heights) - room, max(heights) + room)
-    axes.margins(x=0.15)
-    axes.set_axis_off()
-    return figure
+    """The directed graph, arrows along the flow of information."""
+    title = f"Directed graph of {scenario.name}: arrows from sender to receiver"
+    return drawn(scenario.topology, title)
 
 
 def positions(record: Record, _: Scenario) -> Figure:

@@ -95,11 +95,6 @@ def test_random_graphs_are_rooted_bounded_and_reproducible(n: int, degree: int, 
     assert edges == random_rooted(names, max_in_degree=degree, seed=seed)
 
 
-def test_graphml_carries_a_graph_there_and_back() -> None:
-    graph = Graph.of(FOUR, generated("tree", FOUR), ("r1", "r3"))
-    assert Graph.from_graphml(graph.to_graphml()) == graph
-
-
 def test_the_rows_of_an_adjacency_matrix_hear_its_columns() -> None:
     rows = [[0.0, 0.0, 0.25], [2.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
     weights = of_matrix(FOUR[:3], rows)

@@ -1,0 +1,1 @@
+"""`fleetloop graph`: the directed graph of a scenario, as a table, a file or a picture."""

@@ -1,0 +1,130 @@
+"""A drawing of a directed graph: layers by distance from the leader, weights that aren't 1."""
+
+from collections import Counter
+from math import hypot
+
+import networkx as nx
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from configs.edges import LEADER, Edge
+from configs.graph import Graph
+
+WIDTH_IN, UNIT_IN, DPI = 6.4, 0.95, 150
+_MOST_IN = 40.0
+_NODE_SIZE, _LEADER_SIZE = 620.0, 1200.0
+"""Area of a node [points²]."""
+_LABELLED = 120
+"""With more edges their weights find no room."""
+_BEND_BESIDE_OPPOSITE, _BEND_AROUND_NODE = 0.18, 0.4
+"""How far an arrow bows out, in parts of its length."""
+
+Places = dict[str, tuple[float, float]]
+
+
+def drawn(graph: Graph, title: str) -> Figure:
+    """The graph as a figure."""
+    digraph = graph.digraph()
+    if not graph.links:
+        digraph.remove_node(LEADER)
+    places = _places(digraph, graph)
+    across = [x for x, _ in places.values()]
+    up = [y for _, y in places.values()]
+    figure = Figure(
+        figsize=(
+            min(max(WIDTH_IN, UNIT_IN * (max(across) - min(across) + 1.2)), _MOST_IN),
+            min(0.4 + UNIT_IN * (max(up) - min(up) + 1.2), _MOST_IN),
+        ),
+        dpi=DPI,
+        layout="constrained",
+    )
+    axes = figure.add_subplot()
+    axes.set_title(title, fontsize=10)
+    axes.set_axis_off()
+    axes.set_aspect("equal")  # so that weights lie on their bowed arrows
+    for kind in ("robots", "leader"):
+        nodes = [node for node in digraph if (node == LEADER) == (kind == "leader")]
+        nx.draw_networkx_nodes(
+            digraph,
+            places,
+            nodelist=nodes,
+            ax=axes,
+            node_size=_LEADER_SIZE if kind == "leader" else _NODE_SIZE,
+            edgecolors="black",
+            node_color="#dddddd" if kind == "leader" else "white",
+            node_shape="s" if kind == "leader" else "o",
+        )
+    nx.draw_networkx_labels(digraph, places, ax=axes, font_size=8)
+    for edge in digraph.edges:
+        _arrow(axes, digraph, edge, places, labelled=digraph.size() <= _LABELLED)
+    axes.set_xlim(min(across) - 0.6, max(across) + 0.6)
+    axes.set_ylim(min(up) - 0.6, max(up) + 0.6)
+    return figure
+
+
+def _places(digraph: "nx.DiGraph", graph: Graph) -> Places:
+    """Layers from left to right by hops from the leader; unreached robots in the last."""
+    start = [LEADER] if graph.links else list(graph.roots()[:1] or graph.robots[:1])
+    hops = nx.multi_source_dijkstra_path_length(digraph, set(start), weight=lambda *_: 1)
+    last = max(hops.values()) + 1
+    layers = {node: int(hops.get(node, last)) for node in digraph}
+    size = Counter(layers.values())
+    widest = max(size.values())
+    row: Counter[int] = Counter()
+    places: Places = {}
+    for node in digraph:
+        layer = layers[node]
+        # Every second layer a little lower: an arrow over two layers then misses what is between.
+        lower = 0.25 * (layer % 2) * (widest > 1)
+        places[node] = (1.5 * layer, 0.5 * (size[layer] - 1) - row[layer] - lower)
+        row[layer] += 1
+    return places
+
+
+def _arrow(
+    axes: Axes, digraph: "nx.DiGraph", edge: Edge, places: Places, *, labelled: bool
+) -> None:
+    """One edge; bowed where a straight one would cross a node or lie on its opposite."""
+    speaker, hearer = edge
+    weight = digraph.edges[edge]["weight"]
+    bend = _BEND_BESIDE_OPPOSITE if digraph.has_edge(hearer, speaker) else 0.0
+    if _crosses(edge, places):
+        bend = _BEND_AROUND_NODE
+    style = "dashed" if speaker == LEADER else "solid"
+    axes.annotate(
+        "",
+        xy=places[hearer],
+        xytext=places[speaker],
+        arrowprops={
+            "arrowstyle": "-|>,head_width=0.25,head_length=0.5",
+            "linestyle": style,
+            "color": "black",
+            "linewidth": 1.1,
+            "shrinkA": 18 if speaker == LEADER else 13,
+            "shrinkB": 13,
+            "connectionstyle": f"arc3,rad={bend}",
+        },
+    )
+    if weight != 1.0 and labelled:
+        (x0, y0), (x1, y1) = places[speaker], places[hearer]
+        # A third of the way, on the bow: where opposite arrows or crossing ones are apart.
+        part = 0.4
+        bow = 2.0 * part * (1.0 - part) * bend
+        x, y = x0 + part * (x1 - x0) + bow * (y1 - y0), y0 + part * (y1 - y0) - bow * (x1 - x0)
+        box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
+        axes.text(x, y, f"{weight:.3g}", fontsize=7, ha="center", va="center", bbox=box)
+
+
+def _crosses(edge: Edge, places: Places) -> bool:
+    """Whether another node lies on the straight line of an edge."""
+    (x0, y0), (x1, y1) = places[edge[0]], places[edge[1]]
+    along_x, along_y = x1 - x0, y1 - y0
+    length = hypot(along_x, along_y)
+    for node, (x, y) in places.items():
+        if node in edge or not length:
+            continue
+        part = ((x - x0) * along_x + (y - y0) * along_y) / length**2
+        apart = abs((x - x0) * along_y - (y - y0) * along_x) / length
+        if 0.0 < part < 1.0 and apart < 0.3:
+            return True
+    return False
