@@ -1,8 +1,10 @@
 """Scenario and deployment → the place of each role: its buses, its network, its credentials."""
 
-from collections.abc import Iterable, Mapping
+import contextlib
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bridge.network import access
 from configs.brief import PlantBrief
@@ -11,6 +13,9 @@ from configs.deployment import Deployment, NetworkSection, passwords
 from configs.errors import ScenarioError
 from configs.roles import LOCALISATION, identity_of
 from configs.scenario import Scenario
+
+if TYPE_CHECKING:
+    from fleetloop.certificates.folder import CertificateFolder
 
 
 def robots_of_plant(brief: PlantBrief, deployment: Deployment) -> PlantBrief:
@@ -101,10 +106,8 @@ def kept_out(deployment: Deployment) -> Mapping[str, str]:
     network = deployment.network
     if network is None or network.certificates is None or not network.guests:
         return {}
-    from fleetloop.certificates.folder import CertificateFolder
-
-    folder = CertificateFolder(network.certificates)
-    revoked = [user for user in network.guests if folder.is_revoked(folder.certificate(user))]
+    with _named_certificates(network.certificates) as folder:
+        revoked = [user for user in network.guests if folder.is_revoked(folder.certificate(user))]
     return dict.fromkeys(revoked, "its certificate is revoked")
 
 
@@ -119,18 +122,19 @@ def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
         identities.append(LOCALISATION.name)
     identities += bus_guests(deployment)
     if deployment.network is not None and deployment.network.certificates is not None:
-        return _proved_names(deployment.network.certificates, identities)
+        with _named_certificates(deployment.network.certificates) as folder:
+            return {identity: folder.proved_name(identity) for identity in identities}
     known = passwords(deployment.network, tuple(identities))
     return known | {user: _as_option(known[user]) for user in bus_guests(deployment)}
 
 
-def _proved_names(certificates: Path, identities: Iterable[str]) -> Mapping[str, str]:
-    """The common names that prove these identities at present, from the authority's folder."""
+@contextlib.contextmanager
+def _named_certificates(path: Path) -> "Iterator[CertificateFolder]":
+    """The authority's folder; what is wrong with it is said with the deployment's key."""
     from fleetloop.certificates.folder import CertificateFolder
 
-    folder = CertificateFolder(certificates)
     try:
-        return {identity: folder.proved_name(identity) for identity in identities}
+        yield CertificateFolder(path)
     except ScenarioError as error:
         raise ScenarioError(f"network.certificates: {error}") from error
 
@@ -166,9 +170,8 @@ def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.
     )
     if network is None or network.certificates is None:
         return planned
-    from fleetloop.certificates.folder import CertificateFolder
-
-    return replace(planned, expiries=CertificateFolder(network.certificates).expiries())
+    with _named_certificates(network.certificates) as folder:
+        return replace(planned, expiries=folder.expiries())
 
 
 def network_link(scenario: Scenario, deployment: Deployment, role: str) -> NetworkLink:

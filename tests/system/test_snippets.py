@@ -3,6 +3,7 @@
 What a page can't know (the endpoint of a run, the folder of a link) is filled in, nothing else.
 """
 
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,9 +13,10 @@ from pathlib import Path
 import can
 import pytest
 from support.addresses import free_port
-from support.certificates import certificates
 from support.processes import completed, running
 from support.snippets import Snippet, snippets
+
+from fleetloop.certificates.folder import CertificateFolder
 
 pytestmark = pytest.mark.system
 TIMEOUT_S = 60.0
@@ -52,7 +54,11 @@ def run(tmp_path: Path) -> Iterator[tuple[Path, str]]:
     """A run that lets the guest of the pages in: (folder of its certificates, endpoint)."""
     folder = tmp_path / "lab"
     folder.mkdir()
-    certificates(folder, ("router", "bench"))
+    made = CertificateFolder(folder / "certs")
+    made.create(["localhost"], days=2, authority_days=2)
+    made.issue("bench", days=2, guest=True)
+    for name in ("ca.pem", "bench.pem", "bench.key"):
+        shutil.copy(made.path / name, folder)
     endpoint = f"tls/localhost:{free_port()}"
     (guests,) = (s for s in snippets("toml") if "[network.guests]" in s.text)
     (folder / "where.toml").write_text(guests.text.replace("tls/lab:7447", endpoint))
