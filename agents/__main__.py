@@ -152,6 +152,7 @@ class _Connections(NamedTuple):
                 | {"processor": processor_wait_ns() - waited_ns},
                 profile_ns=sampler.nanoseconds(),
                 stop_reason=guard.stop_reason,
+                messages=self.agent.network.counts() if self.agent.network else {},
                 stop_tick=guard.stop_tick,
                 deadlines=counters.deadlines(),
             )

@@ -31,6 +31,7 @@ from typing import Any
 
 from agents.admission import Admission
 from agents.coordination import CoordinationState, Coordinator
+from agents.emulated_network import EmulatedNetwork
 from agents.guard import UNCHANGED, Guard, Phase, TorqueOutcome
 from agents.laws.build import build
 from agents.laws.failure import DIVERGED, failure
@@ -43,11 +44,12 @@ from bridge.frame import Frame
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.network.telemetry import RowBuffer
 from configs.brief import AgentBrief
+from configs.signals import AGE_PREFIX
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 _NO_REFERENCE = Reference(nan, nan, nan, nan, nan)
 POSE_HISTORY_TICKS = 64
-"""Longest age of a fix in real time: the odometry since then is kept for that long."""
+"""Longest age of a fix in real time [ticks]."""
 
 
 class Agent:
@@ -67,8 +69,10 @@ class Agent:
         self._no_signals = (nan,) * law.signals
         self._law_state: Any = None  # the law's own
         self._pose_delay = brief.schedule.pose_delay_ticks
-        history = POSE_HISTORY_TICKS if brief.schedule.realtime else self._pose_delay
-        self._localiser = Localiser(brief.localisation, brief.wheels, history)
+        self.network = self._network = EmulatedNetwork(brief) if brief.channels else None
+        """The emulated edges to this robot; None if none has effects."""
+        self._history = self._pose_history(brief)
+        self._localiser = Localiser(brief.localisation, brief.wheels, self._history)
         self._neighbours = Neighbours(brief.hears, brief.coordination, self._h)
         self._coordinator = Coordinator(brief.coordination, self._h)
         self._leader_weight = brief.leader_link.weight if brief.leader_link else 0.0
@@ -84,6 +88,8 @@ class Agent:
         self._start_fix: PoseFix | None = None
         self._fixes: dict[int, PoseFix] = {}  # by tick, until due
         self._path_states: dict[int, dict[str, PathState]] = {}  # by tick, until due
+        self._fix_tick = -1  # of the newest fix of the emulated network
+        self._records_ages = any(signal.name.startswith(AGE_PREFIX) for signal in brief.signals)
         self._awaited = {edge.speaker for edge in brief.hears}
         self._realtime = brief.schedule.realtime
         self._encoder_check = EncoderCheck(brief.host.encoder_mismatch_limit_wheel_rad, self._h)
@@ -97,6 +103,13 @@ class Agent:
         """Lateness and feedback round trip at this tick [s], set by the loop, for the record."""
         self.on_frame = self._drives.on_frame
         """Process a frame from the bus: identifier, data, bus time of reception [ns]."""
+
+    def _pose_history(self, brief: AgentBrief) -> int:
+        """Longest age of a fix [ticks]: the odometry since then is kept for that long."""
+        if self._network is not None and self._network.carries_poses:
+            oldest = brief.host.pose_age_limit_ns // brief.schedule.period_ns
+            return max(oldest, POSE_HISTORY_TICKS, self._pose_delay)
+        return POSE_HISTORY_TICKS if brief.schedule.realtime else self._pose_delay
 
     @property
     def phase(self) -> Phase:
@@ -120,7 +133,7 @@ class Agent:
             return
         self._awaited.discard(robot)
         if state.tick < 0 or self._realtime:
-            self._neighbours.receive(robot, state.t_ns, state.s, state.v_hat)
+            self._receive_due(robot, state)
         else:
             self._path_states.setdefault(state.tick, {})[robot] = state
 
@@ -191,6 +204,8 @@ class Agent:
             motion = self._apply_newest_fix(tick, motion)
         elif self._schedule.owes(tick):
             motion = self._apply_due(tick, motion)
+        if self._network is not None:
+            motion = self._apply_emulated(tick, motion, self._network)
         if tick >= self.last_tick:
             self.closed = True
             return self._guard.shut_down()
@@ -198,12 +213,35 @@ class Agent:
             self._guard.begin(tick)
         return self._control(tick, motion)
 
+    def _receive_due(self, robot: str, state: PathState) -> None:
+        """Hand a path state on, through its emulated edge if it has one."""
+        if self._network is None or not self._network.carries_path_of(robot):
+            self._neighbours.receive(robot, state.t_ns, state.s, state.v_hat)
+        elif state.tick >= 0:  # what is said before the start is no message of the emulated network
+            self._network.send_path_state(robot, state)
+
+    def _apply_emulated(
+        self, tick: int, motion: RobotMotion, network: EmulatedNetwork
+    ) -> RobotMotion:
+        """Apply what the emulated network delivers at this tick."""
+        now_ns = tick * self._schedule.period_ns
+        for robot, state in network.path_states(now_ns):
+            self._neighbours.receive(robot, state.t_ns, state.s, state.v_hat)
+        fix = network.newest_pose(now_ns)
+        if fix is None or tick - fix.tick > self._history or fix.tick <= self._fix_tick:
+            return motion
+        self._fix_tick = fix.tick
+        return self._apply_fix(tick, fix, tick - fix.tick, motion)
+
     def _apply_due(self, tick: int, motion: RobotMotion) -> RobotMotion:
         """Apply the messages due at this tick, in the order of names, not of arrival."""
         for robot, state in sorted(self._path_states.pop(tick, {}).items()):
-            self._neighbours.receive(robot, state.t_ns, state.s, state.v_hat)
+            self._receive_due(robot, state)
         fix = self._fixes.pop(tick - self._pose_delay, None)
         if fix is None:
+            return motion
+        if self._network is not None and self._network.carries_poses:
+            self._network.send_pose(fix)
             return motion
         return self._apply_fix(tick, fix, self._pose_delay, motion)
 
@@ -211,8 +249,13 @@ class Agent:
         """In real time: apply the newest fix at its own instant, unless its odometry is lost."""
         if not self._fixes:
             return motion
-        fix = self._fixes[max(self._fixes)]
+        fixes = [self._fixes[number] for number in sorted(self._fixes)]
         self._fixes.clear()
+        if self._network is not None and self._network.carries_poses:
+            for fix in fixes:
+                self._network.send_pose(fix)
+            return motion
+        fix = fixes[-1]
         ago = max(tick - fix.tick, 0)
         if ago > POSE_HISTORY_TICKS:
             return motion
@@ -238,8 +281,11 @@ class Agent:
         t_ns = tick * self._schedule.period_ns
         v_hat, mu, s = coordination = self._coordination
         s_dot = mu + v_hat
-        sums = self._neighbours.sums(t_ns)
-        v_r = self._leader.speed_at(t_ns) if self._leader is not None else 0.0
+        sums = self._neighbours.sums(t_ns, s)
+        if self._network is not None:
+            v_r = self._network.leader_speed(tick, self._leader, v_hat)
+        else:
+            v_r = self._leader.speed_at(t_ns) if self._leader is not None else 0.0
         after = self._coordinator.advance(coordination, sums, self._leader_weight, v_r)
         along = _new(PathVariable, (s, s_dot, (after[0] + after[1] - s_dot) / self._h))
         guard = self._guard
@@ -263,6 +309,8 @@ class Agent:
         self._accept_path_variable(t_ns * 1e-9 + self._h, after)
         x_d, y_d, theta_d, _, _ = reference
         used = (t_ns * 1e-9, *motion, s, s_dot, mu, v_hat, sums.neighbours, x_d, y_d, theta_d)
+        if self._records_ages:
+            signals = (*self._neighbours.ages_s(t_ns), *signals)
         sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
         self._rows.add(tick, (*used, *signals, *sent))
         return frames

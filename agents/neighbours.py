@@ -1,12 +1,13 @@
 """The newest path states of the in-neighbours, and their sums for the coordination.
 
-Path states carry their time; the coordination uses the neighbour's predicted value in the middle of
-the coming period, t_k + h/2:
+Path states carry their time. Three compensations of their age, `coordination.compensation`:
 
-    s_j ← s_j + v̂_j (age + h/2),     age at most `age_limit_s`
-    v̂_j ← v̂_j                        held as received
+    extrapolate   s_j ← s_j + v̂_j (age + h/2)         the value in the middle of the coming period
+    hold          s_j ← s_j                           biased by v_r per second of age and hop
+    both          s_j ← s_j + s_i − s_i(t − age)      own value as old as the neighbour's: no bias,
+                                                      but a finite margin of delay
 
-The first removes the bias of old data (v_r per second of age and hop, if s_j were held). The second
+with an age of at most `age_limit_s`. v̂_j is held as received, which
 makes (38) an average at every share: robot i's next v̂ is a convex combination of its own, of the
 received ones and of v_r, with fixed positive weights. So where the leader reaches every robot,
 v̂ → v_r at any share period, with any delay, on any graph, also on one that changes. Extrapolated by
@@ -17,8 +18,10 @@ sums until its next path state. Sums run in the order of names, so they don't de
 arrival.
 """
 
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
+from math import nan
 from typing import NamedTuple
 
 from configs.edges import InEdge
@@ -51,8 +54,11 @@ class Neighbours:
     __slots__ = (
         "_age_limit_s",
         "_by_name",
+        "_extrapolates",
         "_half_s",
         "_in_order",
+        "_own_past",
+        "_period_s",
         "_silence_limit_s",
     )
 
@@ -63,6 +69,11 @@ class Neighbours:
         self._half_s = 0.5 * period_s
         self._age_limit_s = limits.age_limit_s
         self._silence_limit_s = limits.silence_limit_s
+        self._extrapolates = limits.compensation == "extrapolate"
+        self._period_s = period_s
+        self._own_past: deque[float] | None = None  # s_i of this and former periods, newest last
+        if limits.compensation == "both":
+            self._own_past = deque(maxlen=round(limits.age_limit_s / period_s) + 1)
 
     def receive(self, name: str, t_ns: int, s: float, v_hat: float) -> None:
         """Store the path state of `name` at time `t_ns`; one that is not newer is ignored."""
@@ -74,11 +85,14 @@ class Neighbours:
         neighbour.v_hat = v_hat
         neighbour.heard = True
 
-    def sums(self, now_ns: int) -> Sums:
-        """The sums for the period that begins at `now_ns`."""
+    def sums(self, now_ns: int, own_s: float) -> Sums:
+        """The sums for the period that begins at `now_ns`, at the robot's own s [m]."""
         count = 0
         degree = sum_s = sum_v = 0.0
         half = self._half_s
+        extrapolates, past = self._extrapolates, self._own_past
+        if past is not None:
+            past.append(own_s)
         for neighbour in self._in_order:
             age = (now_ns - neighbour.t_ns) * 1e-9
             if not neighbour.heard or age > self._silence_limit_s:
@@ -88,6 +102,19 @@ class Neighbours:
             weight = neighbour.weight
             count += 1
             degree += weight
-            sum_s += weight * (neighbour.s + neighbour.v_hat * (age + half))
+            if extrapolates:
+                sum_s += weight * (neighbour.s + neighbour.v_hat * (age + half))
+            elif past is None:
+                sum_s += weight * neighbour.s
+            else:
+                ago = min(round(age / self._period_s), len(past) - 1)
+                sum_s += weight * (neighbour.s + (own_s - past[-1 - ago]))
             sum_v += weight * neighbour.v_hat
         return _new(Sums, (count, degree, sum_s, sum_v))
+
+    def ages_s(self, now_ns: int) -> list[float]:
+        """Age of the newest path state of each neighbour [s], in the order of names.
+
+        NaN: none has been received.
+        """
+        return [(now_ns - one.t_ns) * 1e-9 if one.heard else nan for one in self._in_order]

@@ -18,6 +18,7 @@ from configs.connections import NetworkLink, Settings
 from configs.curves import FormationOffset, ReferencePath
 from configs.edges import InEdge
 from configs.host import Host
+from configs.netem import Effects
 from configs.parameters import Parameters
 from configs.plugins import Choice
 from configs.powertrain import Encoder, Motor, Supply
@@ -128,6 +129,14 @@ class HostLimits(Host):
     bus_error_limit_ns: int = 0  # 0: an error of the bus ends the controller
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChannelModel(Effects):
+    """Effects of the emulated edge from one source to one robot."""
+
+    source: str  # a robot, the leader or the localisation system
+    seed: str  # of its random streams
+
+
 @dataclass(frozen=True, slots=True)
 class AgentBrief:
     """Everything that the controller process of one robot receives at its start."""
@@ -147,6 +156,7 @@ class AgentBrief:
     schedule: Schedule
     drives: DriveLink
     host: HostLimits
+    channels: tuple[ChannelModel, ...]  # the emulated edges to it; others have no effects
     phase_ns: int  # in real time, this much after a tick's time the controller acts
     bus: Settings  # keyword arguments of can.Bus, verbatim
     network: NetworkLink

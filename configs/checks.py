@@ -8,21 +8,24 @@ from pydantic import ValidationError
 
 from configs.drive_checks import drive_problems
 from configs.edges import LEADER
+from configs.emulated_edges import emulation_problems
 from configs.errors import Problem
 from configs.graph_checks import edge_problems, graph_problems, no_such_robot
 from configs.paths import Spline, Varying
 from configs.plugins import Recorded
 from configs.scenario import ETSRO, Scenario
 from configs.sections import Expect
-from configs.signals import PLANT_SIGNALS, SPREAD, controller_signals
+from configs.signals import AGE_PREFIX, PLANT_SIGNALS, SPREAD, controller_signals
 from configs.wording import MISSING, guess, remedy_of
 
 
 def cross_problems(scenario: Scenario) -> list[Problem]:
     """All problems that no section can see alone."""
     problems = [*_names(scenario), *_laws(scenario), *_periods(scenario), *drive_problems(scenario)]
-    problems += [*_host(scenario), *_expects(scenario)]
     edges = edge_problems(scenario)
+    problems += [*_host(scenario), *_expects(scenario, sound_edges=not edges)]
+    if not edges:
+        problems += emulation_problems(scenario.network, scenario.topology)
     if not problems and not edges:
         edges = list(graph_problems(scenario))
     return problems + edges
@@ -73,7 +76,7 @@ def _laws(scenario: Scenario) -> Iterator[Problem]:
                 yield Problem(key, value, remedy_of(item))
 
 
-def _expectable(scenario: Scenario, robots: Sequence[str]) -> list[str]:
+def _expectable(scenario: Scenario, robots: Sequence[str], *, sound_edges: bool) -> list[str]:
     """Signals that all of these robots have, or some robot if none is named.
 
     Nothing if a law isn't here, of a record.
@@ -89,7 +92,10 @@ def _expectable(scenario: Scenario, robots: Sequence[str]) -> list[str]:
             continue
         if isinstance(control.parameters, Recorded):
             return []
-        tables.append({s.name for s in controller_signals(control.load().SIGNALS)})
+        signals = controller_signals(
+            control.load().SIGNALS, scenario.aged(robot.name) if sound_edges else ()
+        )
+        tables.append({signal.name for signal in signals})
     of_all = set.intersection if robots else set.union
     return sorted(every | of_all(*tables)) if tables else []
 
@@ -155,9 +161,11 @@ def _host(scenario: Scenario) -> Iterator[Problem]:
             yield Problem(f"host.{key}", value, remedy)
 
 
-def _expects(scenario: Scenario) -> Iterator[Problem]:
+def _expects(scenario: Scenario, *, sound_edges: bool) -> Iterator[Problem]:
     for n, expect in enumerate(scenario.expect):
-        known = _expectable(scenario, expect.robots or ())
+        if expect.signal.startswith(AGE_PREFIX) and not sound_edges:
+            continue  # named after an edge
+        known = _expectable(scenario, expect.robots or (), sound_edges=sound_edges)
         where = f"expect.{n}"
         if known and expect.signal not in known:
             hint = guess(expect.signal, known, cutoff=0.5)

@@ -149,7 +149,9 @@ def _problem(item: dict[str, Any], data: dict[str, Any], model: type[BaseModel])
     for n, part in enumerate(loc):
         inner = _get(holder, part)
         last = n == len(loc) - 1
-        if inner is _NOTHING and not (last and isinstance(holder, dict | list)):
+        whole = item["type"] == "value_error" and item["input"] == as_tuples(holder)
+        named = last and isinstance(holder, dict | list) and not whole
+        if inner is _NOTHING and not named:
             continue  # the tag of a union
         if isinstance(part, int) and isinstance(inner, dict) and "name" in inner:
             names.append(str(inner["name"]))

@@ -167,6 +167,11 @@ def extended(made: type[_P], section: Parameters, **derived: Any) -> _P:
     return made(**{key.name: getattr(section, key.name) for key in fields(section)} | derived)
 
 
+def base_of(base: type[_P], section: Parameters) -> _P:
+    """Those keys of a section that it has from a base class."""
+    return base(**{key.name: getattr(section, key.name) for key in fields(base)})
+
+
 def as_tuples(value: Any) -> Any:
     """Parsed TOML with its arrays as tuples, as `Parameters` have them."""
     if isinstance(value, dict):

@@ -5,6 +5,7 @@ from math import inf
 from configs import sections
 from configs.brief import (
     AgentBrief,
+    ChannelModel,
     DriveLink,
     DriveModel,
     HostLimits,
@@ -21,6 +22,9 @@ from configs.brief import (
 from configs.connections import OURS, NetworkLink, Settings
 from configs.curves import formation_offset, reference_path
 from configs.drives import Drive
+from configs.edges import LEADER
+from configs.emulated_edges import EmulatedEdge, effects_of
+from configs.netem import LOCALISATION, Effects
 from configs.parameters import extended
 from configs.reach import Reach, reach_of
 from configs.scenario import Scenario
@@ -88,15 +92,28 @@ def agent_brief(
         schedule=ticks,
         drives=_drive_link(scenario, robot, drive),
         host=_host_limits(scenario, ours=dict(bus).get("interface", OURS) == OURS),
+        channels=channels(scenario, name),
         phase_ns=round(scenario.names.index(name) * ticks.period_ns / len(scenario.names)),
         bus=bus,
         network=network,
     )
 
 
+def channels(scenario: Scenario, name: str) -> tuple[ChannelModel, ...]:
+    """The emulated edges to a robot, without those that have no effects."""
+    graph = scenario.topology
+    heard = tuple(edge.speaker for edge in graph.hears[name])
+    leader = (LEADER,) if name in graph.leader else ()
+    return tuple(
+        extended(ChannelModel, effects, source=source, seed=f"{scenario.seed} {source} -> {name}")
+        for source in (*heard, *leader, LOCALISATION)
+        if (effects := effects_of(scenario.network, EmulatedEdge(source, name))) != Effects()
+    )
+
+
 def signals_of(scenario: Scenario, robot: sections.Robot) -> tuple[Signal, ...]:
     """The recorded signals of a robot's controller, one row per tick."""
-    return controller_signals(scenario.control_of(robot).load().SIGNALS)
+    return controller_signals(scenario.control_of(robot).load().SIGNALS, scenario.aged(robot.name))
 
 
 def reach(scenario: Scenario) -> Reach:

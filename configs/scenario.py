@@ -16,6 +16,7 @@ from configs.drives import Drive
 from configs.edges import Edge, parse_edge
 from configs.graph import Graph, generated, of_matrix, random_rooted
 from configs.host import Host
+from configs.netem import Effects
 from configs.parameters import Name, Seconds, Seed, changed
 from configs.paths import Cosine, PathShape
 from configs.plugins import Choice
@@ -95,6 +96,13 @@ class Scenario(BaseModel):
     def drive(self) -> Drive:
         """Section [drive]; of a record whose protocol isn't here the shared keys."""
         return shared_part(Drive, self.drive_choice.parameters)
+
+    def aged(self, name: str) -> tuple[str, ...]:
+        """In-neighbours of a robot whose ages are recorded: all, where ages vary."""
+        emulated = self.network.default != Effects() or bool(self.network.edge)
+        if not emulated and self.clock.mode == "lockstep":
+            return ()
+        return tuple(edge.speaker for edge in self.topology.hears[name])
 
     @property
     def names(self) -> tuple[str, ...]:

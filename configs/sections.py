@@ -13,6 +13,7 @@ from configs import patterns
 from configs.choices import Changes, Chooser
 from configs.drives import DEFAULT, DRIVES, Drive
 from configs.edges import Weight
+from configs.netem import EdgeEffects, Effects
 from configs.parameters import (
     MOST_S,
     FilePath,
@@ -122,6 +123,11 @@ class Coordination(Parameters):
     q: Positive = 1.0
     v_hat_0: Finite = 0.0
     mu_0: Finite = 0.0
+    compensation: Literal["extrapolate", "hold", "both"] = parameter(
+        "extrapolate",
+        "of the age of a neighbour's s: s + v_r_hat * age; as received; or compared with the"
+        " robot's own value of that time",
+    )
     age_limit_s: Seconds = parameter(2.0, "a neighbour's value is carried on this far")
     silence_limit_s: Seconds = parameter(2.0, "then a silent neighbour stops counting")
     ahead_limit_s: Seconds = parameter(
@@ -273,10 +279,14 @@ class Localisation(Parameters):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Network(Parameters):
-    """The Zenoh router of the run."""
+    """The Zenoh router of the run, and the network that is emulated on it."""
 
     endpoint: Annotated[str, Pattern(patterns.ROUTER)] | None = parameter(
         None, "where the router listens; a free loopback port if not given"
+    )
+    default: Effects = parameter(Effects(), "of every edge between robots")
+    edge: Annotated[tuple[EdgeEffects, ...], Len(0, 1000)] = parameter(
+        (), "of some edges, where they differ"
     )
 
 

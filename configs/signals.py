@@ -91,6 +91,17 @@ SENT_SIGNALS: tuple[Signal, ...] = (
 )
 """What a controller commanded at one tick, and how well it kept its time."""
 
+AGE_PREFIX = "age_of_"
+
+
+def age_signals(hears: Sequence[str]) -> tuple[Signal, ...]:
+    """Ages of what a robot uses of its in-neighbours, in the order of their names."""
+    return tuple(
+        Signal(f"{AGE_PREFIX}{robot}_s", "s", f"age of the newest path state of {robot}")
+        for robot in hears
+    )
+
+
 SPREAD = "s_spread"
 """max_i s_i − min_i s_i over robots [m], of what is recorded of each."""
 
@@ -110,10 +121,15 @@ def gives_path_errors(law: Sequence[Signal]) -> bool:
     return any(signal.name in _PATH_ERROR_NAMES for signal in law)
 
 
-def controller_signals(law: Sequence[Signal]) -> tuple[Signal, ...]:
-    """The row of a controller with a law of this table: what it used, its law's, what it sent."""
+def controller_signals(law: Sequence[Signal], hears: Sequence[str] = ()) -> tuple[Signal, ...]:
+    """The row of a controller: what it used, its law's signals, what it sent.
+
+    Args:
+        law: the table of the law.
+        hears: in-neighbours whose ages are recorded, in the order of their names.
+    """
     own = law if gives_path_errors(law) else (*PATH_ERRORS, *law)
-    return (*USED_SIGNALS, *own, *SENT_SIGNALS)
+    return (*USED_SIGNALS, *age_signals(hears), *own, *SENT_SIGNALS)
 
 
 def signals_fault(law: object) -> str | None:

@@ -193,6 +193,15 @@ class InProcessRun:
         notices = {agent.brief.robot: agent.notices() for agent in self._agents}
         return {robot: said for robot, said in notices.items() if said}
 
+    @property
+    def messages(self) -> dict[str, Mapping[str, Mapping[str, int]]]:
+        """Messages on the emulated edges, by hearer, source and fate."""
+        return {
+            agent.brief.robot: agent.network.counts()
+            for agent in self._agents
+            if agent.network is not None
+        }
+
     def run(self, stop: Stop) -> None:
         """Run from the first tick of the countdown to the closing tick, or until told to stop."""
         self._exchange_paths(-1)

@@ -8,7 +8,7 @@ of another role.
     every role     [1, failure, left_early, notices, flooders, missing_privileges, cpu_ns,
                     durations_ns, profile_ns]
     plant          the same, then [overruns, frames, stopped_robots, bus_troubles, stalls]
-    agent/<robot>  the same, then [stop_reason, stop_tick, deadlines]
+    agent/<robot>  the same, then [stop_reason, stop_tick, deadlines, messages]
     launcher       [1, reason]
 
 Encoding cuts texts that are too long; decoding refuses them, as it refuses wrong types and numbers
@@ -40,6 +40,7 @@ class Deadlines(NamedTuple):
 Texts = tuple[str, ...]
 TextByName = Mapping[str, str]
 NumberByName = Mapping[str, int]
+CountsByName = Mapping[str, Mapping[str, int]]
 Stalls = tuple[Stall, ...]
 
 
@@ -107,6 +108,8 @@ class AgentReport(Report):
     stop_tick: int = 0
     deadlines: Deadlines | None = None
     """In real time only."""
+    messages: CountsByName = field(default_factory=dict)
+    """Messages on the emulated edges to it, by source and by their fate."""
 
 
 class LauncherReport(NamedTuple):
@@ -192,6 +195,7 @@ _READERS: Mapping[Any, Callable[[Any], Any]] = {
     int: _number,
     Texts: _texts,
     NumberByName: lambda value: _by_name(value, _number),
+    CountsByName: lambda value: _by_name(value, lambda inner: _by_name(inner, _number)),
     TextByName: lambda value: _by_name(value, _text),
     Stalls: _stalls,
     Deadlines | None: _deadlines,

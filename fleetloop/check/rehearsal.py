@@ -84,7 +84,7 @@ def rehearse(scenario: Scenario) -> list[Finding]:
         for robot, reason in run.stopped_robots.items()
     ]
     if not found:
-        found = _errors(scenario, notebook, said, whole=whole)
+        found = _errors(part, notebook, said, whole=whole)
     return found or [Finding("ok", _TITLE, f"{said}: no robot stops")]
 
 

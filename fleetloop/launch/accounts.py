@@ -57,6 +57,8 @@ def _add_report(stats: RunStats, process: str, report: Report) -> None:
             stats.frames_per_bus = dict(report.frames)
             stats.bus_troubles = dict(report.bus_troubles)
         case AgentReport():
+            if report.messages:
+                stats.messages[name] = report.messages
             if report.deadlines is not None:
                 stats.realtime[name] = report.deadlines._asdict()
             if report.stop_reason:

@@ -212,6 +212,7 @@ def _in_process(
         frames_per_bus=run.frames,
         stopped_robots=run.stopped_robots,
         notices=run.notices,
+        messages=run.messages,
     )
 
 

@@ -2,7 +2,7 @@
 
 import json
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
@@ -15,6 +15,7 @@ from configs.scenario import Scenario
 from fleetloop.record.reader import Record
 from fleetloop.results import expectations
 from fleetloop.results.expectations import judge, spread, why_not_checked
+from fleetloop.results.network import network
 from fleetloop.settling import FINAL_S, settle_s
 
 ERRORS = ("x_e_m", "y_e_m", "theta_e_rad")
@@ -40,6 +41,7 @@ class RunStats:
     stopped_robots: dict[str, str] = field(default_factory=dict)
     notices: dict[str, list[str]] = field(default_factory=dict)
     refused: dict[str, dict[str, int]] = field(default_factory=dict)  # by kind, by identity
+    messages: dict[str, Mapping[str, Mapping[str, int]]] = field(default_factory=dict)  # of edges
     machine: dict[str, Any] = field(default_factory=dict)  # of `fleetloop.launch.machine`
     bus_troubles: dict[str, str] = field(default_factory=dict)
     left_early: dict[str, str] = field(default_factory=dict)  # robots told to stop, by whom
@@ -94,6 +96,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         },
         "notices": stats.notices,
         "refused": stats.refused,
+        "network": network(controllers, stats.messages),
         "overruns": stats.overruns,
         "machine": stats.machine or None,
         "frames_per_bus": stats.frames_per_bus,

@@ -4,9 +4,10 @@ from math import exp
 
 import numpy as np
 import pytest
+from support.coordinated_fleet import coordinated_fleet
 
 from agents.coordination import MOST_MAPS, CoordinationState, Coordinator, matrix_exponential
-from agents.neighbours import Neighbours, Sums
+from agents.neighbours import Sums
 from configs.loading import load
 from configs.scenario import Scenario
 from configs.sections import Coordination
@@ -17,22 +18,7 @@ NOBODY = Sums(0, 0.0, 0.0, 0.0)
 
 
 def fleet(scenario: Scenario, share_every: int, ticks: int) -> np.ndarray:
-    """(ticks + 1, robots, 3): v̂, μ, s of the coordination alone, sharing every so many ticks."""
-    graph = scenario.topology
-    ears = {r: Neighbours(graph.hears[r], GAINS, H) for r in graph.robots}
-    minds = {r: Coordinator(GAINS, H) for r in graph.robots}
-    links = {r: graph.links[r].weight if r in graph.leader else 0.0 for r in graph.robots}
-    states = {r: CoordinationState(0.0, 0.0, 0.0) for r in graph.robots}
-    history = [[states[r] for r in graph.robots]]
-    for tick in range(ticks):
-        now_ns = tick * 1_000_000
-        if tick % share_every == 0:
-            for speaker, hearer in graph.edges:
-                ears[hearer].receive(speaker, now_ns, states[speaker].s, states[speaker].v_hat)
-        sums = {r: ears[r].sums(now_ns) for r in graph.robots}
-        states = {r: minds[r].advance(states[r], sums[r], links[r], 0.6) for r in graph.robots}
-        history.append([states[r] for r in graph.robots])
-    return np.array(history)
+    return coordinated_fleet(scenario.topology, GAINS, ticks, h_s=H, share_every=share_every)
 
 
 def exact(scenario: Scenario, ticks: int) -> np.ndarray:

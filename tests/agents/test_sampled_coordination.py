@@ -44,7 +44,7 @@ def one_robot(heard: int, hears_leader: bool, share_every: int) -> np.ndarray:
             ears.receive(name, period_ns, unit[4] / heard, unit[3] / heard)
         state = CoordinationState(*unit[:3])
         for tick in range(share_every):
-            sums = ears.sums(period_ns + tick * tick_ns)
+            sums = ears.sums(period_ns + tick * tick_ns, 0.0)
             state = mind.advance(state, sums, float(hears_leader), 0.0)
         columns.append(state)
     return np.array(columns).T

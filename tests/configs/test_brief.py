@@ -15,6 +15,7 @@ from configs.scenario import Scenario
 
 RESOLVED = {
     "AgentBrief": {"offset", "s_0", "bus"},
+    "ChannelModel": {"source", "seed"},
     "DriveLink": {"right_node", "left_node"},
     "HostLimits": {
         *("torque_limit_wheel_N_m", "torque_slew_limit_wheel_N_m_s"),

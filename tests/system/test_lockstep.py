@@ -13,14 +13,23 @@ pytestmark = pytest.mark.system
 CYCLE = 'graph={edges=["r1 -> r2", "r2 -> r1"], leader=["r2"]}'
 
 
+LOSSY = (
+    'network={default={delay={kind="normal", mean_s=0.1, std_s=0.05}, duplication=0.1,'
+    ' loss={kind="bernoulli", probability=0.3}}, edge=[{edges=["leader -> *",'
+    ' "localisation -> *"], delay={kind="constant", delay_s=0.03}}]}'
+)
 WIRE = 'bus.timing="wire"'
 KINDS = ["blf", "log"]
 
 
 @pytest.mark.parametrize(
     "overrides",
-    [(), ("--set", CYCLE), ("--set", WIRE, "--set", "clock.control_period_s=0.001")],
-    ids=["two_robots", "cycle", "wire"],
+    [
+        (),
+        ("--set", CYCLE, "--set", LOSSY),
+        ("--set", WIRE, "--set", "clock.control_period_s=0.001"),
+    ],
+    ids=["two_robots", "lossy_cycle", "wire"],
 )
 def test_processes_and_one_process_leave_the_same_record_bit_for_bit(
     overrides: tuple[str, ...], tmp_path: Path, capsys

@@ -4,17 +4,12 @@ from math import inf, isclose
 
 import numpy as np
 import pytest
+from support.coordinated_fleet import coordinated_fleet
 
-from agents.coordination import CoordinationState, Coordinator
-from agents.neighbours import Neighbours
-from configs.connections import NetworkLink
 from configs.graph import Graph, generated
 from configs.loading import load
-from configs.resolve import agent_brief
 from configs.scenario import Scenario
 from fleetloop.check.coordination import delay_margin_s, forecast, radii
-
-NOWHERE = NetworkLink("none", "", "", "")
 
 
 def shape(kind: str, n: int) -> Graph:
@@ -24,28 +19,17 @@ def shape(kind: str, n: int) -> Graph:
 
 def driven(scenario: Scenario, ticks: int) -> np.ndarray:
     """(ticks, robots): the path variables of the controllers' own objects."""
-    h, graph = scenario.clock.control_period_s, scenario.topology
-    every = round(scenario.clock.share_period_s / h)
-    briefs = [agent_brief(scenario, r, network=NOWHERE, bus=()) for r in graph.robots]
-    ears = {b.robot: Neighbours(b.hears, b.coordination, h) for b in briefs}
-    minds = {b.robot: Coordinator(b.coordination, h) for b in briefs}
-    links = {b.robot: b.leader_link.weight if b.leader_link else 0.0 for b in briefs}
-    states = {
-        b.robot: CoordinationState(b.coordination.v_hat_0, b.coordination.mu_0, b.s_0)
-        for b in briefs
-    }
-    rows = []
-    for tick in range(ticks):
-        now_ns = round(tick * h * 1e9)
-        if tick % every == 0:
-            for speaker, hearer in graph.edges:
-                ears[hearer].receive(speaker, now_ns, states[speaker].s, states[speaker].v_hat)
-        rows.append([states[robot].s for robot in graph.robots])
-        speed = scenario.leader.speed_m_s
-        states = {
-            r: minds[r].advance(states[r], ears[r].sums(now_ns), links[r], speed) for r in states
-        }
-    return np.array(rows)
+    h = scenario.clock.control_period_s
+    history = coordinated_fleet(
+        scenario.topology,
+        scenario.coordination,
+        ticks,
+        h_s=h,
+        share_every=round(scenario.clock.share_period_s / h),
+        v_r=scenario.leader.speed_m_s,
+        starts=[robot.s_0 for robot in scenario.robot],
+    )
+    return history[:-1, :, 2]
 
 
 WEIGHTS = "graph.weights={'r1 -> r2'=0.5, 'r4 -> r2'=0.2, 'leader -> r1'=3.0}"

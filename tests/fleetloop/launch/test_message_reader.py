@@ -29,7 +29,7 @@ SCHEDULE = schedule(SCENARIO)
 
 
 HONEST = ["", "", [], [], [], 0, {}, {}]
-OWN = {"plant": [0, {}, {}, {}, []], "agent/r1": ["", 0, None]}
+OWN = {"plant": [0, {}, {}, {}, []], "agent/r1": ["", 0, None, {}]}
 
 
 def said(process: str, changes: dict[int, object]) -> bytes:
@@ -58,6 +58,8 @@ def said(process: str, changes: dict[int, object]) -> bytes:
         ("agent/r1", {8: {f"name {n}": n for n in range(5000)}}),
         ("agent/r1", {11: [1]}),
         ("agent/r1", {12: 0}),
+        ("agent/r1", {12: {"r2": {"sent": 0.5}}}),
+        ("agent/r1", {12: {"r2": 5}}),
         ("plant", {11: {"r1": 1}}),
         ("plant", {13: [[200, inf]]}),
         ("plant", {13: [[200]]}),
@@ -124,6 +126,7 @@ reports = st.fixed_dictionaries(
             stop_reason=names,
             stop_tick=st.integers(-9, 2**40),
             deadlines=st.none() | st.builds(Deadlines, st.integers(0, 9), st.integers(0, 9)),
+            messages=st.dictionaries(st.sampled_from(["r2", "leader"]), counts, max_size=2),
         ),
         "recorder": st.builds(Report, **common),
     }

@@ -1,0 +1,1 @@
+"""Emulated network, per directed edge: delay, loss, order, bandwidth, cuts. Pure."""

@@ -1,0 +1,77 @@
+"""Edges of the emulated network: which effects each has, and entries that name none."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from configs.edges import LEADER, parse_edge
+from configs.errors import Problem
+from configs.graph import Graph
+from configs.netem import EVERY_ROBOT, LOCALISATION, Effects
+from configs.parameters import base_of, changed
+from configs.sections import Network
+
+SOURCES = (LEADER, LOCALISATION)
+"""Sources of messages that are no robots."""
+
+
+class EmulatedEdge(NamedTuple):
+    """A directed edge: messages go from the source to the hearer."""
+
+    source: str
+    hearer: str
+
+    def __str__(self) -> str:
+        return f"{self.source} -> {self.hearer}"
+
+
+def edges_of(graph: Graph) -> list[EmulatedEdge]:
+    """All edges that can be emulated: between robots, from the leader, from the localisation."""
+    return [
+        *(EmulatedEdge(*edge) for edge in graph.edges),
+        *(EmulatedEdge(LEADER, robot) for robot in graph.leader),
+        *(EmulatedEdge(LOCALISATION, robot) for robot in graph.robots),
+    ]
+
+
+def effects_of(network: Network, edge: EmulatedEdge) -> Effects:
+    """The effects of one edge: of each key what the last entry that names the edge gives."""
+    effects = Effects() if edge.source in SOURCES else network.default
+    for entry in network.edge:
+        if any(_names(text, edge) for text in entry.edges):
+            effects = changed(effects, base_of(Effects, entry))
+    return effects
+
+
+def _names(text: str, edge: EmulatedEdge) -> bool:
+    pattern = parse_edge(text)
+    if pattern is None:
+        return False
+    source, hearer = pattern
+    from_it = source == edge.source or (source == EVERY_ROBOT and edge.source not in SOURCES)
+    return from_it and hearer in (edge.hearer, EVERY_ROBOT)
+
+
+def emulation_problems(network: Network, graph: Graph) -> Iterator[Problem]:
+    """Entries of [[network.edge]] that name no edge of the graph, and names with two meanings."""
+    if LOCALISATION in graph.robots and network.edge:
+        remedy = "[[network.edge]] has the localisation system by this name; rename the robot"
+        yield Problem("robot.name", LOCALISATION, remedy)
+    edges = edges_of(graph)
+    for n, entry in enumerate(network.edge):
+        for text in entry.edges:
+            if problem := _problem_of(text, edges, graph.robots):
+                yield Problem(f"network.edge.{n}.edges", text, problem)
+
+
+def _problem_of(text: str, edges: Sequence[EmulatedEdge], robots: Sequence[str]) -> str | None:
+    pattern = parse_edge(text)
+    if pattern is None:
+        return 'must read "r1 -> r2", with * for every robot, or leader or localisation as source'
+    source, hearer = pattern
+    for name, known in ((source, (*robots, EVERY_ROBOT, *SOURCES)), (hearer, (*robots, "*"))):
+        if name not in known:
+            return f"{name}: must be one of {', '.join(known)}"
+    if any(_names(text, edge) for edge in edges):
+        return None
+    heard = [edge.source for edge in edges if edge.hearer == hearer] or [str(e) for e in edges]
+    return f"no such edge in the graph; {hearer} hears {', '.join(heard)}"

@@ -1,0 +1,111 @@
+"""Section [network]: the effects that each edge has, and entries that can't have any."""
+
+from pathlib import Path
+
+import pytest
+
+from configs.emulated_edges import EmulatedEdge, effects_of
+from configs.errors import ScenarioError
+from configs.loading import load, loads, to_toml
+from configs.netem import BernoulliLoss, ConstantDelay, TraceDelay
+from configs.resolve import channels
+from configs.scenario import Scenario
+
+HALF = 'loss = { kind = "bernoulli", probability = 0.5 }'
+EDGES = f"""
+[network.default]
+delay = {{ kind = "constant", delay_s = 0.1 }}
+[[network.edge]]
+edges = ["* -> r3", "leader -> *"]
+{HALF}
+[[network.edge]]
+edges = ["r2 -> r3"]
+delay = {{ kind = "constant", delay_s = 0.2 }}
+"""
+
+
+def paper(network: str, folder: str = "") -> Scenario:
+    text = (Path(__file__).parents[2] / "configs" / "paper.toml").read_text("utf-8")
+    return loads("paper.toml", text + network, folder=folder)
+
+
+def constant(delay_s: float) -> ConstantDelay:
+    return ConstantDelay(kind="constant", delay_s=delay_s)
+
+
+def test_an_edge_has_of_each_effect_the_last_that_names_it() -> None:
+    network = paper(EDGES).network
+    lossy = BernoulliLoss(kind="bernoulli", probability=0.5)
+    known = {
+        ("r1", "r2"): (constant(0.1), None),
+        ("r2", "r3"): (constant(0.2), lossy),
+        ("leader", "r1"): (None, lossy),
+    }
+    for edge, expected in known.items():
+        effects = effects_of(network, EmulatedEdge(*edge))
+        assert (effects.delay, effects.loss) == expected
+
+
+def test_a_robot_has_channels_from_what_it_hears_where_there_are_effects() -> None:
+    scenario = paper(EDGES)
+    assert [model.source for model in channels(scenario, "r1")] == ["leader"]
+    assert [model.source for model in channels(scenario, "r3")] == ["r2"]
+    assert channels(load("paper"), "r3") == ()
+    seeds = [model.seed for name in scenario.names for model in channels(scenario, name)]
+    assert len(set(seeds)) == len(seeds) == 4
+
+
+@pytest.mark.parametrize(
+    ("edge", "remedy"),
+    [
+        ("r2 -> r1", "no such edge in the graph; r1 hears leader, localisation"),
+        ("leader -> r2", "no such edge in the graph; r2 hears r1, localisation"),
+        ("r1 - r2", 'must read "r1 -> r2"'),
+        ("r1 -> r9", "r9: must be one of r1, r2, r3, r4, *"),
+        ("localisation -> leader", "leader: must be one of r1, r2, r3, r4, *"),
+    ],
+)
+def test_an_entry_that_names_no_edge_is_refused(edge: str, remedy: str) -> None:
+    with pytest.raises(ScenarioError) as refused:
+        paper(f'[[network.edge]]\nedges = ["{edge}"]\n{HALF}\n')
+    assert f'network.edge.0.edges = "{edge}": {remedy}' in str(refused.value)
+
+
+def test_a_trace_is_read_from_a_file_beside_the_scenario_and_written_out(tmp_path: Path) -> None:
+    (tmp_path / "radio.txt").write_text("0.01\nlost  # a gap\n\n0.5\n")
+    scenario = paper(
+        '[network.default]\ndelay = { kind = "trace", delays_s = "radio.txt" }\n', str(tmp_path)
+    )
+    delay = scenario.network.default.delay
+    assert delay == TraceDelay(kind="trace", delays_s=(0.01, -1.0, 0.5))
+    assert loads("again", to_toml(scenario)) == scenario
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("0.1\nsoon\n", "radio.txt, line 2: 'soon' must be a delay of 0 to 60 s, or lost"),
+        ("-0.1\n", "radio.txt, line 1: '-0.1' must be a delay of 0 to 60 s, or lost"),
+        ("inf\n", "radio.txt, line 1: 'inf' must be a delay of 0 to 60 s, or lost"),
+        ("# nothing\n", "must have 1 entries or more"),
+        ("\udcff", "no text in UTF-8"),
+        (None, "can't be read: No such file or directory"),
+    ],
+)
+def test_a_trace_that_can_not_be_used_is_refused_with_its_line(
+    text: str | None, said: str, tmp_path: Path
+) -> None:
+    if text is not None:
+        (tmp_path / "radio.txt").write_bytes(text.encode("utf-8", "surrogateescape"))
+    network = '[network.default]\ndelay = { kind = "trace", delays_s = "radio.txt" }\n'
+    with pytest.raises(ScenarioError) as refused:
+        paper(network, str(tmp_path))
+    assert "network.default.delay.delays_s" in str(refused.value)
+    assert said in str(refused.value)
+
+
+def test_bounds_out_of_order_are_named_at_their_table() -> None:
+    with pytest.raises(ScenarioError) as refused:
+        paper("[network.default]\npartitions = [{ from_s = 3.0, to_s = 2.0 }]\n")
+    assert "network.default.partitions.0" in str(refused.value)
+    assert "to_s must be above from_s = 3" in str(refused.value)

@@ -1,0 +1,31 @@
+"""What the edges did: counts from reports, ages from the record."""
+
+import numpy as np
+
+from fleetloop.results.network import network
+
+
+def rows(**columns: list[float]) -> np.ndarray:
+    made = np.zeros(len(next(iter(columns.values()))), [(name, "<f8") for name in columns])
+    for name, values in columns.items():
+        made[name] = values
+    return made
+
+
+def test_an_edge_has_its_counts_and_the_age_of_its_data() -> None:
+    ages = [np.nan, *np.linspace(0.0, 1.0, 101)]
+    controllers = {"r1": rows(s=[0.0]), "r2": rows(s=[0.0] * 102, age_of_r1_s=ages)}
+    edges = network(controllers, {"r2": {"r1": {"sent": 5, "lost": 2}, "leader": {"sent": 7}}})
+    assert edges == {
+        "r1 -> r2": {"sent": 5, "lost": 2, "age_s": {"mean": 0.5, "p99": 0.99, "max": 1.0}},
+        "leader -> r2": {"sent": 7},
+    }
+
+
+def test_an_edge_that_carried_nothing_has_no_age() -> None:
+    controllers = {"r2": rows(age_of_r1_s=[np.nan, np.nan])}
+    assert network(controllers, {}) == {"r1 -> r2": {"age_s": None}}
+
+
+def test_without_emulation_or_ages_there_is_nothing_to_say() -> None:
+    assert network({"r1": rows(s=[0.0])}, {}) is None
