@@ -55,9 +55,6 @@ class Clock(Parameters):
         "longest wait for all processes to be ready; if not given 20 s, or 0.5 s for each"
         " robot if that is more",
     )
-    on_late: Literal["abort"] = parameter(
-        "abort", "the consequence of a late process: the run ends"
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

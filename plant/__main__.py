@@ -37,7 +37,7 @@ from plant.herald import Herald
 from plant.lockstep import LockstepLoop, PlantCounters
 from plant.real_robot import RealRobot
 from plant.realtime import RealtimeLoop
-from plant.robot import diverged_robots, emulated_robot
+from plant.robot import bus_troubles, diverged_robots, emulated_robot
 
 PLANT_PRIORITY = 45
 """SCHED_FIFO, above the controllers'."""
@@ -127,13 +127,14 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
     stalls: list[Stall] = []
 
     def news() -> dict[str, str]:
-        troubles = {f"bus {bus}": text for bus, text in end.troubles().items()}
+        troubles = bus_troubles(end.troubles(), emulated)
+        buses = {f"bus {bus}": text for bus, text in troubles.items()}
         late = {
             brief.schedule.when(stall.tick): "the plant, or its machine, stalled for"
             f" {stall.lasted_s:.2f} s"
             for stall in stalls
         }
-        return troubles | late | diverged_robots(emulated, brief.schedule.period_ns)
+        return buses | late | diverged_robots(emulated, brief.schedule.period_ns)
 
     notice = link.publisher(keys.notice(name, PLANT.name))
     herald = Herald(news, lambda text: notice.put(Notice(text).encode()))
@@ -191,7 +192,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
             overruns=counters.overruns,
             frames=counters.frames,
             stopped_robots=diverged_robots(emulated, brief.schedule.period_ns),
-            bus_troubles=end.troubles(),
+            bus_troubles=bus_troubles(end.troubles(), emulated),
             stalls=tuple(stalls),
         )
         report.put(summary.encode())

@@ -11,7 +11,7 @@ Drives, motors and encoders are at the motor shaft, the body and what is recorde
     RealisticRobot    motors, supply and encoders of `plant.powertrain`
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from bridge.drives import protocol
 from bridge.drives.interface import DriveMeasurements, DriveNode
@@ -229,6 +229,17 @@ def emulated_robot(brief: RobotBrief) -> EmulatedRobot:
         if brief.powertrain is None
         else RealisticRobot(brief, brief.powertrain)
     )
+
+
+def bus_troubles(troubles: Mapping[str, str], robots: Iterable[EmulatedRobot]) -> dict[str, str]:
+    """The troubles of buses, and the frames on them that drives ignored."""
+    found = {bus: [text] for bus, text in troubles.items()}
+    for robot in robots:
+        for side, drive in zip(("right", "left"), robot.drives, strict=True):
+            if count := drive.ignored:
+                text = f"{robot.brief.robot}'s {side} drive ignored {count} frames: no such command"
+                found.setdefault(robot.brief.bus, []).append(f"{text}, value or length")
+    return {bus: "; ".join(texts) for bus, texts in found.items()}
 
 
 def diverged_robots(robots: Iterable[EmulatedRobot], period_ns: int) -> dict[str, str]:

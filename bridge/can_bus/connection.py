@@ -59,16 +59,13 @@ class SubmissionQueue(Generic[_Item]):
 
 
 class BusCounters:
-    """Frames and packets of one bus."""
+    """Frames and packets of one bus that were lost."""
 
-    __slots__ = ("dropped", "from_clients", "from_drives", "garbage", "joins")
+    __slots__ = ("dropped", "garbage")
 
     def __init__(self) -> None:
-        self.from_drives = 0
-        self.from_clients = 0
         self.dropped = 0  # frames that a client did not take in time
         self.garbage = 0  # packets that are none, and frames that are none of classic CAN
-        self.joins = 0
 
 
 class Bus:

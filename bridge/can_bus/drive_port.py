@@ -10,13 +10,6 @@ from typing import Protocol
 from bridge.frame import Frame
 
 
-class FrameCounters(Protocol):
-    """What went over one bus."""
-
-    from_drives: int
-    from_clients: int
-
-
 class DrivePort(Protocol):
     """Where emulated drives hear and speak."""
 
@@ -35,11 +28,8 @@ class DrivePort(Protocol):
     def clients(self) -> int:
         """How many may be listening."""
 
-    def counters(self, name: str) -> FrameCounters:
-        """What went over a bus so far."""
-
     def troubles(self) -> dict[str, str]:
-        """Buses that failed at times, and how."""
+        """Buses that failed at times or lost frames, in words."""
 
     def close(self, reason: str) -> None:
         """Leave all buses. Idempotent."""

@@ -22,7 +22,7 @@ from typing import Protocol
 
 import can
 
-from bridge.can_bus.drive_port import DrivePort, FrameCounters
+from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import open_bus, to_frame, to_message
 from bridge.frame import Frame
@@ -42,13 +42,11 @@ _FAILURES = (can.CanError, OSError, ValueError)  # ValueError: a descriptor that
 
 
 class ExternalBusCounters:
-    """What went over one bus, and what did not."""
+    """What went wrong on one bus."""
 
-    __slots__ = ("dropped", "error_frames", "from_clients", "from_drives", "garbage", "outages")
+    __slots__ = ("dropped", "error_frames", "garbage", "outages")
 
     def __init__(self) -> None:
-        self.from_drives = 0
-        self.from_clients = 0
         self.dropped = 0  # could not be sent, or were not taken in time
         self.garbage = 0  # FD frames, and what is no frame of classic CAN
         self.error_frames = 0
@@ -127,7 +125,6 @@ class ExternalBuses:
             if bus is None:
                 attachment.counters.dropped += len(frames) - n
                 return
-        attachment.counters.from_drives += len(frames)
         if attachment.failing_since_s is not None and frames:
             self._note_recovery(attachment)
 
@@ -161,24 +158,27 @@ class ExternalBuses:
         """Number of open buses: their listeners are unknown."""
         return sum(attachment.bus is not None for attachment in self._all.values())
 
-    def counters(self, name: str) -> ExternalBusCounters:
-        """What went over a bus so far."""
-        return self._all[name].counters
-
     def troubles(self) -> dict[str, str]:
-        """Buses with outages: their number, duration, last error and lost frames."""
+        """Buses with outages: their number, duration, last error; with lost and strange frames."""
         now_s = self._clock.monotonic_s()
         found = {}
         for name, attachment in self._all.items():
             counters, since_s = attachment.counters, attachment.failing_since_s
+            said = []
             if counters.outages:
                 out_s = attachment.out_s + (now_s - since_s if since_s is not None else 0.0)
-                found[name] = (
+                said.append(
                     f"{counters.outages} × failed for {out_s:.1f} s in all, {counters.dropped}"
-                    f" frames not sent; last: {attachment.reason}"
+                    f" frames lost; last: {attachment.reason}"
                 )
             elif counters.dropped:
-                found[name] = f"{counters.dropped} frames not sent"
+                said.append(f"{counters.dropped} frames lost")
+            if counters.error_frames:
+                said.append(f"{counters.error_frames} error frames")
+            if counters.garbage:
+                said.append(f"{counters.garbage} × no frame of classic CAN")
+            if said:
+                found[name] = "; ".join(said)
         return found
 
     def fileno(self) -> int:
@@ -244,7 +244,6 @@ class ExternalBuses:
                 frame, self._clock.monotonic_s()
             ):
                 continue
-            counters.from_clients += 1
             if attachment.failing_since_s is not None:
                 self._note_recovery(attachment)
             if len(taken) < BACKLOG:
@@ -320,10 +319,6 @@ class CombinedPort:
     def clients(self) -> int:
         """Number of buses or clients that may be listening."""
         return sum(end.clients() for end in self._both)
-
-    def counters(self, name: str) -> FrameCounters:
-        """What went over a bus so far."""
-        return self._end_of(name).counters(name)
 
     def troubles(self) -> dict[str, str]:
         """Buses that failed at times, and how."""

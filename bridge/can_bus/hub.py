@@ -26,7 +26,7 @@ emulation of the wire reads with `submitted` the frames that clients want to sen
 import socket
 from collections.abc import Mapping, Sequence
 
-from bridge.can_bus.connection import Bus, BusCounters, Connection
+from bridge.can_bus.connection import Bus, Connection
 from bridge.can_bus.packet import (
     DONE,
     MAX_FRAMES,
@@ -84,7 +84,6 @@ class Hub:
         """Send frames of the drives, in order, to all clients of a bus at bus time `stamp_ns`."""
         bus = self._buses[name]
         bus.stamp_ns = stamp_ns
-        bus.counters.from_drives += len(frames)
         clients = bus.clients
         if not clients:
             return
@@ -121,7 +120,6 @@ class Hub:
         """
         bus = self._buses[name]
         bus.stamp_ns = stamp_ns
-        bus.counters.from_drives += sum(passed.of_drive for passed in frames)
         for client in bus.clients.copy():
             heard = [p.as_heard_by(client.key) for p in frames if p.heard_by(client.key)]
             if client.own:
@@ -226,17 +224,21 @@ class Hub:
         """Robots whose controllers have gone, in the order in which they went."""
         return tuple(self._server.left)
 
-    def counters(self, name: str) -> BusCounters:
-        """What went over a bus so far."""
-        return self._buses[name].counters
-
     def troubles(self) -> dict[str, str]:
-        """Buses with invalid frames or packets of clients; an emulated bus never fails."""
-        return {
-            name: f"clients sent {count} × what is no frame of classic CAN: it was dropped"
-            for name, bus in self._buses.items()
-            if (count := bus.counters.garbage)
-        }
+        """Buses with invalid frames or packets of clients, or frames that they didn't read in time.
+
+        An emulated bus never fails.
+        """
+        found = {}
+        for name, bus in self._buses.items():
+            garbage, lost = bus.counters.garbage, bus.counters.dropped
+            said = [f"clients sent {garbage} × what is no frame of classic CAN: it was dropped"]
+            said = said if garbage else []
+            if lost:
+                said.append(f"{lost} frames for clients were lost: they did not read them in time")
+            if said:
+                found[name] = "; ".join(said)
+        return found
 
     def fileno(self) -> int:
         """A descriptor that is readable when there is something to handle."""
@@ -252,7 +254,6 @@ class Hub:
         bus = client.bus
         _, flags, _, stamp_ns, frames, *_ = packet
         if frames:
-            bus.counters.from_clients += len(frames)
             if bus.queue:
                 submitted = [Submitted(client.key, frame) for frame in frames]
                 bus.submitted.put(submitted, at_once=client.synchronous)

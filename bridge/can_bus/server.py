@@ -216,7 +216,6 @@ class ClientServer:
         client.joined = True
         bus.unidentified.remove(client)
         bus.clients.append(client)
-        bus.counters.joins += 1
         welcome = encode_text(WELCOME, count=VERSION, stamp_ns=bus.stamp_ns, credit=bus.queue)
         self.send(client, welcome)
 

@@ -81,6 +81,8 @@ class DriveNode(Protocol):
     """Bus time of its last set-point: the last feed of the watchdog."""
     setpoint_id: int
     """The identifier of its set-points at its present address; negative: it accepts none."""
+    ignored: int
+    """Frames to it without an effect: unknown commands, values and lengths that it doesn't take."""
 
     def update_encoder(self, revolutions: float, rev_s: float) -> None:
         """Set the encoder's position [rev] and speed [rev/s] of the shaft."""

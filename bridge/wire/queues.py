@@ -5,7 +5,6 @@
                 `txqueuelen` of 10
     Mailboxes   a drive: bxCAN's     the lowest             refused: firmware tries again a
                 three                identifier             millisecond later with newer data
-    Endless     a babbling idiot     always the same frame  never
 
 Nothing pending is ever replaced by something newer: ODrive's firmware 0.5.6 looks for a free
 mailbox and else reports that it didn't send (`ODriveCAN::send_message`), and its mailboxes compete
@@ -18,7 +17,6 @@ from bisect import insort
 from typing import NamedTuple
 
 from bridge.frame import Frame
-from bridge.wire.bits import arbitration_key, frame_bits
 
 HOST_QUEUE = 10
 DRIVE_MAILBOXES = 3
@@ -93,26 +91,3 @@ class Mailboxes(Queue):
             return False
         insort(entries, entry)
         return True
-
-
-class Endless(Queue):
-    """A babbling idiot: sends one frame again and again, as fast as the bus lets it."""
-
-    __slots__ = ()
-
-    def __init__(self, frame: Frame) -> None:
-        super().__init__(1)
-        self.entries.append(Entry(arbitration_key(frame.can_id), -1, frame, frame_bits(frame)))
-
-    def push(self, entry: Entry) -> bool:
-        """No: it says one thing only."""
-        del entry
-        return False
-
-    def sent(self, entry: Entry) -> None:
-        """It goes on."""
-
-    def clear(self) -> int:
-        """Stop for good; nothing that was submitted is lost."""
-        self.entries.clear()
-        return 0

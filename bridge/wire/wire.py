@@ -109,10 +109,6 @@ class Wire:
             self._segment(node).move(node, self._main, self.now_ns)
             self._forget_empty()
 
-    def queued(self, node: Node) -> int:
-        """Frames that wait at a node, the one on the wire and withheld ones included."""
-        return len(node.queue.entries) + sum(held[2] is node for held in self._withheld)
-
     # --- frames ----------------------------------------------------------------------------------
 
     def submit(self, node: Node, frame: Frame, at_ns: int) -> bool:

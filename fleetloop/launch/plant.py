@@ -42,7 +42,7 @@ from fleetloop.terminal import note, say
 from plant.__main__ import PLANT_PRIORITY, join
 from plant.__main__ import run as plant_of_a_run
 from plant.realtime import RealtimeLoop
-from plant.robot import EmulatedRobot, diverged_robots, emulated_robot
+from plant.robot import EmulatedRobot, bus_troubles, diverged_robots, emulated_robot
 
 FOREVER_TICKS = 1 << 53
 GO_AHEAD_NS = 1_000_000
@@ -191,7 +191,7 @@ def _run(
     with settled_memory():
         loop.run(SYSTEM_CLOCK.monotonic_ns() + GO_AHEAD_NS, stop)
     watch.look()
-    for bus, trouble in end.troubles().items():
+    for bus, trouble in bus_troubles(end.troubles(), robots).items():
         note(f"BUS {bus}: {trouble}")
     frames = ", ".join(f"{bus} {count}" for bus, count in loop.counters.frames.items())
     late = f"; late ticks: {loop.counters.overruns}" if loop.counters.overruns else ""

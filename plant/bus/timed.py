@@ -98,8 +98,6 @@ class TimedBus:
         self._now_ns = 0
         self._transmitted: list[Transmitted] = []
         self._freed: list[tuple[Key, int]] = []
-        self.refused = 0
-        """Frames of clients that found no room."""
         self.crossed = 0
         """Frames that ended on the wire, drives' and clients'."""
 
@@ -179,9 +177,7 @@ class TimedBus:
             node = self._hosts.get(key) or self._host(key)
             if not self.wire.submit(node, frame, self._now_ns):
                 refused[key] = refused.get(key, 0) + 1
-        if refused:
-            self.refused += sum(refused.values())
-            self._freed += refused.items()
+        self._freed += refused.items()
 
     def _detach(self, key: Key) -> None:
         """A client has left."""

@@ -11,7 +11,7 @@ from configs.connections import NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief
 from configs.signals import PLANT_SIGNALS
-from plant.robot import EmulatedRobot, emulated_robot
+from plant.robot import EmulatedRobot, bus_troubles, emulated_robot
 
 COLUMNS = [signal.name for signal in PLANT_SIGNALS]
 
@@ -32,6 +32,19 @@ def arm(robot: EmulatedRobot, right: float, left: float) -> None:
 def test_frames_of_an_instant_come_in_order_of_arbitration() -> None:
     identifiers = [frame.can_id for frame in robot_of().frames_due(0)]
     assert identifiers == [0x001, 0x009, 0x021, 0x029]
+
+
+def test_what_drives_ignore_is_a_trouble_of_their_bus() -> None:
+    robot = robot_of()
+    assert bus_troubles({}, [robot]) == {}
+    for _ in range(3):
+        robot.on_frame(Frame(identifier(1, Command.SET_POS_GAIN), f.ONE_FLOAT.pack(-1.0)), 0)
+    said = "r1's left drive ignored 3 frames: no such command, value or length"
+    assert bus_troubles({}, [robot]) == {"r1": said}
+    assert bus_troubles({"r1": "failed", "x": "failed"}, [robot]) == {
+        "r1": f"failed; {said}",
+        "x": "failed",
+    }
 
 
 def test_an_idle_robot_coasts() -> None:

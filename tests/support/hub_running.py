@@ -19,6 +19,11 @@ GRANTED = {"bench": ("r1",), "boss": ("*",)}
 WORDS = {"bench": "agreed", "boss": "secret"}
 
 
+def lost_at(hub: Hub, bus: str) -> int:
+    """Frames that clients of a bus did not read in time."""
+    return int(hub.troubles()[bus].split(" frames for clients were lost")[0])
+
+
 class Remote:
     """A router with its relay, and how a guest opens a bus through it."""
 

@@ -28,7 +28,7 @@ def test_a_frame_that_only_can_fd_could_carry_is_refused_and_leaves_no_trace() -
     node, _ = wire.attach("node"), wire.attach("other")
     with pytest.raises(ValueError, match="12 bytes of data"):
         wire.submit(node, Frame(0x00E, bytes(12)), 0)
-    assert (wire.next_ns(), wire.queued(node), node.counters.accepted) == (None, 0, 0)
+    assert (wire.next_ns(), len(node.queue.entries), node.counters.accepted) == (None, 0, 0)
 
 
 # --- drop, duplicate, delay -----------------------------------------------------------------------
@@ -61,7 +61,7 @@ def test_a_delayed_frame_goes_to_arbitration_later_by_exactly_that() -> None:
     wire.inject(Fault(FaultKind.DELAY, delay_ns=5 * MS))
     wire.submit(node, Frame(0x100, b""), 0)
     wire.submit(node, Frame(0x101, b""), 0)
-    assert wire.queued(node) == 2
+    assert len(node.queue.entries) == 1  # the other one is withheld
     first, second = delivered(wire.advance(10 * MS))
     assert (first.frame.can_id, second.frame.can_id) == (0x101, 0x100)
     assert second.start_ns == 5 * MS
@@ -116,7 +116,7 @@ def test_whatever_goes_wrong_every_frame_is_accounted_for_and_none_overlap(seed:
     events += wire.advance(wire.now_ns + 50 * MS)
     for node in nodes:
         c = node.counters
-        assert c.accepted == c.sent + c.dropped + wire.queued(node)
+        assert c.accepted == c.sent + c.dropped + len(node.queue.entries)
     frames = delivered(events)
     assert sum(1 + len(event.merged) for event in frames) == sum(n.counters.sent for n in nodes)
     assert [event[0] for event in events] == sorted(event[0] for event in events)

@@ -4,13 +4,14 @@ import itertools
 import random
 
 import pytest
+from support.babbler import Endless
 
 from bridge.frame import EFF, Frame
 from bridge.wire.bits import frame_bits
 from bridge.wire.confinement import NodeState
 from bridge.wire.faults import Fault, FaultKind
 from bridge.wire.node import Delivered, ErrorFrame, ErrorKind, Event, Node, StateChanged
-from bridge.wire.queues import Endless, Fifo, Mailboxes
+from bridge.wire.queues import Fifo, Mailboxes
 from bridge.wire.wire import Wire
 
 US = 1000
@@ -110,7 +111,7 @@ def test_a_node_that_babbles_identifier_0_fills_the_bus_and_starves_all_commands
     assert host.counters.refused == 90
     wire.detach(babbler)
     assert [event.frame.can_id for event in delivered(wire.advance(110 * MS))][1:] == [0x00E] * 10
-    assert wire.queued(drive) == 0
+    assert len(drive.queue.entries) == 0
 
 
 # --- 39: error frames, error passive --------------------------------------------------------------
@@ -178,7 +179,7 @@ def test_only_the_frames_asked_for_are_corrupted() -> None:
 def test_32_failed_sends_in_a_row_take_a_node_off_and_drop_what_it_had() -> None:
     wire, node, other, _ = off_the_bus(None)
     assert node.counters.errors == 32
-    assert (node.counters.sent, node.counters.dropped, wire.queued(node)) == (0, 1, 0)
+    assert (node.counters.sent, node.counters.dropped, len(node.queue.entries)) == (0, 1, 0)
     assert not wire.submit(node, SYNC, wire.now_ns)
     assert node.counters.refused == 1
     assert wire.submit(other, SYNC, wire.now_ns)
@@ -269,7 +270,7 @@ def test_an_open_line_cuts_a_node_off_and_a_closed_one_brings_its_queue_back() -
         (b"\2", (left,)),
     ]
     assert host.state is NodeState.ERROR_PASSIVE
-    assert (wire.queued(host), host.counters.refused) == (9, 3)  # the first one took a place
+    assert (len(host.queue.entries), host.counters.refused) == (9, 3)  # the first one took a place
     wire.reconnect(host)
     events = delivered(wire.advance(40 * MS))
     assert len(events) == 9

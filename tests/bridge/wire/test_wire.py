@@ -102,7 +102,7 @@ def test_a_full_queue_refuses_and_keeps_what_it_has() -> None:
     host, _ = wire.attach("host"), wire.attach("drive")
     taken = [wire.submit(host, Frame(0x100 + n, b""), 0) for n in range(12)]
     assert taken == [True] * 10 + [False] * 2
-    assert (wire.queued(host), host.counters.refused) == (10, 2)
+    assert (len(host.queue.entries), host.counters.refused) == (10, 2)
     assert len(delivered(wire.advance(MS))) == 10
 
 
@@ -127,7 +127,7 @@ def test_a_node_that_leaves_takes_its_queue_along_but_not_the_frame_on_the_wire(
     with pytest.raises(ValueError, match="client has left"):
         wire.submit(client, Frame(0x100, b""), MS)
     assert wire.next_ns() is None
-    assert wire.queued(other) == 0
+    assert len(other.queue.entries) == 0
 
 
 def test_who_joins_during_a_frame_does_not_hear_it() -> None:
@@ -277,7 +277,7 @@ def test_every_accepted_frame_is_delivered_once_in_order_and_none_overlap(
     for node in nodes:
         counters = node.counters
         assert counters.accepted == counters.sent
-        assert counters.dropped == wire.queued(node) == 0
+        assert counters.dropped == len(node.queue.entries) == 0
     for before, after in itertools.pairwise(events):
         assert after.start_ns >= before.end_ns + 3 * 2000
     sent_ns = {frame: at for at, _, frame in accepted}

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import pytest
+from support.babbler import Endless
 from support.manual_port import ManualPort, Question
 
 from bridge.can_bus.packet import Submitted
@@ -11,7 +12,6 @@ from bridge.drives.odrive.frames import AxisState, Command, identifier
 from bridge.frame import Frame
 from bridge.network.telemetry import no_tap
 from bridge.wire.node import NodeState
-from bridge.wire.queues import Endless
 from configs.brief import PlantBrief
 from configs.connections import NetworkLink
 from configs.loading import load, loads
@@ -117,7 +117,7 @@ def test_who_says_more_than_the_transmit_queue_holds_is_refused_and_told() -> No
     flood = [Frame(0x700, bytes(8))] * 40
     driven = Driven(lambda tick: flood if tick == -250 else [])
     driven.tick()
-    assert driven.bus.refused == 30
+    assert driven.bus._hosts["r1"].counters.refused == 30
     freed = [count for ask in driven.ticks(5) for _, count in ask.freed]
     assert sum(freed) == 40
 
@@ -247,8 +247,8 @@ def test_a_host_that_nobody_acknowledges_hears_of_it_and_finds_its_queue_full() 
     heard = [passed.frame for ask in driven.ticks(40) for passed in ask.transmitted]
     kinds = {frame.can_id & ~ERR for frame in heard if frame.can_id & ERR}
     assert {0x04, 0x20} <= kinds
-    assert driven.bus.wire.queued(host) == 10
-    assert driven.bus.refused > 0
+    assert len(host.queue.entries) == 10
+    assert host.counters.refused > 0
 
 
 def test_frames_of_seven_robots_on_one_bus_come_to_each_in_its_turn() -> None:

@@ -19,7 +19,7 @@ class PlainNode:
         self.setpoint_id = TORQUE + node_id
         self._period_ns = model.encoder_period_ns
         self.next_due_ns = 0
-        self.fed_ns = 0
+        self.fed_ns = self.ignored = 0
         self.input_torque_shaft = 0.0
         self._motion = (0.0, 0.0)
 
@@ -40,7 +40,9 @@ class PlainNode:
         return Frame(self._id, ENCODER.pack(round(rev / REV), round(rev_s / REV_S)))
 
     def on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
-        if frame.can_id == self.setpoint_id:
+        if frame.can_id == self.setpoint_id and len(frame.data) != SET_POINT.size:
+            self.ignored += 1
+        elif frame.can_id == self.setpoint_id:
             (steps,) = SET_POINT.unpack(frame.data)
             self.input_torque_shaft = steps * self._unit
             self.fed_ns = now_ns
