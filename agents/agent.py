@@ -64,7 +64,9 @@ class Agent:
         """Phases, faults and limits between the law and the drives."""
         self._drives = self._guard.drives
         self._path = robot_path(brief.path, brief.offset)
-        law = build(brief.law, brief.wheels, self._h, self._path)
+        self._tick = 0  # of the law
+        law = build(brief.law, brief.wheels, self._h, self._path, self._note)
+        self._law_name = brief.law.name
         self._law_step, self._law_hold = law.step, law.hold
         self._no_signals = (nan,) * law.signals
         self._law_state: Any = None  # the law's own
@@ -279,6 +281,7 @@ class Agent:
     def _control(self, tick: int, motion: RobotMotion) -> Sequence[Frame]:
         """The coordination and the law at one tick; where either diverges the robot stops."""
         t_ns = tick * self._schedule.period_ns
+        self._tick = tick
         v_hat, mu, s = coordination = self._coordination
         s_dot = mu + v_hat
         sums = self._neighbours.sums(t_ns, s)
@@ -294,7 +297,7 @@ class Agent:
             out = self._law_step(self._law_state, motion, reference, along)
         except (Exception, SystemExit) as error:  # any end of a law or path stops this robot only
             reference, signals = _NO_REFERENCE, self._no_signals
-            how, why = failure(error)
+            how, why = failure(error, self._law_name)
             frames = guard.command(tick, nan, nan, f"{how} at s = {s:.4g} m: {why}")
         else:
             signals = tuple(out[3])
@@ -325,6 +328,9 @@ class Agent:
             self._diverged = far is not None
             trouble = None if far is None else f"its path variable diverged: {far}"
             self._guard.note_fault("path variable", trouble)
+
+    def _note(self, text: str) -> None:
+        self._guard.note(self._tick, text)
 
     def shut_down(self) -> Sequence[Frame]:
         """Disarm for good, on a stop before the closing tick."""

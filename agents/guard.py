@@ -110,8 +110,12 @@ class Guard:
     def note_stall(self, tick: int, reason: str) -> None:
         """Note the reason for late ticks from this one on; set `stalled` to "" afterwards."""
         self.stalled = reason
+        self.note(tick, reason)
+
+    def note(self, tick: int, text: str) -> None:
+        """Note what stops nothing, for people."""
         if len(self._announced) < 2 * MAX_EVENTS:
-            self._announce(f"{self._when(tick)}: {reason}")
+            self._announce(f"{self._when(tick)}: {text}")
 
     def note_unsent(self, tick: int) -> None:
         """Note that the frames of this tick were not sent: arming has lost a step."""

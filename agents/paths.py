@@ -60,7 +60,7 @@ def robot_path(path: ReferencePath, offset: FormationOffset) -> RobotPath:
         case VaryingOffset():
             return _turning(centre, _varying(offset))
         case Choice():
-            return _turning(centre, _own(offset))
+            return _turning(centre, own_curve(offset))
 
 
 def _reference(x: Jet, y: Jet) -> Reference:
@@ -166,11 +166,14 @@ def _centre_path(path: ReferencePath) -> _Curve:
         case SplinePath():
             return _spline(path)
         case Choice():
-            return _own(path)
+            return own_curve(path)
 
 
-def _own(choice: Choice) -> _Curve:
-    """A path or an offset of the user's own: `jet(s)` of its class, its answers checked."""
+def own_curve(choice: Choice) -> Callable[[float], PlanarJet]:
+    """A path or an offset of the user's own: `jet(s)` of its class, its answers checked.
+
+    The curve raises `ShapeError` where it fails or gives anything else than finite numbers.
+    """
     shape: Any = choice.parameters
     jet = shape.jet
     name = f"{choice.plugin.kind.word} {choice.name}"

@@ -125,12 +125,26 @@ class AlsoOwn:
     """Annotation of a union of tables told apart by a key: a class of one's own is one more."""
 
     chooser: Chooser
+    other: Kind
+    """The kind whose names are mistaken for ours."""
+    other_names: frozenset[str]
+    """Names of the shipped ones of the other kind."""
 
-    def _is_own(self, value: Any, shipped: Collection[str]) -> bool:
-        name = value.get(self.chooser.key) if isinstance(value, Mapping) else None
+    def _own_name(self, value: Any, shipped: Collection[str], *, recorded: bool) -> str:
+        """The name in a table if it is no shipped one but leads elsewhere; else "".
+
+        Raises:
+            ValidationError: it is the name of the other kind.
+        """
+        key, kind = self.chooser.key, self.chooser.kind
+        name = value.get(key) if isinstance(value, Mapping) else None
         if not isinstance(name, str) or name in shipped:  # most are, and packages are searched long
-            return False
-        return ":" in name or name in entry_points(self.chooser.kind)
+            return ""
+        if any(mark in name for mark in (":", ".py")) or name in entry_points(kind):
+            return name
+        if name in self.other_names or name in entry_points(self.other):
+            raise stated(key, name, f"is a {self.other.word}, no {kind.word}")
+        return name if recorded else ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: "GetCoreSchemaHandler") -> Any:
         """Tables of the union as before, others choices."""
@@ -142,8 +156,8 @@ class AlsoOwn:
         def made(value: Any, inner: Any, info: "core_schema.ValidationInfo") -> Any:
             if isinstance(value, Choice):
                 return value
-            if self._is_own(value, shipped):
-                folder, recorded = origin_of(info)
+            folder, recorded = origin_of(info)
+            if self._own_name(value, shipped, recorded=recorded):
                 return self.chooser.choose(value, folder, recorded=recorded)
             return inner(value)
 

@@ -4,8 +4,8 @@
 `configs.curves`; all others reach them as they stand here.
 """
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 from annotated_types import Len
 
@@ -69,16 +69,6 @@ class Spline(Parameters):
     closed: bool = False
 
 
-if TYPE_CHECKING:
-    PathShape = Line | Cosine | Circle | FigureEight | Spline | Choice
-else:
-    PathShape = Annotated[
-        Line | Cosine | Circle | FigureEight | Spline,
-        Tagged("kind"),
-        AlsoOwn(Chooser(Kind.PATH, "kind", {})),
-    ]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class World(Parameters):
     """Offset fixed in world axes: R(θ_d0) l_i = (x, y), as in the paper's section 4."""
@@ -118,12 +108,26 @@ class Varying(Parameters):
 
 
 if TYPE_CHECKING:
+    PathShape = Line | Cosine | Circle | FigureEight | Spline | Choice
     Offset = World | Structure | Varying | Choice
 else:
-    Offset = Annotated[
-        World | Structure | Varying,
+    _PATHS = Line | Cosine | Circle | FigureEight | Spline
+    _OFFSETS = World | Structure | Varying
+
+    def _names(shapes):
+        """Values of the key `kind` that lead to a union of shapes."""
+        kinds = (kind for shape in get_args(shapes) for kind in fields(shape))
+        return frozenset(get_args(kind.type)[0] for kind in kinds if kind.name == "kind")
+
+    PathShape = Annotated[
+        _PATHS,
         Tagged("kind"),
-        AlsoOwn(Chooser(Kind.OFFSET, "kind", {})),
+        AlsoOwn(Chooser(Kind.PATH, "kind", {}), Kind.OFFSET, _names(_OFFSETS)),
+    ]
+    Offset = Annotated[
+        _OFFSETS,
+        Tagged("kind"),
+        AlsoOwn(Chooser(Kind.OFFSET, "kind", {}), Kind.PATH, _names(_PATHS)),
     ]
 
 AT_CENTRE = World(kind="world")

@@ -25,6 +25,7 @@ from typing import Any
 from configs.drives import Drive
 from configs.errors import ScenarioError
 from configs.parameters import Parameters
+from configs.shapes import OwnOffset, OwnPath
 from configs.signals import signals_fault
 from configs.wording import guess
 
@@ -90,16 +91,33 @@ def find(
     """
     if name in shipped:
         return Plugin(kind, name, shipped[name])
+    if name.partition(":")[0].endswith(".py"):
+        raise PluginError(
+            f'must be "{_module_form(name, kind)}", a module {place}, not the path of a file'
+        )
     if ":" in name:
         return Plugin(kind, name, name, folder)
     installed = entry_points(kind)
     if name in installed:
         return Plugin(kind, name, installed[name])
+    if other := _other_kind(kind, name):
+        raise PluginError(f"is a {other.word}, no {kind.word}")
     known = sorted({*shipped, *installed})
     raise PluginError(
         f"no such {kind.word}{guess(name, known)} (known: {', '.join(known)}; one of your own is"
         f' "{kind.form}", from module.py {place})'
     )
+
+
+def _module_form(name: str, kind: Kind) -> str:
+    """The name of a class whose file is given."""
+    file, _, path = name.partition(":")
+    return f"{Path(file).stem}:{path or kind.form.partition(':')[2]}"
+
+
+def _other_kind(kind: Kind, name: str) -> Kind | None:
+    """The kind of an installed plug-in that has this name, if it is another one."""
+    return next((one for one in Kind if one is not kind and name in entry_points(one)), None)
 
 
 def entry_points(kind: Kind) -> dict[str, str]:
@@ -128,7 +146,9 @@ def load(plugin: Plugin) -> Any:
             raise PluginError(f"{_where(module)} has no {path}{has}")
     fault = _FAULTS[plugin.kind](found)
     if fault is not None:
-        raise PluginError(f"{_where(module)}: {path} is no {plugin.kind.word}: {fault}")
+        others = [kind.word for kind in Kind if _FAULTS[kind](found) is None]
+        why = f"it is a {' or a '.join(others)}" if others else fault
+        raise PluginError(f"{_where(module)}: {path} is no {plugin.kind.word}: {why}")
     return found
 
 
@@ -242,7 +262,17 @@ def _is_of_protocol(law: type, name: str) -> bool:
     return owner is not None and getattr(owner, "_is_protocol", False)
 
 
-def _shape_fault(found: Any) -> str | None:
+def _path_fault(found: Any) -> str | None:
+    return _shape_fault(found, OwnOffset, Kind.OFFSET)
+
+
+def _offset_fault(found: Any) -> str | None:
+    return _shape_fault(found, OwnPath, Kind.PATH)
+
+
+def _shape_fault(found: Any, other: type, other_kind: Kind) -> str | None:
+    if isinstance(found, type) and issubclass(found, other):
+        return f"it is a {other_kind.word}"
     fault = _parameters_fault(found)
     if fault is not None:
         return fault
@@ -268,8 +298,8 @@ def _protocol_fault(row: Any) -> str | None:
 
 _FAULTS = {
     Kind.LAW: _law_fault,
-    Kind.PATH: _shape_fault,
-    Kind.OFFSET: _shape_fault,
+    Kind.PATH: _path_fault,
+    Kind.OFFSET: _offset_fault,
     Kind.DRIVE: _protocol_fault,
 }
 

@@ -132,6 +132,15 @@ def controller_signals(law: Sequence[Signal], hears: Sequence[str] = ()) -> tupl
     return (*USED_SIGNALS, *age_signals(hears), *own, *SENT_SIGNALS)
 
 
+def law_table(controller: Sequence[Signal]) -> tuple[Signal, ...]:
+    """The signals of the law alone in the row of a controller, without the errors (8)."""
+    return tuple(
+        signal
+        for signal in controller[len(USED_SIGNALS) : -len(SENT_SIGNALS)]
+        if signal.name not in _PATH_ERROR_NAMES and not signal.name.startswith(AGE_PREFIX)
+    )
+
+
 def signals_fault(law: object) -> str | None:
     """Why a law's table can't be recorded, None if it can."""
     if not isinstance(law, tuple):
@@ -144,7 +153,7 @@ def signals_fault(law: object) -> str | None:
         name, *about = signal
         if not _NAME.fullmatch(name):
             return f"SIGNALS: {name!r}: a name has letters, digits and single underscores"
-        if name.lower() in _TAKEN:
+        if name.lower() in _TAKEN or name.lower().startswith(AGE_PREFIX):
             return f"SIGNALS: {name} is recorded of every robot already; choose another name"
         if name.lower() in seen:
             return f"SIGNALS: {name} comes twice (upper and lower case are one in a record)"

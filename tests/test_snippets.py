@@ -21,7 +21,7 @@ PLACES = {"roles", "network", "robot"}
 
 
 TABLES = [
-    one for one in snippets("toml") if not one.text.startswith("# own.toml")
+    one for one in snippets("toml") if not one.text.startswith(("# own.toml", "# pyproject.toml"))
 ]  # runs elsewhere
 
 

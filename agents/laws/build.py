@@ -5,11 +5,12 @@ and an error in `hold` or a wrong number of signals is an error of the law, at t
 happens.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from math import isfinite
 from typing import Any, NamedTuple
 
 from agents.laws.dsc_terms import path_errors
-from agents.laws.failure import LawError, failure, number
+from agents.laws.failure import LawError, number, raised
 from agents.laws.interface import (
     Law,
     LawOutput,
@@ -17,6 +18,7 @@ from agents.laws.interface import (
     Reference,
     RobotMotion,
     RobotPath,
+    Signal,
     Wheels,
 )
 from configs.errors import ScenarioError
@@ -34,8 +36,14 @@ class BuiltLaw(NamedTuple):
     signals: int  # values of each step, path errors (8) among them
 
 
-def build(choice: Choice, wheels: Wheels, period_s: float, path: RobotPath) -> BuiltLaw:
-    """The law of a robot.
+def build(
+    choice: Choice,
+    wheels: Wheels,
+    period_s: float,
+    path: RobotPath,
+    note: Callable[[str], None] = lambda _: None,
+) -> BuiltLaw:
+    """The law of a robot; `note` is told once when a signal of a user's own law is not finite.
 
     Raises:
         ScenarioError: it can't be had, or raises when it is made.
@@ -44,19 +52,22 @@ def build(choice: Choice, wheels: Wheels, period_s: float, path: RobotPath) -> B
     try:
         law: Law = kind(choice.parameters, wheels, period_s, path)
     except (Exception, SystemExit) as error:
-        raise ScenarioError(f"control.law = {choice.name}: {failure(error)[1]}") from error
+        raise ScenarioError(f"control.law = {choice.name}: {raised(error)}") from error
     if choice.name in LAWS:
         return BuiltLaw(law.step, law.hold, len(kind.SIGNALS))
-    return _checked(law, len(kind.SIGNALS), adds=not gives_path_errors(kind.SIGNALS))
+    return _checked(law, kind.SIGNALS, lambda text: note(f"law {choice.name}: {text}"))
 
 
-def _checked(law: Law, expected: int, *, adds: bool) -> BuiltLaw:
-    """A law of the user's own; `adds`: the errors (8) are put before its signals."""
+def _checked(law: Law, table: Sequence[Signal], note: Callable[[str], None]) -> BuiltLaw:
+    """A law of the user's own; (8) is put before its signals unless it gives the errors itself."""
+    expected, adds = len(table), not gives_path_errors(table)
     failed = ""  # by `hold`, said at the next step
+    noted = False
 
     def step(
         state: Any, motion: RobotMotion, reference: Reference, along: PathVariable
     ) -> LawOutput:
+        nonlocal noted
         if failed:
             raise LawError(failed)
         out = law.step(state, motion, reference, along)
@@ -71,6 +82,9 @@ def _checked(law: Law, expected: int, *, adds: bool) -> BuiltLaw:
             ) from error
         if len(values) != expected:
             raise LawError(f"step returned {len(values)} signals, SIGNALS has {expected}")
+        if not noted and not all(map(isfinite, values)):
+            noted = True
+            note(_not_finite(table, values))
         if adds:
             errors = path_errors(*motion[:3], *reference[:3])
             return LawOutput(right, left, after, (*errors, *values))
@@ -81,7 +95,16 @@ def _checked(law: Law, expected: int, *, adds: bool) -> BuiltLaw:
         try:
             return law.hold(before, after)
         except (Exception, SystemExit) as error:
-            failed = f"in hold: {failure(error)[1]}"
+            failed = f"in hold: {raised(error)}"
             return before
 
     return BuiltLaw(step, hold, expected + 3 * adds)
+
+
+def _not_finite(table: Sequence[Signal], values: Sequence[float]) -> str:
+    each = [
+        f"{signal.name} = {value:g}"
+        for signal, value in zip(table, values, strict=True)
+        if not isfinite(value)
+    ]
+    return f"recorded as not finite: {', '.join(each)}"

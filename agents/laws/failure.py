@@ -16,15 +16,19 @@ class ShapeError(TypeError):
     """A path shape or a formation offset raises or gives no jet; the text says which, and why."""
 
 
-def failure(error: BaseException) -> tuple[str, str]:
-    """What became of a law or a path that raised, and how: arithmetic at its end, or a mistake."""
+def failure(error: BaseException, law: str) -> tuple[str, str]:
+    """What became of a path or the law of this name, and the error that it raised.
+
+    Arithmetic of Fleetloop's own code raises where the motion diverges; of other code it isn't
+    known why it raises, whatever the type of the error.
+    """
     if isinstance(error, ShapeError):
         return "the path failed", str(error)
     if isinstance(error, LawError):
-        return "the law failed", str(error)
-    if isinstance(error, DIVERGED):
-        return "the law diverged", f"{place_of(error)}{error}"
-    return "the law failed", raised(error)
+        return f"law {law} failed", str(error)
+    if isinstance(error, DIVERGED) and not place_of(error):
+        return f"law {law} diverged", str(error)
+    return f"law {law} failed", raised(error)
 
 
 def raised(error: BaseException) -> str:

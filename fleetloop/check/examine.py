@@ -1,12 +1,14 @@
 """All checks of a scenario in order."""
 
+from configs.errors import ScenarioError
 from configs.overrides import Overrides
 from configs.resolve import robot_briefs
 from configs.scenario import Scenario
 from fleetloop.check.bus_load import bus_findings
 from fleetloop.check.coordination import forecast
 from fleetloop.check.course import courses, refuse_irregular
-from fleetloop.check.finding import Finding, alike
+from fleetloop.check.derivatives import derivative_findings
+from fleetloop.check.finding import Finding, alike, worst
 from fleetloop.check.graph import graph_findings
 from fleetloop.check.law import law_findings
 from fleetloop.check.sampling import sampling_findings
@@ -23,11 +25,18 @@ def examine(source: str, scenario: Scenario, overrides: Overrides = ()) -> list[
         ScenarioError: a robot's path isn't regular.
     """
     ahead = forecast(scenario)
-    refuse_irregular(source, scenario, ahead, overrides)
+    shapes = list(derivative_findings(scenario, ahead))
+    try:
+        refuse_irregular(source, scenario, ahead, overrides)
+    except ScenarioError:
+        if worst(shapes) == "error":  # by derivatives that are wrong
+            return shapes
+        raise
     along = courses(scenario, ahead)
     return alike(
         [
             *graph_findings(scenario, ahead),
+            *shapes,
             *sampling_findings(scenario, along),
             *torque_findings(scenario, along),
             *start_findings(scenario, ahead),

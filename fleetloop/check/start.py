@@ -87,7 +87,7 @@ def _start(
         try:
             out = law.step(memory, motion, path(along[0]), PathVariable(*along))
         except (Exception, SystemExit) as error:
-            how, why = failure(error)
+            how, why = failure(error, control.name)
             seen.diverged_at_s, seen.failed = tick * h, f"{how}: {why}"
             return seen
         asked = max(abs(out.tau_right), abs(out.tau_left))

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from configs.signals import Signal
 from fleetloop.record import schema
 from fleetloop.record.scan import RecordError, scan
 from fleetloop.record.schema import Kind
@@ -22,6 +23,8 @@ class Record:
     robots: tuple[str, ...]
     plant: dict[str, np.ndarray]
     controller: dict[str, np.ndarray]
+    signals: dict[str, tuple[Signal, ...]]
+    """The table of each controller's rows: names, units and meanings."""
     scenario_toml: str
     lost: str
     """The missing part, and the cause; empty for a complete, undamaged record."""
@@ -59,7 +62,8 @@ class Record:
 
         plant, controller = rows(Kind.PLANT), rows(Kind.CONTROLLER)
         toml = found.head.scenario_toml
-        return cls(path, layout.robots, plant, controller, toml, found.lost)
+        signals = dict(zip(layout.robots, layout.controllers, strict=True))
+        return cls(path, layout.robots, plant, controller, signals, toml, found.lost)
 
     def shortage(self) -> str:
         """The missing part and the extent of the rest; empty for a complete record."""

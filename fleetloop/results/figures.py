@@ -3,30 +3,39 @@
     fig3  the directed graph                     fig8  path parameter errors s_i − s_j over edges
     fig4  positions and orientations             s, v_r_hat, torques: what the fleet agreed on and
     fig5, fig6, fig7  x_e, y_e, θ_e                    what it cost
+    law_signals  whatever else the laws record   clock  lateness and round trips, in real time
 
-Robots differ by dash pattern and by lightness, so the figures stay readable in grey.
+Lines, colours and panels are `fleetloop.results.drawing`'s.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from configs.scenario import Scenario
+from configs.signals import law_table
 from fleetloop.record.reader import Record
+from fleetloop.results.drawing import (
+    COLOURS,
+    DPI,
+    HEIGHT_IN,
+    WIDTH_IN,
+    axes_of,
+    drawable,
+    envelope,
+    legend,
+    over_time,
+    stride,
+    style_of,
+)
 from fleetloop.results.graph_drawing import drawn
-from fleetloop.settling import settled_from
 
-WIDTH_IN, HEIGHT_IN, DPI = 6.4, 3.6, 150
-_COLOURS = ("#08306b", "#d95f02", "#1b9e77", "#9e2a8c", "#7f7f7f", "#b8860b")
-_DASHES: tuple[object, ...] = ("-", (0, (6, 2)), (0, (2, 1.2)), (0, (7, 2, 1.5, 2)))
-_POINTS = 1500
-_DRAWABLE = 1e30
-"""Of a motion that diverged only what is smaller is drawn: axes can't be laid out beyond."""
+_COLUMNS, _PANEL_IN, _TITLE_IN, _STRETCHES = 3, 1.1, 0.5, 300
+"""Of the figure of the laws' signals."""
 _STYLE: Any = {
     "font.size": 9,
     "axes.grid": True,
@@ -53,7 +62,11 @@ def all_figures(record: Record, scenario: Scenario) -> list[Captioned]:
     Each robot is drawn up to its own end; an edge's difference while both its ends are there.
     """
     with mpl.rc_context(_STYLE), np.errstate(all="ignore"):
-        chosen = [*_FIGURES, _CLOCK] if scenario.clock.mode == "realtime" else _FIGURES
+        chosen = list(_FIGURES)
+        if any(map(law_table, record.signals.values())):
+            chosen.append(_LAW)
+        if scenario.clock.mode == "realtime":
+            chosen.append(_CLOCK)
         return [Captioned(name, caption, draw(record, scenario)) for name, caption, draw in chosen]
 
 
@@ -68,17 +81,17 @@ def graph(_: Record, scenario: Scenario) -> Figure:
 
 def positions(record: Record, _: Scenario) -> Figure:
     """Tracks in the plane with the heading at regular times, over the reference paths."""
-    figure, axes = _axes(height_in=4.6)
+    figure, axes = axes_of(height_in=4.6)
     for n, robot in enumerate(record.robots):
         truth, used = record.plant[robot], record.controller[robot]
         if not len(truth):
             continue
-        colour, dash = _style(n)
-        pick = _stride(len(used))
-        x, y = _drawable(used["x_d_m"][pick]), _drawable(used["y_d_m"][pick])
+        colour, dash = style_of(n)
+        pick = stride(len(used))
+        x, y = drawable(used["x_d_m"][pick]), drawable(used["y_d_m"][pick])
         axes.plot(x, y, color="0.75", linewidth=2.6, zorder=1)
-        pick = _stride(len(truth))
-        x, y = _drawable(truth["x_m"]), _drawable(truth["y_m"])
+        pick = stride(len(truth))
+        x, y = drawable(truth["x_m"]), drawable(truth["y_m"])
         axes.plot(x[pick], y[pick], color=colour, linestyle=dash, label=robot)
         at = np.linspace(0, len(truth) - 1, 9).astype(int)
         heading = truth["theta_rad"][at]
@@ -97,7 +110,7 @@ def positions(record: Record, _: Scenario) -> Figure:
     axes.plot([], [], color="0.75", linewidth=2.6, label="reference")
     axes.set(xlabel="x [m]", ylabel="y [m]", title="Positions and orientations; dots: start")
     axes.set_aspect("equal", adjustable="datalim")
-    _legend(axes, len(record.robots) + 1)
+    legend(axes, len(record.robots) + 1)
     return figure
 
 
@@ -109,7 +122,7 @@ def error_of(signal: str, symbol: str, unit: str) -> Callable[[Record, Scenario]
 
     def draw(record: Record, _: Scenario) -> Figure:
         series = {robot: rows[signal] for robot, rows in record.controller.items()}
-        return _over_time(
+        return over_time(
             record, series, f"Path following error {symbol}", f"{symbol} [{unit}]", zoom=True
         )
 
@@ -123,19 +136,19 @@ def parameter_errors(record: Record, scenario: Scenario) -> Figure:
     for speaker, hearer in scenario.topology.edges:
         both = min(len(s[hearer]), len(s[speaker]))
         series[f"{hearer} − {speaker}"] = s[hearer][:both] - s[speaker][:both]
-    return _over_time(record, series, "Path parameter errors", "s$_i$ − s$_j$ [m]", zoom=True)
+    return over_time(record, series, "Path parameter errors", "s$_i$ − s$_j$ [m]", zoom=True)
 
 
 def path_variables(record: Record, _: Scenario) -> Figure:
     """The path variable of every robot."""
     series = {robot: rows["s"] for robot, rows in record.controller.items()}
-    return _over_time(record, series, "Path variables", "s [m]")
+    return over_time(record, series, "Path variables", "s [m]")
 
 
 def speed_estimates(record: Record, scenario: Scenario) -> Figure:
     """v̂_r of every robot and the leader's speed."""
     series = {robot: rows["v_r_hat"] for robot, rows in record.controller.items()}
-    figure = _over_time(record, series, "Estimates of the reference speed", "v̂$_r$ [m/s]")
+    figure = over_time(record, series, "Estimates of the reference speed", "v̂$_r$ [m/s]")
     axes = figure.axes[0]
     end = max(rows["t_s"][-1] for rows in record.controller.values() if len(rows))
     steps = [(0.0, scenario.leader.speed_m_s)]
@@ -144,7 +157,7 @@ def speed_estimates(record: Record, scenario: Scenario) -> Figure:
     axes.step(times, speeds, where="post", color="black", linewidth=0.8, label="leader v$_r$")
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, 0.0), max(high, 1e-3))
-    _legend(axes, len(series) + 1)
+    legend(axes, len(series) + 1)
     return figure
 
 
@@ -155,8 +168,8 @@ def torques(record: Record, _: Scenario) -> Figure:
     for axes, side in ((upper, "right"), (lower, "left")):
         for n, robot in enumerate(record.robots):
             rows = record.controller[robot]
-            colour, dash = _style(n)
-            t, values = _envelope(rows["t_s"], rows[f"tau_{side}_wheel_N_m"])
+            colour, dash = style_of(n)
+            t, values = envelope(rows["t_s"], rows[f"tau_{side}_wheel_N_m"])
             axes.plot(t, values, color=colour, linestyle=dash, linewidth=1.0, label=robot)
         commanded = (np.abs(rows[f"tau_{side}_wheel_N_m"]) for rows in record.controller.values())
         peak = max(float(values.max(initial=0.0)) for values in commanded)
@@ -165,7 +178,42 @@ def torques(record: Record, _: Scenario) -> Figure:
         axes.set(ylabel=f"τ {side} [N·m]")
     upper.set_title("Commanded wheel torques")
     lower.set_xlabel("t [s]")
-    _legend(upper, len(record.robots))
+    legend(upper, len(record.robots))
+    return figure
+
+
+def law_signals(record: Record, _: Scenario) -> Figure:
+    """What the laws record beside the errors (8): a panel for each signal, a line per robot."""
+    units = {one.name: one.unit for table in record.signals.values() for one in law_table(table)}
+    rows = -(-len(units) // _COLUMNS)
+    height_in = _TITLE_IN + _PANEL_IN * rows
+    figure = Figure(figsize=(WIDTH_IN, height_in), dpi=DPI)
+    figure.subplots_adjust(  # a computed layout of many panels takes long
+        left=0.09,
+        right=0.88,
+        bottom=0.3 / height_in,
+        top=1.0 - 0.5 / height_in,
+        wspace=0.4,
+        hspace=0.6,
+    )
+    panels = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False).ravel()
+    figure.suptitle("Signals of the laws, over t [s]", fontsize=10, y=1.0 - 0.1 / height_in)
+    for axes, (name, unit) in zip(panels, units.items(), strict=False):
+        for n, robot in enumerate(record.robots):
+            series = record.controller[robot]
+            if name in (series.dtype.names or ()):
+                colour, dash = style_of(n)
+                t, values = envelope(series["t_s"], series[name], _STRETCHES)
+                axes.plot(t, values, color=colour, linestyle=dash, linewidth=0.8, label=robot)
+        axes.set_title(f"{name} [{unit}]", fontsize=7)
+        axes.tick_params(labelsize=6)
+    for axes in panels[len(units) :]:
+        axes.set_axis_off()
+    known = {
+        str(line.get_label()): line for axes in panels[: len(units)] for line in axes.get_lines()
+    }
+    order = [robot for robot in record.robots if robot in known]
+    figure.legend([known[robot] for robot in order], order, loc="upper right", fontsize=7)
     return figure
 
 
@@ -178,96 +226,14 @@ def clock_figures(record: Record, _: Scenario) -> Figure:
         values = np.concatenate([rows[signal] for rows in record.controller.values()])
         values = np.clip(values[np.isfinite(values)] * 1e6, 1.0, 1e12)
         bins = np.geomspace(1.0, values.max(initial=10.0), 60)
-        axes.hist(values, bins=bins, color=_COLOURS[0])
+        axes.hist(values, bins=bins, color=COLOURS[0])
         for share, dash in ((50, "-"), (99, "--"), (99.9, ":")) if len(values) else ():
             at = float(np.percentile(values, share))
-            axes.axvline(at, color=_COLOURS[1], linestyle=dash, label=f"p{share:g} {at:.0f} µs")
+            axes.axvline(at, color=COLOURS[1], linestyle=dash, label=f"p{share:g} {at:.0f} µs")
         axes.set(xscale="log", yscale="log", title=title, xlabel="µs", ylabel="ticks")
         if len(values):
             axes.legend(fontsize=7)
     return figure
-
-
-# --- helpers --------------------------------------------------------------------------------------
-
-
-def _over_time(
-    record: Record,
-    series: Mapping[str, np.ndarray],
-    title: str,
-    ylabel: str,
-    *,
-    zoom: bool = False,
-) -> Figure:
-    """One line per entry; with `zoom`, a second panel from when all are within the settle band."""
-    t = max((rows["t_s"] for rows in record.controller.values()), key=len)
-    settled = _settled(list(series.values())) if zoom else None
-    if not settled or t[-1] - t[settled] < 0.1 * t[-1]:
-        figure, whole = _axes()
-        panels = [(whole, 0)]
-    else:
-        figure = Figure(figsize=(WIDTH_IN, HEIGHT_IN), dpi=DPI, layout="constrained")
-        whole, close = figure.subplots(1, 2, width_ratios=(3, 2))
-        close.set_title(f"from {t[settled]:.1f} s on", fontsize=9)
-        close.set_xlabel("t [s]")
-        panels = [(whole, 0), (close, settled)]
-    for n, (name, values) in enumerate(series.items()):
-        colour, dash = _style(n)
-        for axes, first in panels:
-            x, y = _envelope(t[first : len(values)], values[first:])
-            axes.plot(x, y, color=colour, linestyle=dash, label=name)
-    whole.set(xlabel="t [s]", ylabel=ylabel, title=title)
-    _legend(panels[-1][0], len(series))
-    return figure
-
-
-def _settled(series: Sequence[np.ndarray]) -> int | None:
-    """The first index from which all stay within the settle band, None if they don't."""
-    last = max(map(settled_from, series), default=0)
-    longest = max((len(values) for values in series), default=0)
-    return last if last < longest - 2 else None
-
-
-def _drawable(values: np.ndarray) -> np.ndarray:
-    """NaN for what can't be drawn."""
-    return np.where(np.abs(values) < _DRAWABLE, values, np.nan)
-
-
-def _envelope(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Few enough points to draw, with every peak: smallest and largest value of each stretch."""
-    values = _drawable(values)
-    stretch = len(values) // _POINTS
-    if stretch < 3:
-        return t, values
-    count = len(values) // stretch
-    blocks = values[: count * stretch].reshape(count, stretch)
-    first = np.arange(count) * stretch
-    chosen = np.stack([first + blocks.argmin(axis=1), first + blocks.argmax(axis=1)])
-    index = np.append(np.sort(chosen, axis=0).T.ravel(), len(values) - 1)
-    return t[index], values[index]
-
-
-def _stride(length: int) -> slice:
-    return slice(None, None, max(1, length // _POINTS))
-
-
-def _style(n: int) -> tuple[str, object]:
-    return _COLOURS[n % len(_COLOURS)], _DASHES[(n + n // len(_COLOURS)) % len(_DASHES)]
-
-
-def _axes(height_in: float = HEIGHT_IN) -> tuple[Figure, Axes]:
-    figure = Figure(figsize=(WIDTH_IN, height_in), dpi=DPI, layout="constrained")
-    return figure, figure.subplots()
-
-
-def _legend(axes: Axes, entries: int) -> None:
-    axes.legend(
-        loc="center left",
-        bbox_to_anchor=(1.0, 0.5),
-        ncols=1 + (entries - 1) // 14,
-        handlelength=2.8,
-        frameon=False,
-    )
 
 
 _FIGURES: Sequence[tuple[str, str, Callable[[Record, Scenario], Figure]]] = (
@@ -289,4 +255,5 @@ _FIGURES: Sequence[tuple[str, str, Callable[[Record, Scenario], Figure]]] = (
     ("speed_estimates", "Estimates of the reference speed, equation (38).", speed_estimates),
     ("torques", "Commanded wheel torques, equation (34).", torques),
 )
+_LAW = ("law_signals", "What the robots' laws record of themselves.", law_signals)
 _CLOCK = ("clock", "How the wall clock was kept: all ticks of all controllers.", clock_figures)

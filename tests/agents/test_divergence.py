@@ -38,7 +38,9 @@ def test_a_path_that_stands_still_stops_the_robot_and_names_the_place() -> None:
     for _ in range(50):
         assert set_points(bench.tick()) in ([ZERO, ZERO], [])
     assert bench.phase is Phase.STOPPED
-    assert bench.why == "tick 0 (t = 0.000 s): the law diverged at s = 0 m: float division by zero"
+    assert bench.why == (
+        "tick 0 (t = 0.000 s): law adaptive_dsc diverged at s = 0 m: float division by zero"
+    )
     rows = rows_of(bench)
     assert [row["t_s"] for row in rows] == pytest.approx([0.002 * k for k in range(50)])
     assert isnan(rows[-1]["x_d_m"])

@@ -64,7 +64,7 @@ def test_figures_are_there_and_not_empty(finished_run: Path) -> None:
 
 def test_the_page_stands_alone_and_says_the_verdict(finished_run: Path) -> None:
     page = (finished_run / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 9
+    assert page.count("data:image/png;base64,") == 10
     assert 'class="verdict held"' in page
     assert "<script" not in page
     assert "http://" not in page

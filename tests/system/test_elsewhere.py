@@ -5,28 +5,33 @@ import secrets
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
 from support.addresses import free_port, multicast_bus, multicast_goes_nowhere
 from support.certificates import certificates
-from support.processes import Run
+from support.own_files import write_own_at_100_hz
+from support.processes import Run, completed
 
 from fleetloop.record.reader import Record
 
 pytestmark = [pytest.mark.system, pytest.mark.wall_clock]
 SCENARIO = ("two_robots_100hz", "--set", "expect=[]")
+SHORT = ("--duration", "1")
 
 
 class Agent:
     """A `fleetloop agent` that is going on."""
 
-    def __init__(self, robot: str, deployment: Path, *args: str) -> None:
+    def __init__(
+        self, robot: str, deployment: Path, *args: str, scenario: Sequence[str] = SCENARIO
+    ) -> None:
         self.process = subprocess.Popen(
             [
-                *(sys.executable, "-m", "fleetloop", "agent", SCENARIO[0], robot, *SCENARIO[1:]),
+                *(sys.executable, "-m", "fleetloop", "agent", scenario[0], robot, *scenario[1:]),
                 *("--deployment", str(deployment), *args),
             ],
             stderr=subprocess.PIPE,
@@ -90,6 +95,19 @@ def test_a_controller_elsewhere_drives_its_robot_to_the_end_of_the_run(tmp_path,
         assert rows["tick"].tolist() == list(range(300))
     assert set(run.summary()["realtime"]["robots"]) == {"r1", "r2"}
     assert "router" not in run.summary()["notices"]
+
+
+def test_a_controller_elsewhere_runs_a_law_of_the_users_own(tmp_path, agents) -> None:
+    scenario, where = str(write_own_at_100_hz(tmp_path)), with_password(tmp_path)
+    agents.append(Agent("r2", where, scenario=[scenario]))
+    status, out = completed(tmp_path / "run", scenario, "--deployment", str(where), *SHORT)
+    assert status == 0, out
+    status, said = agents[0].end()
+    assert (status, "end of the run" in said) == (0, True), said
+    rows = Record.open(tmp_path / "run" / "record.mcap").controller["r2"]
+    off = np.hypot(rows["x_e_m"], rows["y_e_m"])
+    assert len(rows) == 100
+    assert np.allclose(rows["distance_m"], off, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.skipif(multicast_goes_nowhere(), reason="no route for multicast here")

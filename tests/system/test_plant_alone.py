@@ -15,6 +15,7 @@ import psutil
 import pytest
 from odrive_can import CanMsg, ODriveCAN
 from odrive_can.odrive import DriveError
+from support.own_files import write_own_at_100_hz
 
 from fleetloop.testing import EmulatedPlant, PlantError
 
@@ -72,6 +73,16 @@ async def drive_left_wheel(plant: EmulatedPlant) -> None:
             axis.check_errors()
         finally:
             axis.stop()
+
+
+def test_the_fixture_takes_a_scenario_with_a_law_of_the_users_own(
+    fleetloop_plant, tmp_path: Path
+) -> None:
+    scenario = write_own_at_100_hz(tmp_path)
+    plant = fleetloop_plant(scenario, robots=["r1"], overrides=["control.k_x_1_s=3.0"])
+    assert plant.poses()["r1"].x_m == pytest.approx(3.02)
+    with pytest.raises(PlantError, match=r"control\.k_x_1_s=-3\.0: must be greater than 0"):
+        fleetloop_plant(scenario, overrides=["control.k_x_1_s=-3.0"])
 
 
 def test_a_client_that_falls_silent_is_disarmed_by_the_watchdog(fleetloop_plant) -> None:

@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from agents.laws.adaptive_dsc import AdaptiveDsc
 from configs.loading import load
 from configs.sections import Expect
+from configs.signals import PATH_ERRORS
 from fleetloop.record.reader import Record
 from fleetloop.results.figures import all_figures
 from fleetloop.results.summary import RunStats, Summary, settle_s, summarise, to_json
@@ -131,13 +133,24 @@ def test_figures_show_every_robot_up_to_its_own_end(uneven_run: Path) -> None:
     assert edge.get_xdata()[-1] == record.controller["r2"]["t_s"][-1]
 
 
+def test_every_signal_of_the_law_has_a_panel_with_its_unit(uneven_run: Path) -> None:
+    record = Record.open(uneven_run / "record.mcap")
+    figures = {item.name: item.figure for item in all_figures(record, load("two_robots"))}
+    panels = {axes.get_title(): axes for axes in figures["law_signals"].axes if axes.lines}
+    own = [signal for signal in AdaptiveDsc.SIGNALS if signal not in PATH_ERRORS]
+    assert list(panels) == [f"{signal.name} [{signal.unit}]" for signal in own]
+    for axes in panels.values():
+        ends = [line.get_xdata()[-1] for line in axes.lines]
+        assert ends == [record.controller[robot]["t_s"][-1] for robot in ("r1", "r2")]
+
+
 def test_figures_bear_a_robot_without_any_row(uneven_run: Path) -> None:
     record = Record.open(uneven_run / "record.mcap")
     record.plant["r2"], record.controller["r2"] = (
         record.plant["r2"][:0],
         record.controller["r2"][:0],
     )
-    assert len(all_figures(record, load("two_robots"))) == 9
+    assert len(all_figures(record, load("two_robots"))) == 10
 
 
 def test_what_is_no_number_is_null_in_the_file_and_said_in_the_table() -> None:
