@@ -79,6 +79,8 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> str:
     link.subscribe(keys.pose(name, robot), "pose")
     for edge in brief.hears:
         link.subscribe(keys.path(name, edge.speaker), f"path/{edge.speaker}")
+    for other in brief.located:
+        link.subscribe(keys.pose(name, other), f"place/{other}")
     link.subscribe(keys.go(name), "go")
     if brief.leader_link is not None:
         link.subscribe(keys.leader_speed(name), "leader")

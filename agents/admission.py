@@ -63,18 +63,19 @@ class Admission:
             self._newest_ns[robot] = state.t_ns
         return True
 
-    def admits_pose(self, fix: PoseFix) -> bool:
-        """Whether a pose is plausible; one that isn't is counted."""
+    def admits_pose(self, fix: PoseFix, robot: str = "") -> bool:
+        """Whether a pose is plausible, of this robot or another; one that isn't is counted."""
+        sender = f"{LOCALISATION}, of {robot}" if robot else LOCALISATION
         if fix.tick < 0 <= self.tick:
-            return self._late(LOCALISATION)
-        wrong = self._pose_date(fix)
+            return self._late(sender)
+        wrong = self._pose_date(fix, sender)
         if wrong is None and not within_world(fix.x_m, fix.y_m, fix.theta_rad):
             wrong = "reach", f"({fix.x_m:.6g} m, {fix.y_m:.6g} m, {fix.theta_rad:.6g} rad)"
         if wrong is not None:
-            self.refusals.note("pose", LOCALISATION, *wrong)
+            self.refusals.note("pose", sender, *wrong)
             return False
         if fix.tick >= 0:
-            self._newest_ns[LOCALISATION] = fix.t_ns
+            self._newest_ns[sender] = fix.t_ns
         return True
 
     def admits_leader_speed(self, speed: LeaderSpeed) -> bool:
@@ -108,7 +109,7 @@ class Admission:
             return self._distance(t_ns) or self._order(t_ns, self._newest_ns.get(robot))
         return self._due(tick) or self._order(t_ns, self._newest_ns.get(robot))
 
-    def _pose_date(self, fix: PoseFix) -> tuple[str, str] | None:
+    def _pose_date(self, fix: PoseFix, sender: str) -> tuple[str, str] | None:
         tick, t_ns = fix.tick, fix.t_ns
         if tick < 0:
             return None
@@ -119,7 +120,7 @@ class Admission:
         if not self._schedule.localises(tick):
             return "tick", f"no pose is taken at tick {tick}"
         wrong = self._due(tick, self._delay_ticks)
-        return wrong or self._order(t_ns, self._newest_ns.get(LOCALISATION))
+        return wrong or self._order(t_ns, self._newest_ns.get(sender))
 
     def _due(self, tick: int, delay_ticks: int = 0) -> tuple[str, str] | None:
         """In lockstep: a reason if the tick is over or too far ahead, None otherwise."""

@@ -31,7 +31,7 @@ from typing import Any
 
 from agents.admission import Admission
 from agents.coordination import CoordinationState, Coordinator
-from agents.emulated_network import EmulatedNetwork
+from agents.emulated_network import HERE, EmulatedNetwork
 from agents.guard import UNCHANGED, Guard, Phase, TorqueOutcome
 from agents.laws.build import build
 from agents.laws.failure import DIVERGED, failure
@@ -71,6 +71,7 @@ class Agent:
         self._no_signals = (nan,) * law.signals
         self._law_state: Any = None  # the law's own
         self._pose_delay = brief.schedule.pose_delay_ticks
+        self._place_delay = brief.schedule.place_delay_ticks
         self.network = self._network = EmulatedNetwork(brief) if brief.channels else None
         """The emulated edges to this robot; None if none has effects."""
         self._history = self._pose_history(brief)
@@ -128,6 +129,13 @@ class Agent:
             self._start_fix = fix
         else:
             self._fixes[fix.tick] = fix
+        if self._network is not None:
+            self._network.receive_place(HERE, fix)
+
+    def receive_place(self, robot: str, fix: PoseFix) -> None:
+        """Store the pose of an in-neighbour for the emulated network; the controller has no use."""
+        if self._network is not None and self._admission.admits_pose(fix, robot):
+            self._network.receive_place(robot, fix)
 
     def receive_path_state(self, robot: str, state: PathState) -> None:
         """Store the path state of an in-neighbour; ticks below 0: its start value."""
@@ -159,7 +167,7 @@ class Agent:
             missing.append("the localisation system")
         if self._leader is None and self.brief.leader_link is not None:
             missing.append("the leader")
-        return missing
+        return missing + (self._network.missing_to_start() if self._network is not None else [])
 
     def missing(self, tick: int) -> list[str]:
         """Messages that are due at this tick by the schedule and have not arrived."""
@@ -167,6 +175,9 @@ class Agent:
         pose_tick = tick - self._pose_delay
         if self._schedule.localises(pose_tick) and pose_tick not in self._fixes:
             missing.append("pose")
+        place_tick = tick - self._place_delay
+        if self._network is not None and self._schedule.localises(place_tick):
+            missing += self._network.missing(place_tick)
         if self._schedule.shares(tick):
             heard = self._path_states.get(tick, {})
             missing += [
@@ -227,6 +238,7 @@ class Agent:
     ) -> RobotMotion:
         """Apply what the emulated network delivers at this tick."""
         now_ns = tick * self._schedule.period_ns
+        network.measure(tick if self._realtime else tick - self._place_delay)
         for robot, state in network.path_states(now_ns):
             self._neighbours.receive(robot, state.t_ns, state.s, state.v_hat)
         fix = network.newest_pose(now_ns)

@@ -7,10 +7,14 @@ when it really arrives, if that is later.
 
 The leader's speed profile is one message. Its emulated edge carries v_r at every share instead, and
 the last speed that arrived is held.
+
+Where effects depend on the distance between two robots, the poses of the other one come here as
+well, from the localisation system, and nowhere else: the controller doesn't know them. A message is
+sent from as far as the robots were apart at the last poses that both have.
 """
 
 from collections.abc import Mapping
-from math import nan
+from math import hypot, nan
 
 from bridge.netem.channel import Channel
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
@@ -18,11 +22,28 @@ from configs.brief import AgentBrief
 from configs.edges import LEADER
 from configs.netem import LOCALISATION
 
+EARLY = -1
+"""Tick of what is said before the start."""
+HERE = ""
+"""This robot among those that have poses."""
+
 
 class EmulatedNetwork:
     """The channels of one robot; sources without effects have none."""
 
-    __slots__ = ("_fixes", "_leader", "_paths", "_schedule", "_silence_ns", "_v_r", "_v_r_ns")
+    __slots__ = (
+        "_distances_m",
+        "_fixes",
+        "_leader",
+        "_located",
+        "_paths",
+        "_places",
+        "_poses",
+        "_schedule",
+        "_silence_ns",
+        "_v_r",
+        "_v_r_ns",
+    )
 
     def __init__(self, brief: AgentBrief) -> None:
         age_limit_ns = round(brief.coordination.age_limit_s * 1e9)
@@ -40,6 +61,10 @@ class EmulatedNetwork:
         self._schedule = brief.schedule
         self._silence_ns = round(brief.coordination.silence_limit_s * 1e9)
         self._v_r, self._v_r_ns = nan, 0
+        self._located = brief.located
+        self._poses: dict[int, dict[str, PoseFix]] = {}  # by tick, until due
+        self._places: dict[str, PoseFix] = {}  # the newest of each robot
+        self._distances_m = dict.fromkeys(brief.located, nan)
 
     def carries_path_of(self, robot: str) -> bool:
         """Whether the path states of a robot go through a channel."""
@@ -52,12 +77,40 @@ class EmulatedNetwork:
 
     def send_path_state(self, robot: str, state: PathState) -> None:
         """Hand a path state to its channel, at its date."""
-        self._paths[robot].send(state.t_ns, state)
+        self._paths[robot].send(state.t_ns, state, self._distances_m.get(robot, 0.0))
 
     def send_pose(self, fix: PoseFix) -> None:
         """Hand a pose to its channel, at its date."""
         if self._fixes is not None:
             self._fixes.send(fix.t_ns, fix)
+
+    def missing_to_start(self) -> list[str]:
+        """Robots whose start pose has not arrived, though effects depend on their distance."""
+        start = self._poses.get(EARLY, {})
+        return [f"the pose of {robot}" for robot in self._located if robot not in start]
+
+    def missing(self, tick: int) -> list[str]:
+        """Robots whose pose of this tick has not arrived, though effects depend on it."""
+        poses = self._poses.get(tick, {})
+        return [f"pose of {robot}" for robot in self._located if robot not in poses]
+
+    def receive_place(self, robot: str, fix: PoseFix) -> None:
+        """Store the pose of an in-neighbour, or of this robot (`HERE`), until it is due."""
+        if self._located:
+            self._poses.setdefault(max(fix.tick, EARLY), {})[robot] = fix
+
+    def measure(self, tick: int) -> None:
+        """Measure the distances to in-neighbours by the newest poses up to this tick."""
+        due = sorted(at for at in self._poses if at <= tick)
+        for at in due:
+            self._places |= self._poses.pop(at)
+        here = self._places.get(HERE)
+        if not due or here is None:
+            return
+        for robot in self._located:
+            if (there := self._places.get(robot)) is not None:
+                apart_m = hypot(there.x_m - here.x_m, there.y_m - here.y_m)
+                self._distances_m[robot] = apart_m
 
     def path_states(self, now_ns: int) -> list[tuple[str, PathState]]:
         """The path states that are due, in the order of names."""

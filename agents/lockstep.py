@@ -34,7 +34,11 @@ BUS_SHARE = 2.0
 """Multiple of the tick deadline for the wait for the bus: the plant reports its own faults
 first."""
 
-_KINDS_AND_SENDERS = {"pose": ("pose", LOCALISATION), "leader": ("speed", LEADER)}
+_KINDS_AND_SENDERS = {
+    "pose": ("pose", LOCALISATION),
+    "place": ("pose", LOCALISATION),
+    "leader": ("speed", LEADER),
+}
 
 
 @dataclass(slots=True)
@@ -205,6 +209,8 @@ def deliver(agent: Agent, arrival: Arrival) -> None:
             agent.receive_path_state(robot, state)
         case "pose" if (fix := PoseFix.decode(arrival.payload)) is not None:
             agent.receive_pose(fix)
+        case "place" if (fix := PoseFix.decode(arrival.payload)) is not None:
+            agent.receive_place(robot, fix)
         case "leader" if (speed := LeaderSpeed.decode(arrival.payload)) is not None:
             agent.receive_leader_speed(speed)
         case "go":

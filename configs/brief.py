@@ -11,6 +11,7 @@ and learns the rest. Angles are radians, wheels in the order (right, left), time
 nanoseconds.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
 
@@ -85,7 +86,16 @@ class Schedule:
 
     def owes(self, tick: int) -> bool:
         """Whether a pose or path states are due at this tick."""
-        return self.shares(tick) or self.localises(tick - self.pose_delay_ticks)
+        return (
+            self.shares(tick)
+            or self.localises(tick - self.pose_delay_ticks)
+            or self.localises(tick - self.place_delay_ticks)
+        )
+
+    @property
+    def place_delay_ticks(self) -> int:
+        """Delay of other robots' poses to the emulated network: a tick or more."""
+        return max(self.pose_delay_ticks, 1)
 
     def when(self, tick: int) -> str:
         """A tick in words."""
@@ -137,6 +147,11 @@ class ChannelModel(Effects):
     seed: str  # of its random streams
 
 
+def located(channels: Iterable[ChannelModel]) -> tuple[str, ...]:
+    """Robots whose poses the emulated network needs: effects depend on the distance to them."""
+    return tuple(model.source for model in channels if model.distance is not None)
+
+
 @dataclass(frozen=True, slots=True)
 class AgentBrief:
     """Everything that the controller process of one robot receives at its start."""
@@ -162,6 +177,11 @@ class AgentBrief:
     network: NetworkLink
     detached: bool = False  # no launcher is its parent: the run's end is when the launcher's
     # token on the network goes
+
+    @property
+    def located(self) -> tuple[str, ...]:
+        """In-neighbours whose poses the emulated network needs."""
+        return located(self.channels)
 
 
 # --- the plant ------------------------------------------------------------------------------------

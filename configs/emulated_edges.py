@@ -61,6 +61,9 @@ def emulation_problems(network: Network, graph: Graph) -> Iterator[Problem]:
         for text in entry.edges:
             if problem := _problem_of(text, edges, graph.robots):
                 yield Problem(f"network.edge.{n}.edges", text, problem)
+            elif entry.distance is not None and text.partition(" ")[0] in SOURCES:
+                remedy = "only between robots: the source of this edge has no place"
+                yield Problem(f"network.edge.{n}.distance", text, remedy)
 
 
 def _problem_of(text: str, edges: Sequence[EmulatedEdge], robots: Sequence[str]) -> str | None:

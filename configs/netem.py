@@ -176,6 +176,19 @@ class Partition(Parameters):
             raise ValueError(f"to_s must be above from_s = {self.from_s:g}")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DistanceLoss(Parameters):
+    """Losses by the distance between the two robots: all of them from a range on.
+
+    Below it a message is lost with probability (distance / range)^exponent.
+    """
+
+    range_m: Positive
+    exponent: Annotated[float, Gt(0), Le(100)] | None = parameter(
+        None, "below the range none is lost if not given"
+    )
+
+
 if TYPE_CHECKING:
     Delay = ConstantDelay | UniformDelay | NormalDelay | LognormalDelay | TraceDelay
     Loss = BernoulliLoss | GilbertElliottLoss
@@ -206,6 +219,7 @@ class Effects(Parameters):
         None, "that wait for the bandwidth; others are lost; 64 if not given"
     )
     partitions: Annotated[tuple[Partition, ...], Len(0, 1000)] | None = None
+    distance: DistanceLoss | None = parameter(None, "between robots only")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

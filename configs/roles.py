@@ -28,6 +28,7 @@ class Topic(Enum):
     OWN_POSE = auto()
     OWN_TELEMETRY = auto()
     PATHS_OF_IN_NEIGHBOURS = auto()
+    POSES_OF_LOCATED_NEIGHBOURS = auto()  # whose distance changes the emulated network
     LEADER_SPEED = auto()  # of robots with h_i = 1
     EMULATED_POSES = auto()  # of the robots that the plant emulates
     MEASURED_POSES = auto()  # of the robots that it doesn't
@@ -84,7 +85,13 @@ AGENT = Role(
     per_robot=True,
     forked=True,
     puts=(Topic.OWN_PATH, Topic.OWN_TELEMETRY),
-    hears=(Topic.OWN_POSE, Topic.GO, Topic.PATHS_OF_IN_NEIGHBOURS, Topic.LEADER_SPEED),
+    hears=(
+        Topic.OWN_POSE,
+        Topic.GO,
+        Topic.PATHS_OF_IN_NEIGHBOURS,
+        Topic.POSES_OF_LOCATED_NEIGHBOURS,
+        Topic.LEADER_SPEED,
+    ),
     watches=(LAUNCHER.name,),
 )
 RECORDER = Role(

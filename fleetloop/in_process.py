@@ -140,6 +140,10 @@ class InProcessRun:
         self._agents = [
             Agent(brief, rows) for brief, rows in zip(agents, self._telemetry, strict=True)
         ]
+        self._locators = {
+            brief.robot: [agent for agent in self._agents if brief.robot in agent.brief.located]
+            for brief in agents
+        }
         self._hearers: dict[str, list[Agent]] = {brief.robot: [] for brief in agents}
         for agent in self._agents:
             for edge in agent.brief.hears:
@@ -206,7 +210,7 @@ class InProcessRun:
         """Run from the first tick of the countdown to the closing tick, or until told to stop."""
         self._exchange_paths(-1)
         for robot, agent in zip(self._robots, self._agents, strict=True):
-            _localise(robot, agent, -1, 0)
+            self._localise(robot, agent, -1, 0)
         with settled_memory():
             self._run(stop)
         for rows in (*self._truths, *self._telemetry):
@@ -246,7 +250,7 @@ class InProcessRun:
             if 0 <= tick < schedule.ticks:
                 truth.add(tick, robot.row(t_ns * 1e-9))
             if schedule.localises(tick):
-                _localise(robot, agent, tick, t_ns)
+                self._localise(robot, agent, tick, t_ns)
 
     def _exchange_paths(self, tick: int) -> None:
         for agent in self._agents:
@@ -256,12 +260,13 @@ class InProcessRun:
                 for hearer in self._hearers[robot]:
                     hearer.receive_path_state(robot, state)
 
-
-def _localise(robot: EmulatedRobot, agent: Agent, tick: int, t_ns: int) -> None:
-    x, y, theta, *_ = robot.state
-    fix = PoseFix.decode(PoseFix(tick, t_ns, x, y, theta).encode())
-    if fix is not None:
-        agent.receive_pose(fix)
+    def _localise(self, robot: EmulatedRobot, agent: Agent, tick: int, t_ns: int) -> None:
+        x, y, theta, *_ = robot.state
+        fix = PoseFix.decode(PoseFix(tick, t_ns, x, y, theta).encode())
+        if fix is not None:
+            agent.receive_pose(fix)
+            for other in self._locators[robot.brief.robot]:
+                other.receive_place(robot.brief.robot, fix)
 
 
 def _write(

@@ -1,6 +1,6 @@
 """One directed edge of the emulated network: messages in with their send time, out when due.
 
-    sent → cut? → lost? → waits for the bandwidth → delay → cut? → due, once or twice
+    sent → cut? → too far? → lost? → waits for the bandwidth → delay → cut? → due, once or twice
 
 All in scenario time. Draws happen in the order of sending and each effect has a random stream of
 its own, named by seed, edge and effect: edges and directions are independent, and a change of one
@@ -14,7 +14,7 @@ from random import Random
 from typing import Generic, NamedTuple, TypeVar
 
 from bridge.netem.delay import delay_draw
-from bridge.netem.loss import loss_draw
+from bridge.netem.loss import distance_draw, loss_draw
 from configs.netem import Effects
 
 MESSAGE_BYTES = 128
@@ -60,6 +60,7 @@ class Channel(Generic[Message]):
     __slots__ = (
         "_age_limit_ns",
         "_delay",
+        "_distance_loss",
         "_due",
         "_duplication",
         "_duplication_draw",
@@ -79,6 +80,7 @@ class Channel(Generic[Message]):
     def __init__(self, effects: Effects, seed: str, age_limit_ns: int) -> None:
         self._delay = delay_draw(effects.delay, Random(f"{seed} delay"))
         self._loss = loss_draw(effects.loss, Random(f"{seed} loss"))
+        self._distance_loss = distance_draw(effects.distance, Random(f"{seed} distance"))
         self._duplication = effects.duplication or 0.0
         self._duplication_draw = Random(f"{seed} duplication").random
         self._in_order = effects.reordering is False
@@ -98,11 +100,11 @@ class Channel(Generic[Message]):
         self._newest_ns: int | None = None
         self.counts = Counts()
 
-    def send(self, now_ns: int, message: Message) -> None:
-        """Take a message that its source sends now; times must not decrease."""
+    def send(self, now_ns: int, message: Message, distance_m: float = 0.0) -> None:
+        """Take a message that its source sends now, from this far; times must not decrease."""
         counts = self.counts
         counts.sent += 1
-        lost = self._loss()  # drawn of every message, cut or not
+        lost = self._loss() | self._distance_loss(distance_m)  # drawn of every message, cut or not
         delay_ns = self._delay()
         if lost or delay_ns is None or self._is_cut(now_ns):
             counts.lost += 1

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from random import Random
 
-from configs.netem import BernoulliLoss, GilbertElliottLoss, Loss
+from configs.netem import BernoulliLoss, DistanceLoss, GilbertElliottLoss, Loss
 
 Draw = Callable[[], bool]
 """Whether the next message is lost."""
@@ -19,6 +19,21 @@ def loss_draw(loss: Loss | None, random: Random) -> Draw:
             return lambda: random.random() < probability
         case GilbertElliottLoss():
             return _GilbertElliott(loss, random)
+
+
+def distance_draw(loss: DistanceLoss | None, random: Random) -> Callable[[float], bool]:
+    """The draw of an edge's losses by distance [m], in the order in which messages are sent."""
+    if loss is None:
+        return lambda _: False
+    range_m, exponent = loss.range_m, loss.exponent
+
+    def draw(distance_m: float) -> bool:
+        chance = random.random()
+        if distance_m >= range_m:
+            return True
+        return exponent is not None and chance < (distance_m / range_m) ** exponent
+
+    return draw
 
 
 class _GilbertElliott:

@@ -130,6 +130,7 @@ def plan(
     *,
     buses: Sequence[str] = (),
     real_robots: Collection[str] = (),
+    located: Mapping[str, Sequence[str]] | None = None,
     guests: Mapping[str, str] | None = None,
     bus_guests: Collection[str] = (),
     certified: bool = False,
@@ -145,7 +146,7 @@ def plan(
     `certified`. Identities that are `kept_out` have no rights, for the reason named. Periods are of
     real time; with one, what comes much more often is dropped.
     """
-    graph = _Graph(run, robots, hears, leader, buses, real_robots)
+    graph = _Graph(run, robots, hears, leader, buses, real_robots, located or {})
     rights: dict[str, Rights] = {}
     for role in ROLES:
         for robot in robots if role.per_robot else ("",):
@@ -179,6 +180,7 @@ class _Graph(NamedTuple):
     leader: Sequence[str]
     buses: Sequence[str]
     measured: Collection[str]  # robots that aren't emulated
+    located: Mapping[str, Sequence[str]]  # by robot, those whose poses its emulated network needs
 
     def keys(self, topics: Iterable[Topic], robot: str) -> tuple[str, ...]:
         """The keys of these topics to a role's process; `robot` is its own."""
@@ -186,29 +188,25 @@ class _Graph(NamedTuple):
 
     def _keys(self, topic: Topic, robot: str) -> Iterable[str]:
         run = self.run
-        match topic:
-            case Topic.OWN_PATH:
-                return [keys.path(run, robot)]
-            case Topic.OWN_POSE:
-                return [keys.pose(run, robot)]
-            case Topic.OWN_TELEMETRY:
-                return [keys.telemetry(run, robot)]
-            case Topic.PATHS_OF_IN_NEIGHBOURS:
-                return [keys.path(run, other) for other in self.hears[robot]]
-            case Topic.LEADER_SPEED:
-                return [keys.leader_speed(run)] if robot in self.leader else []
-            case Topic.EMULATED_POSES:
-                return [keys.pose(run, r) for r in self.robots if r not in self.measured]
-            case Topic.MEASURED_POSES:
-                return [keys.pose(run, r) for r in self.robots if r in self.measured]
-            case Topic.TRUTHS:
-                return [keys.truth(run, r) for r in self.robots]
-            case Topic.TELEMETRIES:
-                return [keys.telemetry(run, r) for r in self.robots]
-            case Topic.TRAFFIC:
-                return [keys.traffic(run, bus) for bus in self.buses]
-            case Topic.GO:
-                return [keys.go(run)]
+        if topic is Topic.GO:
+            return [keys.go(run)]
+        if topic is Topic.LEADER_SPEED:
+            return [keys.leader_speed(run)] if robot in self.leader else []
+        emulated = [r for r in self.robots if r not in self.measured]
+        measured = [r for r in self.robots if r in self.measured]
+        key_of, names = {
+            Topic.OWN_PATH: (keys.path, [robot]),
+            Topic.OWN_POSE: (keys.pose, [robot]),
+            Topic.OWN_TELEMETRY: (keys.telemetry, [robot]),
+            Topic.PATHS_OF_IN_NEIGHBOURS: (keys.path, self.hears.get(robot, ())),
+            Topic.POSES_OF_LOCATED_NEIGHBOURS: (keys.pose, self.located.get(robot, ())),
+            Topic.EMULATED_POSES: (keys.pose, emulated),
+            Topic.MEASURED_POSES: (keys.pose, measured),
+            Topic.TRUTHS: (keys.truth, self.robots),
+            Topic.TELEMETRIES: (keys.telemetry, self.robots),
+            Topic.TRAFFIC: (keys.traffic, self.buses),
+        }[topic]
+        return [key_of(run, name) for name in names]
 
 
 def _rights(role: Role, robot: str, graph: _Graph) -> Rights:

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bridge.network import access
-from configs.brief import PlantBrief
+from configs.brief import PlantBrief, located
 from configs.connections import NetworkLink, Outside, Settings
 from configs.deployment import Deployment, NetworkSection, passwords
 from configs.errors import ScenarioError
+from configs.resolve import channels
 from configs.roles import LOCALISATION, identity_of
 from configs.scenario import Scenario
 
@@ -161,6 +162,7 @@ def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.
         graph.leader,
         buses=scenario.buses,
         real_robots=[robot for robot in scenario.names if not deployment.emulates(robot)],
+        located={robot: located(channels(scenario, robot)) for robot in scenario.names},
         guests=guests(scenario, deployment),
         bus_guests=tuple(bus_guests(deployment)),
         certified=network is not None and network.tls_of(None) is not None,

@@ -109,3 +109,10 @@ def test_bounds_out_of_order_are_named_at_their_table() -> None:
         paper("[network.default]\npartitions = [{ from_s = 3.0, to_s = 2.0 }]\n")
     assert "network.default.partitions.0" in str(refused.value)
     assert "to_s must be above from_s = 3" in str(refused.value)
+
+
+def test_what_has_no_place_has_no_distance() -> None:
+    with pytest.raises(ScenarioError) as refused:
+        paper('[[network.edge]]\nedges = ["leader -> *"]\ndistance = { range_m = 2.0 }\n')
+    assert "network.edge.0.distance" in str(refused.value)
+    assert "only between robots" in str(refused.value)

@@ -15,8 +15,8 @@ CYCLE = 'graph={edges=["r1 -> r2", "r2 -> r1"], leader=["r2"]}'
 
 LOSSY = (
     'network={default={delay={kind="normal", mean_s=0.1, std_s=0.05}, duplication=0.1,'
-    ' loss={kind="bernoulli", probability=0.3}}, edge=[{edges=["leader -> *",'
-    ' "localisation -> *"], delay={kind="constant", delay_s=0.03}}]}'
+    ' loss={kind="bernoulli", probability=0.3}, distance={range_m=1.5, exponent=8}},'
+    ' edge=[{edges=["leader -> *", "localisation -> *"], delay={kind="constant", delay_s=0.03}}]}'
 )
 WIRE = 'bus.timing="wire"'
 KINDS = ["blf", "log"]

@@ -6,8 +6,8 @@ from random import Random
 import numpy as np
 import pytest
 
-from bridge.netem.loss import loss_draw
-from configs.netem import BernoulliLoss, GilbertElliottLoss, Loss
+from bridge.netem.loss import distance_draw, loss_draw
+from configs.netem import BernoulliLoss, DistanceLoss, GilbertElliottLoss, Loss
 
 DRAWS = 40_000
 
@@ -54,3 +54,17 @@ def test_losses_of_two_directions_are_independent() -> None:
     loss = BernoulliLoss(kind="bernoulli", probability=0.5)
     there, back = lost(loss, "1 r1 -> r2 loss"), lost(loss, "1 r2 -> r1 loss")
     assert abs(np.corrcoef(there, back)[0, 1]) < 0.02
+
+
+def test_from_the_range_on_all_is_lost_and_below_it_by_the_power_of_the_distance() -> None:
+    draw = distance_draw(DistanceLoss(range_m=4.0, exponent=2.0), Random("1"))
+    assert all(draw(distance_m) for distance_m in (4.0, 9.0))
+    for distance_m in (0.0, 1.0, 3.0):
+        rate = np.mean([draw(distance_m) for _ in range(10_000)])
+        assert rate == pytest.approx((distance_m / 4.0) ** 2, abs=0.015)
+
+
+def test_without_an_exponent_nothing_is_lost_below_the_range() -> None:
+    draw = distance_draw(DistanceLoss(range_m=4.0), Random("1"))
+    assert not any(draw(3.99) for _ in range(1000))
+    assert draw(4.0)

@@ -210,3 +210,15 @@ def test_a_token_that_is_withdrawn_or_whose_session_ends_is_noticed(
         assert not gone.wait(0.1)
         router.close()
         assert gone.wait(5.0)
+
+
+def test_poses_of_others_are_heard_only_where_the_emulated_network_needs_them() -> None:
+    plan = access.plan(RUN, ROBOTS, HEARS, ("r1",), located={"r2": ["r1"]})
+    poses = {
+        user: [key for key in rights.hears if key.endswith("/pose")]
+        for user, rights in plan.rights.items()
+        if user.startswith("agent-")
+    }
+    own = {f"agent-{robot}": [keys.pose(RUN, robot)] for robot in ROBOTS}
+    own["agent-r2"].append(keys.pose(RUN, "r1"))
+    assert poses == own
