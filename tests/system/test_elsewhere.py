@@ -18,7 +18,7 @@ from support.processes import Run, completed
 
 from fleetloop.record.reader import Record
 
-pytestmark = [pytest.mark.system, pytest.mark.wall_clock]
+pytestmark = pytest.mark.system
 SCENARIO = ("two_robots_100hz", "--set", "expect=[]")
 SHORT = ("--duration", "1")
 
@@ -78,6 +78,7 @@ def start(folder: Path, where: Path, *args: str) -> Run:
     return Run(folder / "run", *SCENARIO, "--deployment", str(where), *args)
 
 
+@pytest.mark.wall_clock
 def test_a_controller_elsewhere_drives_its_robot_to_the_end_of_the_run(tmp_path, agents) -> None:
     where = with_password(tmp_path)
     agents.append(Agent("r2", where))  # that this run ends early, the run tells it
@@ -238,6 +239,7 @@ with open_client(NetworkLink("", sys.argv[1], "bench", "word"), 10.0) as link:
 """
 
 
+@pytest.mark.wall_clock
 def test_a_denied_put_is_named_in_log_and_summary(tmp_path: Path) -> None:
     (tmp_path / "users").write_text("bench:word\n")
     (tmp_path / "users").chmod(0o600)
@@ -261,6 +263,7 @@ def test_a_denied_put_is_named_in_log_and_summary(tmp_path: Path) -> None:
     assert re.fullmatch(rf"{re.escape(what)}( \([2-5] times\))?", said)
 
 
+@pytest.mark.wall_clock
 def test_the_plant_may_be_elsewhere_too(tmp_path) -> None:
     (tmp_path / "users").write_text("plant:secret\n")
     (tmp_path / "users").chmod(0o600)
@@ -317,6 +320,7 @@ def test_files_of_tls_that_are_missing_are_errors_of_the_deployment(
         run.kill()
 
 
+@pytest.mark.wall_clock
 def test_a_certificate_is_an_identity_and_another_one_is_not(tmp_path, agents) -> None:
     certificates(tmp_path, ("router", "agent-r2", "agent-r1"))
     where = with_certificate(tmp_path, "router")

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import can
 import pytest
@@ -49,11 +50,10 @@ def python(folder: Path, *args: str) -> str:
     return done.stdout
 
 
-@pytest.fixture
-def run(tmp_path: Path) -> Iterator[tuple[Path, str]]:
-    """A run that lets the guest of the pages in: (folder of its certificates, endpoint)."""
-    folder = tmp_path / "lab"
-    folder.mkdir()
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str, str]]:
+    """A run that lets the guest of the pages in, for all tests: `run`, and its sockets' folder."""
+    folder = tmp_path_factory.mktemp("lab")
     made = CertificateFolder(folder / "certs")
     made.create(["localhost"], days=2, authority_days=2)
     made.issue("bench", days=2, guest=True)
@@ -62,9 +62,22 @@ def run(tmp_path: Path) -> Iterator[tuple[Path, str]]:
     endpoint = f"tls/localhost:{free_port()}"
     (guests,) = (s for s in snippets("toml") if "[network.guests]" in s.text)
     (folder / "where.toml").write_text(guests.text.replace("tls/lab:7447", endpoint))
-    args = ("two_robots", "--speed", "1", "--duration", "120", "--deployment")
-    with running(folder / "run", *args, str(folder / "where.toml"), bus_time_s=0.2):
-        yield folder, endpoint
+    args = ("two_robots", "--speed", "1", "--duration", "600", "--deployment")
+    with (
+        TemporaryDirectory(prefix="fl-", dir="/tmp") as sockets,
+        pytest.MonkeyPatch.context() as environment,
+    ):
+        environment.setenv("FLEETLOOP_RUNTIME", f"{sockets}/r")
+        with running(folder / "run", *args, str(folder / "where.toml"), bus_time_s=0.2):
+            yield folder, endpoint, f"{sockets}/r"
+
+
+@pytest.fixture
+def run(lab: tuple[Path, str, str], monkeypatch: pytest.MonkeyPatch) -> tuple[Path, str]:
+    """(folder of the run's certificates, its endpoint)."""
+    folder, endpoint, sockets = lab
+    monkeypatch.setenv("FLEETLOOP_RUNTIME", sockets)
+    return folder, endpoint
 
 
 @pytest.mark.parametrize("snippet", shown(LISTENS), ids=lambda s: s.where)

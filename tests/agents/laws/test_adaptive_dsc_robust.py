@@ -17,7 +17,8 @@ from plant.body import RigidBody, State
 from plant.integrate import rk4
 
 NOWHERE = NetworkLink("test", "", "", "")
-SEEDS = 200
+STARTS = {"realtime_100hz": 200, "realtime_200hz": 80, "realtime_500hz": 40}
+"""The slower the rate, the less forgiving."""
 SECONDS = 14.0
 NAMES = [signal.name for signal in AdaptiveDscRobust.SIGNALS]
 
@@ -58,10 +59,10 @@ def final_errors(scenario, seed: int) -> tuple[float, float]:
     return worst_x, worst_y
 
 
-@pytest.mark.parametrize("name", ["realtime_100hz", "realtime_200hz", "realtime_500hz"])
+@pytest.mark.parametrize("name", STARTS)
 def test_it_tracks_from_any_start_within_three_metres(name: str) -> None:
     scenario = load(name)
-    finals = [final_errors(scenario, seed) for seed in range(SEEDS)]
+    finals = [final_errors(scenario, seed) for seed in range(STARTS[name])]
     assert max(x for x, _ in finals) < 0.05
     assert max(y for _, y in finals) < 0.05
 
