@@ -67,6 +67,11 @@ class NetworkSection(Parameters):
     listen: Endpoint | None = parameter(
         None, "where the router listens, for example on all addresses; else endpoint"
     )
+    router: Literal["launcher", "external"] = parameter(
+        "launcher",
+        "external: a program of its own at endpoint, with the configuration that"
+        " `fleetloop network --router-config` writes; all roles are its clients",
+    )
     run: Annotated[str, Pattern(patterns.RUN)] | None = parameter(
         None, "the run's name in every key; the scenario's if not given"
     )
@@ -85,6 +90,11 @@ class NetworkSection(Parameters):
             ' another machine; "*" for all'
         },
     )
+
+    @property
+    def external(self) -> bool:
+        """Whether the router is a program of its own."""
+        return self.router == "external"
 
     def tls_of(self, identity: str | None) -> TlsFiles | None:
         """The files of mutual TLS of an identity, of the router if None; None: passwords."""
@@ -249,7 +259,11 @@ def _problems(deployment: Deployment, scenario: Scenario) -> list[Problem]:
 def _network_problems(network: NetworkSection | None) -> list[Problem]:
     if network is None or (network.tls is None and network.certificates is None):
         return []
-    problems = [
+    problems = []
+    if network.external and network.tls is not None:
+        remedy = "an external router knows all roles: give network.certificates or network.users"
+        problems.append(Problem("network.tls", str(network.tls.certificate), remedy))
+    problems += [
         Problem(f"network.{name}", at, "must be tls/HOST:PORT: certificates are of no use over tcp")
         for name, at in (("endpoint", network.endpoint), ("listen", network.listen))
         if at is not None and not at.startswith("tls/")

@@ -29,6 +29,14 @@ class TlsFiles(Parameters):
     certificate: FilePath = field(metadata={"description": "this machine's"})
     private_key: FilePath = field(metadata={"description": "this machine's"})
 
+    def absolute(self) -> "TlsFiles":
+        """The same wherever they are read."""
+        return TlsFiles(
+            ca=self.ca.absolute(),
+            certificate=self.certificate.absolute(),
+            private_key=self.private_key.absolute(),
+        )
+
 
 def files_in(folder: Path, name: str) -> TlsFiles:
     """The files of the router or of an identity in a folder of `fleetloop certs`."""

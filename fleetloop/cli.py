@@ -247,6 +247,33 @@ def graph(
 
 
 @app.command()
+def network(
+    scenario: ScenarioArg,
+    deployment: Annotated[
+        Path, typer.Argument(metavar="DEPLOYMENT", help="Its network.router is external.")
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE.json5", help="File to write; .users beside it.")
+    ],
+    router_config: Annotated[
+        bool,
+        typer.Option(
+            "--router-config",
+            help="Write the configuration of a router of its own: zenohd -c FILE.json5.",
+        ),
+    ] = False,
+    clock: ClockOption = None,
+    overrides: SetOption = None,
+) -> None:
+    """Write what the network of a run needs outside of it: the configuration of its router."""
+    from fleetloop.launch.router_file import write_router_config
+
+    if not router_config:
+        raise typer.BadParameter("say what to write: --router-config")
+    write_router_config(scenario, deployment, out, overrides_of(overrides, clock=clock))
+
+
+@app.command()
 def report(run: RunArg, partial: PartialOption = False) -> None:
     """Rebuild report.html and the figures of a run from its record."""
     from fleetloop.results.report import write_report

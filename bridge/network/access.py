@@ -23,13 +23,13 @@ it to keep: there hearers keep but few of each (`bridge.network.zenoh_link.POLLE
 count, and of a controller that says far more than the ticks allow nothing more is taken
 (`bridge.network.flood_guard`).
 
-The launcher's own session is inside the router and isn't subject to the rules. Flows are named from
+The launcher's own session is inside the router and isn't subject to the rules; at an external
+router it has rights like the others. Flows are named from
 the router's side: a process that publishes is an ingress put, and it must be told (egress
 declare_subscriber) of a subscriber; a process that hears is an ingress declare_subscriber and
 an egress put.
 """
 
-import json
 import secrets
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -37,7 +37,7 @@ from typing import NamedTuple
 
 from bridge.network import keys
 from bridge.network.messages import MOST_BYTES
-from configs.roles import ROLES, Role, Topic
+from configs.roles import LAUNCHER, ROLES, Role, Topic, processes_of
 
 MOST_PER_PERIOD = 8.0
 """Path states and poses of one robot within the period in which the schedule has one."""
@@ -47,11 +47,11 @@ LEAST_HZ = 100.0
 
 @dataclass(frozen=True, slots=True)
 class Rights:
-    """What one identity may do: keys it may put and hear, its liveliness token, whose it sees."""
+    """What one identity may do: keys it may put and hear, its liveliness tokens, whose it sees."""
 
     puts: tuple[str, ...]
     hears: tuple[str, ...]
-    token: str
+    tokens: tuple[str, ...]
     watches: tuple[str, ...] = ()
 
 
@@ -71,8 +71,8 @@ class AccessPlan:
         """Zenoh's user dictionary: `user:password` lines."""
         return "".join(f"{user}:{word}\n" for user, word in self.passwords.items())
 
-    def access_control(self) -> str:
-        """Zenoh's `access_control` section as JSON."""
+    def access_control(self) -> dict[str, object]:
+        """Zenoh's `access_control` section."""
         rules: list[dict[str, object]] = []
         policies = []
         for user, rights in self.rights.items():
@@ -84,42 +84,39 @@ class AccessPlan:
             | ({"cert_common_names": [self.passwords[user]]} if user in self.certified else {})
             for user in self.rights
         ]
-        return json.dumps(
-            {
-                "enabled": True,
-                "default_permission": "deny",
-                "rules": rules,
-                "subjects": subjects,
-                "policies": policies,
-            }
-        )
+        return {
+            "enabled": True,
+            "default_permission": "deny",
+            "rules": rules,
+            "subjects": subjects,
+            "policies": policies,
+        }
 
-    def low_pass_filter(self) -> str:
-        """Zenoh's `low_pass_filter` section as JSON: how long messages on each key may be."""
+    def low_pass_filter(self) -> list[dict[str, object]]:
+        """Zenoh's `low_pass_filter` section: how long messages on each key may be."""
         by_limit: dict[int, list[str]] = {}
         for rights in self.rights.values():
             for key in rights.puts:
-                by_limit.setdefault(MOST_BYTES[keys.kind(key)], []).append(key)
-        return json.dumps(
-            [
-                {
-                    "id": f"most-{limit}",
-                    "flows": ["ingress"],
-                    "messages": ["put"],
-                    "key_exprs": list(dict.fromkeys(allowed)),
-                    "size_limit": limit,
-                }
-                for limit, allowed in sorted(by_limit.items())
-            ]
-        )
+                if (limit := MOST_BYTES.get(keys.kind(key))) is not None:
+                    by_limit.setdefault(limit, []).append(key)
+        return [
+            {
+                "id": f"most-{limit}",
+                "flows": ["ingress"],
+                "messages": ["put"],
+                "key_exprs": list(dict.fromkeys(allowed)),
+                "size_limit": limit,
+            }
+            for limit, allowed in sorted(by_limit.items())
+        ]
 
-    def downsampling(self) -> str:
-        """Zenoh's `downsampling` section as JSON: how often messages on each key may come."""
+    def downsampling(self) -> list[dict[str, object]]:
+        """Zenoh's `downsampling` section: how often messages on each key may come."""
         if not self.most_hz:
-            return "[]"
+            return []
         rules = [{"key_expr": key, "freq": rate} for key, rate in self.most_hz.items()]
         limits = {"id": "most-often", "flows": ["ingress"], "messages": ["put"], "rules": rules}
-        return json.dumps([limits])
+        return [{**limits}]
 
 
 def plan(
@@ -135,6 +132,7 @@ def plan(
     bus_guests: Collection[str] = (),
     certified: bool = False,
     kept_out: Mapping[str, str] | None = None,
+    external: bool = False,
     share_period_s: float | None = None,
     localisation_period_s: float | None = None,
 ) -> AccessPlan:
@@ -143,8 +141,9 @@ def plan(
     What crosses the `buses` is recorded. `real_robots` aren't emulated: their poses come from the
     localisation system. `guests` are the passwords of identities on other machines (all others are
     given random ones), who must show a certificate with the password as its common name if
-    `certified`. Identities that are `kept_out` have no rights, for the reason named. Periods are of
-    real time; with one, what comes much more often is dropped.
+    `certified`. Identities that are `kept_out` have no rights, for the reason named. An `external`
+    router is a program of its own, where the launcher is a client. Periods are of real time; with
+    one, what comes much more often is dropped.
     """
     graph = _Graph(run, robots, hears, leader, buses, real_robots, located or {})
     rights: dict[str, Rights] = {}
@@ -156,9 +155,11 @@ def plan(
         rights[user] = Rights(
             puts=(keys.guest_lines("up", user),),
             hears=(keys.guest_lines("down", user),),
-            token=keys.guest_lines("alive", user),
+            tokens=(keys.guest_lines("alive", user),),
             watches=(keys.guest_relay(user),),
         )
+    if external:
+        rights[LAUNCHER.identity()] = _launcher(graph, bus_guests)
     known = dict(guests or {})
     passwords = {user: known.get(user) or secrets.token_urlsafe(24) for user in rights}
     most_hz = {
@@ -218,8 +219,25 @@ def _rights(role: Role, robot: str, graph: _Graph) -> Rights:
     return Rights(
         puts=(*graph.keys(role.puts, robot), *control),
         hears=(*graph.keys(role.hears, robot), *reports),
-        token=keys.live(run, process),
+        tokens=(keys.live(run, process),),
         watches=tuple(keys.live(run, other) for other in role.watches),
+    )
+
+
+def _launcher(graph: _Graph, bus_guests: Iterable[str]) -> Rights:
+    """Of a launcher that isn't the router: the operator's end of the control plane, the relay's."""
+    run, users = graph.run, tuple(bus_guests)
+    processes = processes_of(tuple(graph.robots))
+    said = [of(run, it) for it in processes for of in (keys.progress, keys.notice, keys.report)]
+    own = keys.go(run), keys.leader_speed(run), keys.report(run, LAUNCHER.name)
+    return Rights(
+        puts=(*own, *(keys.guest_lines("down", user) for user in users)),
+        hears=(*said, *(keys.guest_lines("up", user) for user in users)),
+        tokens=(keys.live(run, LAUNCHER.name), *map(keys.guest_relay, users)),
+        watches=(
+            *(keys.live(run, process) for process in processes),
+            *(keys.guest_lines("alive", user) for user in users),
+        ),
     )
 
 
@@ -240,7 +258,7 @@ def _rules_of(user: str, rights: Rights) -> list[dict[str, object]]:
         rule("learns", ["declare_subscriber"], "egress", rights.puts),
         rule("asks", ["declare_subscriber"], "ingress", rights.hears),
         rule("hears", ["put"], "egress", rights.hears),
-        rule("lives", ["liveliness_token"], "ingress", [rights.token]),
+        rule("lives", ["liveliness_token"], "ingress", rights.tokens),
     ]
     if rights.watches:
         rules += [

@@ -10,11 +10,12 @@ import zenoh
 from bridge.network.session import (
     ONE_THREAD,
     WAIT_BEFORE_CLOSE,
+    common,
+    config_of,
     few_threads,
     mutual_tls,
     open_bounded,
     set_key,
-    settings,
 )
 from bridge.network.session_errors import Obstacle, obstacle
 from bridge.network.zenoh_link import POLLED_DEPTH, PolledLink, ZenohLink
@@ -42,7 +43,7 @@ def open_client(network: NetworkLink, timeout_s: float, stop: Stop | None = None
         InfrastructureError: no answer from there, or the login was refused.
         StoppedError: `stop` was requested before.
     """
-    return ZenohLink(_client(network, timeout_s, stop))
+    return ZenohLink(open_session(network, timeout_s, stop))
 
 
 def open_polled(
@@ -53,11 +54,16 @@ def open_polled(
     depth: int = POLLED_DEPTH,
 ) -> PolledLink:
     """Connect with a polled link that keeps the newest `depth` messages on each key."""
-    return PolledLink(_client(network, timeout_s, stop), depth)
+    return PolledLink(open_session(network, timeout_s, stop), depth)
 
 
-def _client(network: NetworkLink, timeout_s: float, stop: Stop | None) -> zenoh.Session:
-    """Try until it opens; a refused login ends the attempts, an absent router does not."""
+def open_session(network: NetworkLink, timeout_s: float, stop: Stop | None) -> zenoh.Session:
+    """A session of its own; a refused login ends the attempts, an absent router does not.
+
+    Raises:
+        InfrastructureError: no answer from there, or the login was refused.
+        StoppedError: `stop` was requested before.
+    """
     wake = [] if stop is None else [stop.wake_fd]
     deadline = SYSTEM_CLOCK.monotonic_s() + timeout_s
     pause_s = _FIRST_RETRY_S
@@ -93,7 +99,7 @@ def _reason(network: NetworkLink) -> Obstacle:
 
 def _login_config(mode: str, network: NetworkLink, timeout_s: float) -> zenoh.Config:
     """For a single attempt."""
-    config = settings(mode, network.lease_s)
+    config = config_of(common(mode, network.lease_s))
     # A put that finds the router stopped waits for as long as the router may.
     set_key(config, WAIT_BEFORE_CLOSE, int(max(network.lease_s, _BLOCKED_S) * 1e6))
     set_key(config, "connect/endpoints", [network.endpoint])

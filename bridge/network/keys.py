@@ -66,11 +66,6 @@ def live(run: str, process: str) -> str:
     return f"{_run(run)}/@live/{_process(process)}"
 
 
-def live_all(run: str) -> str:
-    """All liveliness tokens of a run."""
-    return f"{_run(run)}/@live/**"
-
-
 def progress(run: str, process: str) -> str:
     """Key of a process's progress."""
     return f"{_run(run)}/@progress/{_process(process)}"

@@ -8,7 +8,6 @@ wait to send to it is disconnected.
 
 import contextlib
 import os
-import resource
 import socket
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -17,38 +16,47 @@ import zenoh
 
 from bridge.network import zenoh_log
 from bridge.network.access import AccessPlan
+from bridge.network.client import StoppedError, open_session
 from bridge.network.flood_guard import FloodGuard, deafen
+from bridge.network.router_config import router_settings
 from bridge.network.router_refusals import Denials, directives, is_ours
 from bridge.network.session import (
     ROUTER_THREADS,
-    WAIT_BEFORE_CLOSE,
+    config_of,
     few_threads,
-    mutual_tls,
     open_bounded,
-    set_key,
-    settings,
 )
 from bridge.network.session_errors import taken
 from bridge.network.zenoh_link import ZenohLink
-from configs.connections import LEASE_S, Outside
+from bridge.process.lifecycle import Stop
+from configs.connections import LEASE_S, NetworkLink, Outside
 from configs.errors import InfrastructureError
 from configs.roles import AGENT
 
 _LISTEN_S = 10.0
 _PORT_TRIES = 5
 UNREAD_S = 0.5
-_HANDSHAKE_S, _SILENT_S, _PROBE_S = 2.0, 3600, 1.0
-_LEAST_PENDING, MOST_PENDING, _LEAST_SESSIONS = 100, 4096, 1000
+_SILENT_S, _PROBE_S = 3600, 1.0
 
 
-class RouterLink(ZenohLink):
-    """The launcher's link: its session is the router."""
+class LauncherLink(ZenohLink):
+    """The launcher's link to a router elsewhere, whose refusals stay in that router's log."""
 
     def __init__(self, session: zenoh.Session, endpoint: str, denials: Denials) -> None:
         super().__init__(session)
         self.endpoint = endpoint
         self.denials = denials
         """Refusals by the router, from its log."""
+
+    def look_for_floods(self, ticks: int, now_s: float) -> None:
+        """Nothing: a router elsewhere looks after itself."""
+
+
+class RouterLink(LauncherLink):
+    """The launcher's link: its session is the router."""
+
+    def __init__(self, session: zenoh.Session, endpoint: str, denials: Denials) -> None:
+        super().__init__(session, endpoint, denials)
         self._guard = FloodGuard()
         denials.turn_away = deafen
 
@@ -93,6 +101,19 @@ def open_router(
             yield link
 
 
+def join_router(network: NetworkLink, timeout_s: float, stop: Stop | None = None) -> LauncherLink:
+    """Be the launcher of a run whose router is a program of its own.
+
+    Raises:
+        InfrastructureError: no answer from there, the login was refused, or `stop` was requested.
+    """
+    try:
+        session = open_session(network, timeout_s, stop)
+    except StoppedError as error:
+        raise InfrastructureError(f"no router at {network.endpoint} yet: stopped") from error
+    return LauncherLink(session, network.endpoint, Denials())
+
+
 def _listen(
     endpoint: str | None,
     access: AccessPlan,
@@ -105,18 +126,16 @@ def _listen(
     reason = ""
     for _ in range(tries):
         at = endpoint or loopback()
-        config = settings("router", lease_s)
-        set_key(config, "listen/endpoints", [at, *([hasty(outside.endpoint)] if outside else [])])
-        if outside is not None and outside.tls is not None:
-            set_key(config, "transport/link/tls", mutual_tls(outside.tls, "listen"))
-        accept_many(config, len(access.rights))
-        set_key(config, "transport/auth/usrpwd/dictionary_file", str(dictionary))
-        config.insert_json5("access_control", access.access_control())
-        config.insert_json5("low_pass_filter", access.low_pass_filter())
-        config.insert_json5("downsampling", access.downsampling())
-        set_key(config, WAIT_BEFORE_CLOSE, int(unread_s * 1e6))
+        settings = router_settings(
+            access,
+            [at, *([outside.endpoint] if outside else [])],
+            dictionary,
+            outside.tls if outside else None,
+            lease_s=lease_s,
+            unread_s=unread_s,
+        )
         with few_threads(ROUTER_THREADS):
-            session = open_bounded(config, _LISTEN_S)
+            session = open_bounded(config_of(settings), _LISTEN_S)
         if not isinstance(session, str):
             await_first_words([at, *([outside.endpoint] if outside else [])])
             return session, at
@@ -149,25 +168,6 @@ def loopback() -> str:
         f"no loopback address for the processes of a run to meet at ({', '.join(reasons)}):"
         " ip link set lo up"
     )
-
-
-def hasty(endpoint: str) -> str:
-    """The same with a bound on how long a handshake of TLS may take."""
-    milliseconds = int(_HANDSHAKE_S * 1e3)
-    return f"{endpoint}#tls_handshake_timeout_ms={milliseconds}" if "tls/" in endpoint else endpoint
-
-
-def accept_many(config: zenoh.Config, identities: int) -> None:
-    """Bound connections without a login, so that they keep no other client out.
-
-    Each costs a descriptor until `_HANDSHAKE_S`; further connections are closed, and honest clients
-    retry at once. They get a quarter of the descriptors at most.
-    """
-    descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    pending = min(max(descriptors // 4, 2 * identities, _LEAST_PENDING), MOST_PENDING)
-    set_key(config, "transport/unicast/accept_timeout", int(_HANDSHAKE_S * 1e3))
-    set_key(config, "transport/unicast/accept_pending", pending)
-    set_key(config, "transport/unicast/max_sessions", _LEAST_SESSIONS + 2 * identities)
 
 
 def await_first_words(endpoints: Sequence[str]) -> None:

@@ -10,7 +10,7 @@ import ctypes
 import json
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TypeVar
 
 import zenoh
@@ -31,17 +31,28 @@ WAIT_BEFORE_CLOSE = "transport/link/tx/queue/congestion_control/block/wait_befor
 _Kept = TypeVar("_Kept")
 
 
-def settings(mode: str, lease_s: float) -> zenoh.Config:
-    """What all sessions have in common; `mode` is "client", "peer" or "router"."""
+def common(mode: str, lease_s: float) -> dict[str, object]:
+    """What all sessions have in common, by path in Zenoh's configuration.
+
+    `mode` is "client", "peer" or "router".
+    """
+    return {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "scouting/delay": 0,
+        "transport/shared_memory/enabled": False,
+        "transport/link/rx/max_message_size": 2 * MAX_BYTES,
+        "transport/link/tx/lease": int(lease_s * 1e3),
+    }
+
+
+def config_of(settings: Mapping[str, object]) -> zenoh.Config:
+    """Zenoh's configuration with these settings, by path."""
     zenoh_log.begin()
     config = zenoh.Config()
-    set_key(config, "mode", mode)
-    set_key(config, "scouting/multicast/enabled", False)
-    set_key(config, "scouting/gossip/enabled", False)
-    set_key(config, "scouting/delay", 0)
-    set_key(config, "transport/shared_memory/enabled", False)
-    set_key(config, "transport/link/rx/max_message_size", 2 * MAX_BYTES)
-    set_key(config, "transport/link/tx/lease", int(lease_s * 1e3))
+    for path, value in settings.items():
+        set_key(config, path, value)
     return config
 
 

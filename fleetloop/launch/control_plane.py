@@ -57,9 +57,9 @@ class ControlPlane:
 
     def subscribe(self, link: Link, run: str, processes: Iterable[str]) -> None:
         """Subscribe to the messages of these processes."""
-        link.watch_live(keys.live_all(run), "live")
         # One by one: a wildcard is wider than any identity's rights and would be refused.
         for process in processes:
+            link.watch_live(keys.live(run, process), "live")
             link.subscribe(keys.progress(run, process), "progress")
             link.subscribe(keys.notice(run, process), "notice")
             link.subscribe(keys.report(run, process), "report")

@@ -10,7 +10,7 @@ from pathlib import Path
 from bridge.network import keys
 from bridge.network.link import Link, waiting
 from bridge.network.reports import LauncherReport
-from bridge.network.router import RouterLink
+from bridge.network.router import LauncherLink
 from bridge.process.lifecycle import Stop
 from configs.errors import FleetloopError
 from configs.roles import LAUNCHER, RECORDER
@@ -42,7 +42,7 @@ class Ending:
         self._record = record
         self._limit_s = limit_s
 
-    def end(self, link: RouterLink, stop: Stop, failure: Failure | None) -> None:
+    def end(self, link: LauncherLink, stop: Stop, failure: Failure | None) -> None:
         """End all processes; `failure` is the one that ended the run, if one did."""
         plane, outcome = self._plane, self._plane.outcome
         self._judge(stop, failure)

@@ -12,7 +12,7 @@ from configs.connections import NetworkLink, Outside, Settings
 from configs.deployment import Deployment, NetworkSection, passwords
 from configs.errors import ScenarioError
 from configs.resolve import channels
-from configs.roles import LOCALISATION, identity_of
+from configs.roles import LAUNCHER, LOCALISATION, identity_of, processes_of
 from configs.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -66,7 +66,9 @@ def check_credentials(scenario: Scenario, deployment: Deployment) -> None:
             and file.
     """
     guests(scenario, deployment)
-    if deployment.network is not None:
+    if is_external(deployment):
+        links(scenario, deployment)
+    elif deployment.network is not None:
         host = deployment.network.endpoint.partition("/")[2].rpartition(":")[0]
         _proved_name(deployment.network, None, host.strip("[]"))
 
@@ -118,7 +120,10 @@ def guests(scenario: Scenario, deployment: Deployment) -> Mapping[str, str]:
     Raises:
         ScenarioError: the deployment's credentials lack one of them.
     """
-    identities = [identity_of(role) for role in deployment.elsewhere(scenario)]
+    roles = deployment.elsewhere(scenario)
+    if is_external(deployment):
+        roles = (*processes_of(scenario.names), LAUNCHER.name)
+    identities = [identity_of(role) for role in roles]
     if any(not deployment.emulates(robot) for robot in scenario.names):
         identities.append(LOCALISATION.name)
     identities += bus_guests(deployment)
@@ -167,6 +172,7 @@ def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.
         bus_guests=tuple(bus_guests(deployment)),
         certified=network is not None and network.tls_of(None) is not None,
         kept_out=kept_out(deployment),
+        external=is_external(deployment),
         share_period_s=clock.share_period_s if realtime else None,
         localisation_period_s=clock.localisation_period_s if realtime else None,
     )
@@ -174,6 +180,24 @@ def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.
         return planned
     with _named_certificates(network.certificates) as folder:
         return replace(planned, expiries=folder.expiries())
+
+
+def is_external(deployment: Deployment) -> bool:
+    """Whether the router is a program of its own."""
+    return deployment.network is not None and deployment.network.external
+
+
+def links(scenario: Scenario, deployment: Deployment) -> Mapping[str, NetworkLink]:
+    """How launcher and roles of this machine reach an external router, by identity.
+
+    Raises:
+        ScenarioError: the deployment's credentials lack one of them.
+    """
+    here = [role for role in processes_of(scenario.names) if deployment.runs_here(role)]
+    return {
+        identity_of(role): network_link(scenario, deployment, role)
+        for role in (*here, LAUNCHER.name)
+    }
 
 
 def network_link(scenario: Scenario, deployment: Deployment, role: str) -> NetworkLink:

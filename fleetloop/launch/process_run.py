@@ -21,7 +21,7 @@ from bridge.can_bus.relay import Relay
 from bridge.network import keys
 from bridge.network.barrier import Hellos
 from bridge.network.messages import Go, LeaderSpeed, Progress
-from bridge.network.router import RouterLink, open_router
+from bridge.network.router import LauncherLink, join_router, open_router
 from bridge.process.clock import SYSTEM_CLOCK, Clock, process_cpu_ns, wall_of
 from bridge.process.lifecycle import Stop
 from configs.connections import LEASE_S, LOCAL_LEASE_S, NetworkLink
@@ -85,6 +85,7 @@ class ProcessRun:
         limit_s = self._schedule.tick_deadline_s
         self._ending = Ending(self._plane, self._run, self._machine, record, limit_s)
         self._next_look_s = 0.0
+        self._links: dict[str, NetworkLink] = {}
 
     @property
     def outcome(self) -> Outcome:
@@ -101,7 +102,7 @@ class ProcessRun:
         open_files.ensure(len(self._processes))
         began = self._clock.monotonic_s()
         try:
-            with self._machine, self._started() as link:
+            with self._machine, self._started(stop) as link:
                 self._machine.clock.resume()
                 try:
                     failure = self._await_ready(link, stop)
@@ -124,33 +125,49 @@ class ProcessRun:
     # --- start -------------------------------------------------------------------------------
 
     @contextlib.contextmanager
-    def _started(self) -> Iterator[RouterLink]:
+    def _started(self, stop: Stop) -> Iterator[LauncherLink]:
         """Router and processes."""
         scenario, run = self._scenario, self._run
-        plan = placement.access_plan(scenario, self._deployment, run)
-        outside = placement.outside(self._deployment)
         with contextlib.ExitStack() as open_:
             # It imports while the router opens, and knows the folder before there is one.
             batch = not self._schedule.realtime
             with ForkServer(sockets.folder_of(run), batch=batch) as fork_server:
                 folder = open_.enter_context(sockets.run_folder(run))
-                lease_s = LEASE_S if outside is not None else LOCAL_LEASE_S
-                unread_s = UNREAD_SHARE * self._schedule.tick_deadline_s
-                at = scenario.network.endpoint
-                router = open_router(at, plan, folder, outside, lease_s=lease_s, unread_s=unread_s)
-                link = open_.enter_context(router)
+                link = open_.enter_context(self._router(folder, stop))
                 link.declare_live(keys.live(run, LAUNCHER.name))
                 self._plane.subscribe(link, run, self._processes)
-                links = {
-                    user: NetworkLink(run, link.endpoint, user, password, lease_s=LOCAL_LEASE_S)
-                    for user, password in plan.passwords.items()
-                }
-                spawn(self._orders, links, folder, fork_server, self._plane.children)
+                spawn(self._orders, self._links, folder, fork_server, self._plane.children)
             if granted := placement.bus_guests(self._deployment):
                 open_.enter_context(Relay(link, folder, scenario.buses, granted))
             yield link
 
-    def _await_ready(self, link: RouterLink, stop: Stop) -> Failure | None:
+    @contextlib.contextmanager
+    def _router(self, folder: Path, stop: Stop) -> Iterator[LauncherLink]:
+        """The router of this run, or the way to one of its own; sets how each identity gets there.
+
+        Raises:
+            InfrastructureError: it can't listen, or isn't there.
+        """
+        scenario, deployment, run = self._scenario, self._deployment, self._run
+        if placement.is_external(deployment):
+            self._links = dict(placement.links(scenario, deployment))
+            own = self._links[LAUNCHER.identity()]
+            with join_router(own, self._schedule.start_deadline_s, stop) as link:
+                yield link
+            return
+        plan = placement.access_plan(scenario, deployment, run)
+        outside = placement.outside(deployment)
+        lease_s = LEASE_S if outside is not None else LOCAL_LEASE_S
+        unread_s = UNREAD_SHARE * self._schedule.tick_deadline_s
+        at = scenario.network.endpoint
+        with open_router(at, plan, folder, outside, lease_s=lease_s, unread_s=unread_s) as link:
+            self._links = {
+                user: NetworkLink(run, link.endpoint, user, password, lease_s=LOCAL_LEASE_S)
+                for user, password in plan.passwords.items()
+            }
+            yield link
+
+    def _await_ready(self, link: LauncherLink, stop: Stop) -> Failure | None:
         """Publish the leader's speed until all tokens are there, then go until the plant ticks."""
         run, ticks = self._run, self._schedule
         go = link.publisher(keys.go(run))
@@ -186,7 +203,7 @@ class ProcessRun:
 
     # --- run ---------------------------------------------------------------------------------
 
-    def _watch(self, link: RouterLink, stop: Stop) -> Failure | None:
+    def _watch(self, link: LauncherLink, stop: Stop) -> Failure | None:
         """Follow the run until the plant and all controllers have ended."""
         plane, supervision = self._plane, self._supervision
         actors = plane.actors
@@ -213,7 +230,7 @@ class ProcessRun:
                 return supervision.failure() or silent
         return None
 
-    def _report_refusals(self, link: RouterLink) -> None:
+    def _report_refusals(self, link: LauncherLink) -> None:
         """Look for floods now and then; announce what the router refused or cut off."""
         now_s = self._clock.monotonic_s()
         if now_s >= self._next_look_s:
@@ -222,7 +239,7 @@ class ProcessRun:
         for text in link.denials.news():
             self._plane.on_notice("router", text)
 
-    def _complete_account(self, link: RouterLink) -> None:
+    def _complete_account(self, link: LauncherLink) -> None:
         """Add what machine, router and the launcher's own reading say of the run."""
         outcome, words = self.outcome, self._plane.words
         outcome.machine = self._machine.report()
@@ -243,7 +260,7 @@ class ProcessRun:
             self.outcome.reason += f"; flooded by {', '.join(floods)}"
 
 
-def _with_refusals(absent: Sequence[str], link: RouterLink) -> str:
+def _with_refusals(absent: Sequence[str], link: LauncherLink) -> str:
     """The processes that are not there, and the logins under their names that were refused."""
     named = {role: link.denials.logins_of(identity_of(role)) for role in absent}
     texts = [f"{role} ({'; '.join(found)})" if found else role for role, found in named.items()]

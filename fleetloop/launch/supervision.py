@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from bridge.network.link import Link
-from bridge.network.router import RouterLink
+from bridge.network.router import LauncherLink
 from configs.brief import Schedule
 from configs.roles import PLANT, RECORDER, identity_of
 from fleetloop.launch.child import GAVE_UP, PEER_SILENT, Child, Failure, cause
@@ -63,7 +63,7 @@ class Supervision:
             return Failure(GAVE_UP, name, text)
         return None
 
-    def cut_off(self, link: RouterLink) -> Failure | None:
+    def cut_off(self, link: LauncherLink) -> Failure | None:
         """The process that the run needs and that the router cut off, None if there is none."""
         plane = self._plane
         for child in plane.children if link.denials.cut_off else ():

@@ -1,6 +1,5 @@
 """Access control: generated from the graph, default deny, over real sessions."""
 
-import json
 import threading
 import time
 from collections.abc import Iterator
@@ -51,7 +50,7 @@ def test_rights_of_a_robot_are_its_graph(plan: access.AccessPlan) -> None:
 
 
 def test_everything_that_is_not_allowed_is_denied(plan: access.AccessPlan) -> None:
-    rules = json.loads(plan.access_control())
+    rules = plan.access_control()
     assert rules["default_permission"] == "deny"
     assert {rule["permission"] for rule in rules["rules"]} == {"allow"}
     assert all("*" not in key for rule in rules["rules"] for key in rule["key_exprs"])
@@ -160,7 +159,8 @@ def test_a_port_in_use_is_named(
 def test_a_liveliness_token_comes_and_goes_with_its_session(
     router: RouterLink, plan: access.AccessPlan
 ) -> None:
-    router.watch_live(keys.live_all(RUN), "live")
+    for process in ("plant", "recorder"):
+        router.watch_live(keys.live(RUN, process), "live")
     with client(router, plan, PLANT.name) as link:
         link.declare_live(keys.live(RUN, "plant"))
         link.declare_live(keys.live(RUN, "recorder"))  # not its own
@@ -179,7 +179,7 @@ def test_guests_keep_their_passwords_and_show_certificates_if_they_must() -> Non
     )
     assert plan.passwords["agent-r2"] == "agent-r2#2"
     assert len(plan.passwords["agent-r1"]) >= 32
-    subjects = {s["id"]: s for s in json.loads(plan.access_control())["subjects"]}
+    subjects = {s["id"]: s for s in plan.access_control()["subjects"]}
     assert subjects["agent-r2"]["cert_common_names"] == ["agent-r2#2"]
     assert "cert_common_names" not in subjects["agent-r1"]
 

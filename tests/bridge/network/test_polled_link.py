@@ -3,7 +3,7 @@
 import pytest
 from support.clocks import ManualClock
 
-from bridge.network.session import ONE_THREAD, few_threads, open_bounded, set_key, settings
+from bridge.network.session import ONE_THREAD, common, config_of, few_threads, open_bounded, set_key
 from bridge.network.zenoh_link import _LONGEST_PAUSE_S, PolledLink
 
 
@@ -18,7 +18,7 @@ class Pauses(ManualClock):
 
 
 def test_a_wait_ends_at_its_bound_after_pauses_that_grow() -> None:
-    config = settings("peer", 1.0)
+    config = config_of(common("peer", 1.0))
     set_key(config, "listen/endpoints", [])
     with few_threads(ONE_THREAD):
         session = open_bounded(config, 10.0)

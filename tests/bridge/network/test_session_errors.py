@@ -142,7 +142,7 @@ def test_silent_connections_to_a_listener_with_tls_keep_nobody_out(
 def test_whoever_means_it_gets_in_though_more_wait_than_may(
     plan: access.AccessPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bridge.network.router.MOST_PENDING", 20)
+    monkeypatch.setattr("bridge.network.router_config.MOST_PENDING", 20)
     with open_router(None, plan, tmp_path) as router, half_open(router.endpoint, 60, b"x"):
         assert logs_in(NetworkLink(RUN, router.endpoint, "agent-r1", "word"))
 
