@@ -32,7 +32,6 @@ from agents.laws.dsc_terms import (
     Row,
     SurfaceGains,
     adapt,
-    path_errors,
     smoothing,
     wheel_torques,
 )
@@ -51,6 +50,7 @@ from agents.laws.interface import (
     Theta,
     Wheels,
 )
+from agents.laws.path_errors import path_errors
 from configs.parameters import NotNegative, Positive, parameter
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path

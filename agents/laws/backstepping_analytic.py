@@ -26,7 +26,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan, cos, inf, sin
 
-from agents.laws.dsc_terms import Eight, path_errors, wheel_torques
+from agents.laws.dsc_terms import Eight, wheel_torques
 from agents.laws.fixed_dsc import PAPER_THETA, scaled
 from agents.laws.interface import (
     PATH_ERRORS,
@@ -43,6 +43,7 @@ from agents.laws.interface import (
     Theta,
     Wheels,
 )
+from agents.laws.path_errors import path_errors
 from configs.parameters import NotNegative, Parameters, Positive, parameter
 
 _STEP_M = 1e-4

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from math import isfinite
 from typing import Any, NamedTuple
 
-from agents.laws.dsc_terms import path_errors
 from agents.laws.failure import LawError, number, raised
 from agents.laws.interface import (
     Law,
@@ -21,6 +20,7 @@ from agents.laws.interface import (
     Signal,
     Wheels,
 )
+from agents.laws.path_errors import path_errors
 from configs.errors import ScenarioError
 from configs.plugins import LAWS, Choice
 from configs.signals import gives_path_errors

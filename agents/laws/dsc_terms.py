@@ -1,8 +1,4 @@
-"""Terms that dynamic surface laws share: errors (8), filters, projection (35), wheel torques (3).
-
-    x_e =  cos θ (x − x_d) + sin θ (y − y_d)          errors in the robot's axes      (8)
-    y_e = −sin θ (x − x_d) + cos θ (y − y_d)
-    θ_e = θ − θ_d, wrapped to (−π, π]
+"""Terms that dynamic surface laws share: filters, projection (35), wheel torques (3).
 
 A filter γ α' + α = ᾱ moves by (1 − e^(−h/γ)) (ᾱ − α) over a period h with its input held, exactly.
 
@@ -15,7 +11,7 @@ which keeps |σ̂| ≤ σ_M + k; a clip to that bound guards against a long samp
 """
 
 from dataclasses import dataclass
-from math import cos, exp, pi, sin
+from math import exp
 from typing import NamedTuple
 
 from configs.parameters import Finite, Parameters, Positive, Seconds, parameter
@@ -24,8 +20,6 @@ Row = tuple[float, float, float, float]
 """Four of the eight parameters: those of one row of Ω."""
 Eight = tuple[Finite, Finite, Finite, Finite, Finite, Finite, Finite, Finite]
 """Θ's elements: c b, d̄_11, d̄_12, m̄_1, c/b, d̄_21, d̄_22, m̄_2 [kg·m², N·m·s]."""
-PathErrors = tuple[float, float, float]
-"""(8): where the robot is, seen from itself, against its reference: x_e, y_e [m], θ_e [rad]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,23 +33,6 @@ class SurfaceGains(Parameters):
     gamma_1_s: Positive = parameter(0.01, "filter (19)")
     gamma_2_s: Seconds = parameter(0.01, "filter (20)")
     gamma_3_s: Seconds = parameter(0.01, "filter (27)")
-
-
-def wrap(angle: float) -> float:
-    """The same direction in (−π, π]."""
-    if -pi < angle <= pi:
-        return angle
-    wrapped = angle % (2.0 * pi)
-    return wrapped - 2.0 * pi if wrapped > pi else wrapped
-
-
-def path_errors(
-    x: float, y: float, theta: float, x_d: float, y_d: float, theta_d: float
-) -> PathErrors:
-    """Errors (8) of a robot at (x, y, θ) against its reference."""
-    c, s = cos(theta), sin(theta)
-    dx, dy = x - x_d, y - y_d
-    return c * dx + s * dy, c * dy - s * dx, wrap(theta - theta_d)
 
 
 def smoothing(period_s: float, time_constant_s: float) -> float:

@@ -13,9 +13,9 @@ from math import hypot, inf, isfinite
 import numpy as np
 
 from agents.laws.build import build
-from agents.laws.dsc_terms import path_errors
 from agents.laws.failure import failure, raised
 from agents.laws.interface import AdaptationLimit, PathVariable, RobotMotion
+from agents.laws.path_errors import path_errors
 from configs.brief import Wheels
 from configs.errors import ScenarioError
 from configs.scenario import Scenario
@@ -117,8 +117,11 @@ def _first_torque(scenario: Scenario, robot: Robot, seen: _Start, *, adapts: boo
     x_e, y_e, _ = _errors(scenario, robot)
     off = f"{hypot(x_e, y_e):.3g} m off the path"
     said = f"{off}: asks for {seen.asked_wheel_N_m:.3g} N·m {seen.asked_at_s:.3g} s after the start"
+    # Of its own limit the law knows, and of the host's it is told (`Law.hold`).
     bounds = [
-        limit for limit in limits(scenario, robot) if limit.key != "control.torque_limit_wheel_N_m"
+        limit
+        for limit in limits(scenario, robot)
+        if not limit.key.startswith(("control.", "host."))
     ]
     if seen.failed:
         text = f"{off}: {seen.failed}, {seen.diverged_at_s:.3g} s after the start"

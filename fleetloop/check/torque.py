@@ -7,7 +7,7 @@ Everything is at the wheel; shaft quantities come there through the gear.
 
 On a steady curve (1) is d (v̄_d + b |ω̄_d|) v_r / r at the outer wheel. Let through is the least of
 
-    the law's limit (robust)      control.torque_limit_wheel_N_m
+    the law's limit, if any       control.torque_limit_wheel_N_m
     the host's                    host.torque_limit_wheel_N_m
     gear × k_t × i_max            drive.torque_constant_N_m_A, current_limit_A, and [motor]'s
     gear × k_v (v_max − gear ν)   the drive's velocity limit, of its torque mode                 (3)

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from agents.laws.adaptive_dsc import AdaptiveDsc
 from agents.laws.backstepping_analytic import BacksteppingAnalytic
-from agents.laws.dsc_terms import path_errors
 from agents.laws.fixed_dsc import PAPER_THETA, FixedDsc
 from agents.laws.interface import PathVariable, RobotMotion, Wheels
+from agents.laws.path_errors import path_errors
 from agents.paths import robot_path
 from configs.connections import NetworkLink
 from configs.curves import reference_path

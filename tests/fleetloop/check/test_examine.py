@@ -65,6 +65,9 @@ def test_the_papers_first_torque_is_the_one_that_no_drive_has() -> None:
     assert "691 N·m" in first.text
     limited = [f for f in found("paper", "drive.preset='limited'") if f.title == "first torques"]
     assert {f.level for f in limited} == {"warning"}
+    # What the host limits, the law is told: it learns nothing from it.
+    held = found("paper", "host.torque_limit_wheel_N_m=0.5")
+    assert {f.level for f in held if f.title == "first torques"} == {"ok"}
 
 
 def test_starts_that_the_sampled_adaptation_does_not_survive_are_warned_of() -> None:
