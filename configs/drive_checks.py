@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from configs.errors import Problem
+from configs.plugins import raised
 from configs.scenario import Scenario
 
 MAX_NODE = 62
@@ -20,7 +21,7 @@ def drive_problems(scenario: Scenario) -> Iterator[Problem]:
     if least_s > most_s:
         yield Problem("drive.command_latency_s", [least_s, most_s], "least before most")
     yield from _encoder_period(scenario)
-    yield from drive.problems(scenario.clock, scenario.host)
+    yield from _own(scenario)
     encoder = scenario.encoder
     if 2.0 * encoder.pll_bandwidth_rad_s >= encoder.pll_rate_Hz:
         yield Problem(
@@ -29,6 +30,14 @@ def drive_problems(scenario: Scenario) -> Iterator[Problem]:
             f"must be below half of encoder.pll_rate_Hz = {encoder.pll_rate_Hz:g}, as drives want"
             " it: twice the bandwidth times the loop period is a gain below 1",
         )
+
+
+def _own(scenario: Scenario) -> Iterator[Problem]:
+    """What the protocol's section finds itself; its code may be a user's."""
+    try:
+        yield from scenario.drive.problems(scenario.clock, scenario.host)
+    except Exception as error:
+        yield Problem("drive.protocol", scenario.drive_choice.name, f"its check: {raised(error)}")
 
 
 def _encoder_period(scenario: Scenario) -> Iterator[Problem]:

@@ -180,11 +180,11 @@ def _module(plugin: Plugin, name: str) -> ModuleType:
         if beside is None and error.name is not None and f"{name}.".startswith(f"{error.name}."):
             looked = f"no {name}.py in {plugin.folder}, and " if plugin.folder else ""
             raise PluginError(f"{looked}no module {name} is installed") from error
-        raise PluginError(_raised(error)) from error
+        raise PluginError(raised(error)) from error
     except PluginError:
         raise
     except (Exception, SystemExit) as error:
-        raise PluginError(_raised(error)) from error
+        raise PluginError(raised(error)) from error
 
 
 def _beside(folder: str, name: str) -> Path | None:
@@ -219,7 +219,7 @@ def _loaded(file: Path, name: str) -> ModuleType:
     return module
 
 
-def _raised(error: BaseException) -> str:
+def raised(error: BaseException) -> str:
     """An error of a plug-in's code with the place that raised it."""
     if isinstance(error, SyntaxError):
         return f"{error.filename}, line {error.lineno}: {error.msg}"

@@ -187,13 +187,13 @@ class Encoder:
         gauss = self._random.gauss
         for _ in range(samples):
             seen = at + gauss(0.0, self._noise) if self._noise else at
-            self._take(seen // 1.0)
+            self._count_to(seen // 1.0)
             self._track(self._counted + self._offset, 0.0, 1)
             at += slope
         if not (self._frozen or self._flipped or self._loss or self._noise):
             self._choose_path()
 
-    def _take(self, true: float) -> None:
+    def _count_to(self, true: float) -> None:
         """Go on to the count `true`, with what the faults make of the edges in between."""
         moved, counts = true - self._counted, self._model.counts_per_shaft_rev
         if self._frozen:

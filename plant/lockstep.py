@@ -170,11 +170,11 @@ class LockstepLoop:
         """Advance a bus to its next question, or through the end of its tick."""
         asked = next(lane.steps)
         if asked is None:
-            self._take_on(lane, now_ns)
+            self._end_tick(lane, now_ns)
         else:
             lane.asked_ns, lane.asked = now_ns, asked
 
-    def _take_on(self, lane: _Lane, now_ns: int) -> None:
+    def _end_tick(self, lane: _Lane, now_ns: int) -> None:
         """A bus from its tick to the next, and on as far as the slowest allows."""
         tick = lane.tick
         lane.asked_ns = 0

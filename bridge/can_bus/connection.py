@@ -50,8 +50,8 @@ class SubmissionQueue(Generic[_Item]):
         else:
             self._late.extend(items)
 
-    def take(self) -> list[_Item]:
-        """What is next to take."""
+    def next_batch(self) -> list[_Item]:
+        """Remove the frames whose turn it is, and return them."""
         now, self.now = self.now, []
         if late := self._late:
             self.now = [late.popleft() for _ in range(min(TURN, len(late)))]

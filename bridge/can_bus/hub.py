@@ -75,7 +75,7 @@ class Hub:
             for name, sock in listeners.items()
         }
         self._answered: list[str] = []
-        self._server = ClientServer(tuple(self._buses.values()), wake_fd, self._take_frames)
+        self._server = ClientServer(tuple(self._buses.values()), wake_fd, self._receive_frames)
         self._handle, self._send = self._server.handle, self._server.send
 
     # --- the drives' side ------------------------------------------------------------------------
@@ -143,7 +143,7 @@ class Hub:
     def submitted(self, name: str) -> list[Submitted]:
         """What the clients of a bus with bit timing sent since the last call, in order."""
         bus = self._buses[name]
-        submitted = bus.submitted.take()
+        submitted = bus.submitted.next_batch()
         if bus.held:
             self._release(bus)
         return submitted
@@ -197,10 +197,10 @@ class Hub:
     def receive(self, name: str) -> list[Frame]:
         """What the clients of a bus sent since the last take, in order."""
         bus = self._buses[name]
-        taken = bus.received.take()
+        received = bus.received.next_batch()
         if bus.held:
             self._release(bus)
-        return taken
+        return received
 
     def await_controllers(self, timeout_s: float) -> tuple[str, ...]:
         """Wait until all robots' controllers have joined; return the robots whose have not."""
@@ -250,7 +250,7 @@ class Hub:
 
     # --- frames of clients -----------------------------------------------------------------------
 
-    def _take_frames(self, client: Connection, packet: Packet) -> None:
+    def _receive_frames(self, client: Connection, packet: Packet) -> None:
         bus = client.bus
         _, flags, _, stamp_ns, frames, *_ = packet
         if frames:

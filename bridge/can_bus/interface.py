@@ -64,7 +64,6 @@ FLUSH_S = 10.0
 PATIENCE_S = 1.0
 """How long a sender without a timeout waits for a hub that doesn't read."""
 _LOG = logging.getLogger("can.fleetloop")  # as python-can's own interfaces name theirs
-_IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ignore_config"})
 
 
 class BusClosedError(can.CanOperationError):
@@ -107,19 +106,9 @@ class FleetloopBus(can.BusABC):
         fd: bool = False,
         **kwargs: Any,
     ) -> None:
-        remote = {
-            key: options.as_option(kwargs.pop(key))
-            for key in options.REMOTE
-            if kwargs.get(key) is not None
-        }
-        if unknown := sorted(kwargs.keys() - _IGNORED - options.REMOTE):
-            known = ", ".join(sorted({*_KEYWORDS, *options.REMOTE}))
-            raise TypeError(
-                f"the fleetloop interface has no option {', '.join(unknown)} (it has {known})"
-            )
+        remote = options.remote(kwargs, _KEYWORDS)
         self.channel = options.channel_name(channel)
-        if options.truth("fd", fd):
-            raise can.CanInitializationError(f"bus {channel!r} is classic CAN: fd must be False")
+        options.refuse_fd(channel, fd)
         self._name, self._secret = options.controller(synchronous, secret)
         self._synchronous = bool(self._name)
         self._batched = options.truth("batched", batched) or self._synchronous
@@ -132,9 +121,7 @@ class FleetloopBus(can.BusABC):
         self._reply_due = False
         self._closed_because: str | None = None
         self._queue = 0  # frames that may wait at this node; 0: frames take no time
-        self._submitted = self._released = (
-            0  # frames sent, and how many of them have left the queue
-        )
+        self._submitted = self._released = 0  # frames sent; those that have left the queue
         self._transport = self._connect(own, timeout_s, remote)
         self._send_now, self._next = self._transport.send, self._transport.receive
         self.channel_info = f"fleetloop bus {self.channel}"
@@ -263,10 +250,10 @@ class FleetloopBus(can.BusABC):
             raise self._gone_with(error) from error
         if data is None:
             return False
-        self._take(data)
+        self._process(data)
         return True
 
-    def _take(self, data: bytes) -> None:
+    def _process(self, data: bytes) -> None:
         packet = decode(data)
         if packet is not None and packet[0] == FRAMES:
             _, flags, _, stamp_ns, frames, _, self._released, before_ns, _ = packet

@@ -4,6 +4,7 @@ python-can's configuration files hold text, so text is accepted for every type. 
 `can.CanInitializationError` that names the option, its value and a right one.
 """
 
+from collections.abc import Collection, Mapping
 from math import isfinite
 
 import can
@@ -12,6 +13,8 @@ from can.util import cast_from_string
 TLS = ("ca", "certificate", "private_key")
 REMOTE = frozenset({"endpoint", "user", "password", "users", *TLS})
 """Options of a client on another machine: see `bridge.can_bus.credentials`."""
+_IGNORED = frozenset({"bitrate", "data_bitrate", "timing", "single_handle", "ignore_config"})
+"""Options of python-can's other interfaces without a meaning here."""
 LONGEST_S = 1e6
 """Longer times are cut to this: the kernel's own have a bound."""
 _TRUTHS = {"true": True, "1": True, "yes": True, "on": True, "": False}
@@ -29,6 +32,20 @@ def as_option(value: object) -> str:
     except ValueError:  # more digits than Python makes a number of
         read = value
     return str(read).lower() if isinstance(read, bool) else str(read)
+
+
+def remote(others: Mapping[str, object], keywords: Collection[str]) -> dict[str, str]:
+    """The given options of a client on another machine; `keywords` are those of every client.
+
+    Raises:
+        TypeError: there is no such option.
+    """
+    if unknown := sorted(others.keys() - _IGNORED - REMOTE):
+        known = ", ".join(sorted({*keywords, *REMOTE}))
+        raise TypeError(
+            f"the fleetloop interface has no option {', '.join(unknown)} (it has {known})"
+        )
+    return {key: as_option(others[key]) for key in sorted(REMOTE) if others.get(key) is not None}
 
 
 def truth(name: str, value: object) -> bool:
@@ -64,6 +81,12 @@ def channel_name(value: object) -> str:
             " fleetloop can list says what is up",
         )
     return as_option(value)
+
+
+def refuse_fd(channel: object, value: object) -> None:
+    """Refuse CAN FD."""
+    if truth("fd", value):
+        raise can.CanInitializationError(f"bus {channel!r} is classic CAN: fd must be False")
 
 
 def controller(value: object, secret: object) -> tuple[str, str]:

@@ -172,8 +172,8 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
         self._thread = threading.Thread(target=self._serve, daemon=True)
         for user in granted:
             # One by one: guests must learn of the subscriber, and may see no wider key.
-            link.each_keyed(keys.guest_lines("up", user), self._hear)
-            link.each_live(keys.guest_lines("alive", user), self._note)
+            link.each_keyed(keys.guest_lines("up", user), self._on_packet)
+            link.each_live(keys.guest_lines("alive", user), self._on_token)
             link.declare_live(keys.guest_relay(user))
         self._thread.start()
 
@@ -193,10 +193,10 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
 
     # --- on Zenoh's threads ----------------------------------------------------------------------
 
-    def _hear(self, key: str, packet: bytes) -> None:
+    def _on_packet(self, key: str, packet: bytes) -> None:
         self._put(_Event(key.removesuffix("/up"), packet))
 
-    def _note(self, key: str, alive: bool) -> None:
+    def _on_token(self, key: str, alive: bool) -> None:
         self._put(_Event(key.removesuffix("/alive"), alive=alive))
 
     def _put(self, event: _Event) -> None:
@@ -222,7 +222,7 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
             for fd, event in self._epoll.poll(0.02 if self._over_at else None):
                 if fd == self._wake:
                     os.eventfd_read(self._wake)
-                    self._take_events()
+                    self._process_events()
                 elif (guest := self._by_fd.get(fd)) is not None:
                     with self._only(guest.place):
                         self._move(guest, ended=bool(event & _HANG_UP))
@@ -230,8 +230,8 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
             self._part(guest)
         self._epoll.close()
 
-    def _take_events(self) -> None:
-        """Take some events, so that a flood does not delay packets of the hub."""
+    def _process_events(self) -> None:
+        """Process some events, so that a flood does not delay packets of the hub."""
         for _ in range(_EVENTS):
             try:
                 place, packet, alive = self._events.get_nowait()
@@ -243,7 +243,7 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
                 continue
             with self._only(place):
                 if packet is not None:
-                    self._take(place, packet)
+                    self._process(place, packet)
                 elif alive:
                     self._alive.add(place)
                 else:
@@ -263,7 +263,7 @@ class Relay(contextlib.AbstractContextManager["Relay"]):
             if (guest := self._guests.get(place)) is not None:
                 self._part(guest)
 
-    def _take(self, place: str, packet: bytes) -> None:
+    def _process(self, place: str, packet: bytes) -> None:
         with self._lock:
             self._held[_user_of(place)] -= len(packet) + _EVENT_BYTES
         guest = self._guests.get(place)

@@ -64,7 +64,7 @@ class ZenohTransport:
             raise OSError(str(error)) from error
         try:
             self._readable = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC | os.EFD_SEMAPHORE)
-            self._link.each(f"{place}/down", self._take)
+            self._link.each(f"{place}/down", self._on_packet)
             self._link.on_gone(keys.guest_relay(network.user), self._lose)
             self._up = self._link.publisher(f"{place}/up")
             self._link.declare_live(f"{place}/alive")
@@ -91,12 +91,12 @@ class ZenohTransport:
 
     # --- on Zenoh's thread -----------------------------------------------------------------------
 
-    def _take(self, packet: bytes) -> None:
+    def _on_packet(self, packet: bytes) -> None:
         kind = packet[0] if packet else 0
         answer = self._keep_or_answer(packet, kind)
         if answer is not None:
             with contextlib.suppress(OSError):
-                self._say(answer)
+                self._publish(answer)
         if kind in _ENDS:
             # After the answer: the waiting thread then closes the session.
             self._ended.set()
@@ -148,7 +148,7 @@ class ZenohTransport:
             if not self._sender.has_credit():
                 raise BlockingIOError
             self._sender.spend(packet)
-        self._say(packet)
+        self._publish(packet)
 
     def await_writable(self, timeout_s: float) -> bool:
         """Wait for credit, or for the end of the connection."""
@@ -177,10 +177,10 @@ class ZenohTransport:
             credit = self._receiver.consume(self._held.popleft()) if self._held else None
         if credit is not None:
             with contextlib.suppress(OSError):  # the end is still to be read
-                self._say(credit)
+                self._publish(credit)
         return packet
 
-    def _say(self, packet: bytes) -> None:
+    def _publish(self, packet: bytes) -> None:
         try:
             self._up.put(packet)
         except zenoh.ZError as error:
@@ -202,6 +202,6 @@ class ZenohTransport:
         os.close(readable)
         if not self._broken:
             with contextlib.suppress(OSError):
-                self._say(encode_text(BYE))
+                self._publish(encode_text(BYE))
         self._ended.wait(CLOSE_S)
         self._link.close()

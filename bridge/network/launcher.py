@@ -18,10 +18,10 @@ RUN_ENDED = "the run was ended"
 def follow_launcher(link: ZenohLink, run: str, stop: Stop) -> None:
     """End with the run, for its reason."""
 
-    def hear(payload: bytes) -> None:
+    def on_report(payload: bytes) -> None:
         report = LauncherReport.decode(payload)
         if report is not None:
             stop.end(f"{RUN_ENDED}: {report.reason}")
 
-    link.each(keys.report(run, LAUNCHER.name), hear)
+    link.each(keys.report(run, LAUNCHER.name), on_report)
     link.on_gone(keys.live(run, LAUNCHER.name), partial(stop.end, LAUNCHER_GONE))

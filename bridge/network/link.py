@@ -92,12 +92,12 @@ def waiting(link: Link, most: int = MOST_AT_ONCE) -> Iterator[Arrival]:
 class Mailbox:
     """The room of one subscription. Filled from whatever thread, emptied by one."""
 
-    __slots__ = ("_admitted", "_given", "_lock", "_removed", "_room", "_taken", "dropped")
+    __slots__ = ("_admitted", "_given", "_lock", "_released", "_removed", "_room", "dropped")
 
     def __init__(self, room_bytes: int) -> None:
         self.dropped = 0
         self._room = room_bytes
-        self._given = self._taken = 0
+        self._given = self._released = 0
         self._admitted = self._removed = 0
         self._lock = threading.Lock()
 
@@ -105,7 +105,7 @@ class Mailbox:
         """Whether there is room for a message; a single one always finds some."""
         size = payload_bytes + _OVERHEAD_BYTES
         with self._lock:
-            held = self._given - self._taken
+            held = self._given - self._released
             full = self._admitted - self._removed >= MOST_WAITING
             if full or (held and held + size > self._room):
                 self.dropped += 1
@@ -114,9 +114,9 @@ class Mailbox:
             self._admitted += 1
         return True
 
-    def take(self, payload_bytes: int) -> None:
-        """A message has been taken out."""
-        self._taken += payload_bytes + _OVERHEAD_BYTES
+    def release(self, payload_bytes: int) -> None:
+        """Give back the room of a message that was received."""
+        self._released += payload_bytes + _OVERHEAD_BYTES
         self._removed += 1
 
 
@@ -139,11 +139,11 @@ class Inbox:
         self._boxes.append((tag, key, box))
         put = self._queue.put
 
-        def take(key: str, payload: Callable[[], bytes], size: int) -> None:
+        def put_arrival(key: str, payload: Callable[[], bytes], size: int) -> None:
             if box.admit(size):
                 put((Arrival(tag, key, payload()), box))
 
-        return take
+        return put_arrival
 
     def put_latest(self, arrival: Arrival) -> None:
         """Queue a message that replaces one of the same tag and key, if that still waits."""
@@ -168,7 +168,7 @@ class Inbox:
         except Empty:
             return None
         if box is not None:
-            box.take(len(arrival.payload))
+            box.release(len(arrival.payload))
             return arrival
         with self._lock:
             return arrival._replace(payload=self._latest.pop((arrival.tag, arrival.key)))

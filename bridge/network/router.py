@@ -92,7 +92,7 @@ def open_router(
     dictionary = folder / "users"
     dictionary.touch(mode=0o600)
     dictionary.write_text(access.dictionary(), "utf-8")
-    with zenoh_log.listening(denials.take, is_ours):
+    with zenoh_log.listening(denials.process, is_ours):
         try:
             session, at = _listen(endpoint, access, dictionary, outside, unread_s, lease_s)
         finally:

@@ -118,23 +118,23 @@ class Denials:
         """Called, on the log's thread, with the address of a returning flooder."""
         self._caching: dict[str, str] = {}  # the key whose permissions a thread looks up in advance
 
-    def take(self, line: str) -> None:
+    def process(self, line: str) -> None:
         """Read a line of the log."""
         found = _LINE.match(line)
         if found is None:
             return
         text = line[found.end() :]
         if "access_control" in found["where"]:
-            self._take_rights(found["thread"], text)
+            self._on_denial(found["thread"], text)
         elif deaf := _DEAF.match(text):
-            self._take_deaf(deaf["zid"])
+            self._on_deaf(deaf["zid"])
         elif "tls" in found["where"]:
             if accepted := _TLS.match(text):
                 _remember(self._names, accepted["peer"], accepted["name"])
             elif failed := _HANDSHAKE.match(text):
-                self._take_handshake(failed["why"])
+                self._on_handshake(failed["why"])
         elif syn := _SYN.match(text):
-            self._take_syn(syn["kind"], syn["peer"], text)
+            self._on_syn(syn["kind"], syn["peer"], text)
         elif wrong := _WRONG.match(text):
             user, peer = self._latest
             self._users = {zid: at for zid, at in self._users.items() if at != (user, peer)}
@@ -180,7 +180,7 @@ class Denials:
         """Refused logins as `user`."""
         return [note for note in self.notes() if f"the login of {_shown(user)} " in note]
 
-    def _take_syn(self, kind: str, peer: str, text: str) -> None:
+    def _on_syn(self, kind: str, peer: str, text: str) -> None:
         if kind == "Init":
             self._latest = ("", peer)
             if zid := _ZID.search(text):
@@ -196,7 +196,7 @@ class Denials:
         if (zid_of_peer := self._zids.pop(peer, "")) and user:
             _remember(self._users, zid_of_peer, (user, peer))
 
-    def _take_deaf(self, zid: str) -> None:
+    def _on_deaf(self, zid: str) -> None:
         """Said for every message that could not be sent, until the session has ended."""
         if zid not in self._deaf:
             _remember(self._deaf, zid, True)
@@ -209,7 +209,7 @@ class Denials:
                 " all other clients would have waited for it",
             )
 
-    def _take_rights(self, thread: str, text: str) -> None:
+    def _on_denial(self, thread: str, text: str) -> None:
         if caching := _CACHING.match(text):
             _remember(self._caching, thread, caching["key"])
         elif stranger := _STRANGER.match(text):
@@ -240,7 +240,7 @@ class Denials:
             text = f"cut off {_shown(user)} from {_host(peer)}: it went on with what it may not do"
             self._count(FLOOD, user, text)
 
-    def _take_handshake(self, why: str) -> None:
+    def _on_handshake(self, why: str) -> None:
         identity = ""
         if expired := _EXPIRED.search(why):
             identity = self._expiries.get(int(expired["at"]), "")

@@ -52,13 +52,13 @@ class ZenohLink:
         """Queue what others put on `key`, marked with `tag`; what finds no room is counted."""
         put = self._inbox.mailbox(key, tag, room_bytes)
 
-        def take(sample: zenoh.Sample) -> None:
+        def on_sample(sample: zenoh.Sample) -> None:
             payload = sample.payload
             put(str(sample.key_expr), payload.to_bytes, len(payload))
 
         self._declared.append(
             self._session.declare_subscriber(
-                key, Callback(take, indirect=False), allowed_origin=zenoh.Locality.REMOTE
+                key, Callback(on_sample, indirect=False), allowed_origin=zenoh.Locality.REMOTE
             )
         )
 
@@ -69,12 +69,12 @@ class ZenohLink:
     def each_keyed(self, key_expr: str, act: Callable[[str, bytes], None]) -> None:
         """Call `act`, on the network's thread, with key and payload of what others put."""
 
-        def take(sample: zenoh.Sample) -> None:
+        def on_sample(sample: zenoh.Sample) -> None:
             act(str(sample.key_expr), sample.payload.to_bytes())
 
         self._declared.append(
             self._session.declare_subscriber(
-                key_expr, Callback(take, indirect=False), allowed_origin=zenoh.Locality.REMOTE
+                key_expr, Callback(on_sample, indirect=False), allowed_origin=zenoh.Locality.REMOTE
             )
         )
 
@@ -89,21 +89,21 @@ class ZenohLink:
     def on_gone(self, key: str, act: Callable[[], None]) -> None:
         """Call `act`, on the network's thread, when the token on `key` goes, or the way to it."""
 
-        def take(_: str, alive: bool) -> None:
+        def on_token(_: str, alive: bool) -> None:
             if not alive:
                 act()
 
-        self.each_live(key, take)
+        self.each_live(key, on_token)
 
     def each_live(self, key_expr: str, act: Callable[[str, bool], None]) -> None:
         """Call `act`, on the network's thread, with every token that is there, comes or goes."""
 
-        def take(sample: zenoh.Sample) -> None:
+        def on_sample(sample: zenoh.Sample) -> None:
             act(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
         self._declared.append(
             self._session.liveliness().declare_subscriber(
-                key_expr, Callback(take, indirect=False), history=True
+                key_expr, Callback(on_sample, indirect=False), history=True
             )
         )
 

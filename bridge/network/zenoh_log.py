@@ -43,8 +43,8 @@ def begin(directives: str = "") -> None:
 
 
 @contextlib.contextmanager
-def listening(take: Callable[[str], None], is_ours: Callable[[str], bool]) -> Iterator[None]:
-    """Call `take`, in a thread of its own, with every line of the log until the end.
+def listening(process: Callable[[str], None], is_ours: Callable[[str], bool]) -> Iterator[None]:
+    """Call `process`, in a thread of its own, with every line of the log until the end.
 
     Lines go on to standard error if RUST_LOG is set, but for those that are ours.
     """
@@ -57,7 +57,7 @@ def listening(take: Callable[[str], None], is_ours: Callable[[str], bool]) -> It
     ours = os.fstat(into).st_ino
     os.close(into)
     over = threading.Event()
-    reader = threading.Thread(target=_read, args=(out, before, over, take, is_ours), daemon=True)
+    reader = threading.Thread(target=_read, args=(out, before, over, process, is_ours), daemon=True)
     reader.start()
     try:
         yield
@@ -76,7 +76,7 @@ def _read(
     out: int,
     before: int,
     over: threading.Event,
-    take: Callable[[str], None],
+    process: Callable[[str], None],
     is_ours: Callable[[str], bool],
 ) -> None:
     asked = bool(os.environ.get("RUST_LOG"))
@@ -88,7 +88,7 @@ def _read(
                 _write(before, line)
                 continue
             if b" is authorized to " not in line:
-                take(line.decode("utf-8", "replace"))
+                process(line.decode("utf-8", "replace"))
             if asked and not is_ours(line.decode("utf-8", "replace")):
                 _write(2, line)
         over.wait(_PAUSE_S)

@@ -166,7 +166,7 @@ class Segment:
             if self.recovery.nodes:
                 node = self.recovery.next(plan.start_ns if plan else None)
                 if node is not None and self.recovery.back_ns(node) <= to_ns:
-                    self._note(node, self.recovery.finish(node), events)
+                    self._report_state(node, self.recovery.finish(node), events)
                     continue
             if plan is None or plan.done_ns > to_ns:
                 return
@@ -243,7 +243,7 @@ class Segment:
                 Delivered(plan.done_ns, plan.start_ns, plan.sender, plan.entry.frame, plan.heard_by)
             )
             self._sent(plan.sender, plan.entry, plan, events)
-            self._heard(plan, events)
+            self._received(plan, events)
         elif what.error is None:
             self._transmitted(plan, what, events)
         else:
@@ -262,7 +262,7 @@ class Segment:
             node.queue.sent(entry)
         if node.confinement.tec:
             node.confinement.sent()
-            self._note(node, plan.done_ns, events)
+            self._report_state(node, plan.done_ns, events)
         self._rest(node, plan)
 
     def _rest(self, node: Node, plan: Plan) -> None:
@@ -272,12 +272,12 @@ class Segment:
         if not node.queue.entries and node in self._ready:
             self._ready.remove(node)
 
-    def _heard(self, plan: Plan, events: list[Event]) -> None:
+    def _received(self, plan: Plan, events: list[Event]) -> None:
         """All others have received a frame."""
         if self._troubled:
             for node in plan.heard_by:
                 node.confinement.received()
-                self._note(node, plan.done_ns, events)
+                self._report_state(node, plan.done_ns, events)
             self._troubled = any(node.confinement.rec for node in self.nodes)
 
     def _transmitted(self, plan: Plan, what: Outcome, events: list[Event]) -> None:
@@ -290,7 +290,7 @@ class Segment:
             self._sent(node, entry, plan, events)
         for node, _ in what.fallen:
             self._lost(node, ErrorKind.BIT, plan, events)
-        self._heard(plan, events)
+        self._received(plan, events)
 
     def _failed(self, plan: Plan, what: Outcome, kind: ErrorKind, events: list[Event]) -> None:
         self.errors += 1
@@ -314,7 +314,7 @@ class Segment:
         self._troubled = True
         for node in plan.heard_by if what.first is None else (*plan.heard_by, what.first):
             node.confinement.receive_failed(first=node is what.first)
-            self._note(node, at_ns, events)
+            self._report_state(node, at_ns, events)
 
     def _lost(self, node: Node, kind: ErrorKind, plan: Plan, events: list[Event]) -> None:
         """An attempt of a node to send has failed."""
@@ -324,10 +324,10 @@ class Segment:
             node.confinement.not_acknowledged()
         else:
             node.confinement.send_failed()
-        self._note(node, plan.done_ns, events)
+        self._report_state(node, plan.done_ns, events)
         self._rest(node, plan)
 
-    def _note(self, node: Node, at_ns: int, events: list[Event]) -> None:
+    def _report_state(self, node: Node, at_ns: int, events: list[Event]) -> None:
         """Report it if a node's counters have changed its state."""
         state = node.confinement.state
         if state is node.state or not node.attached:

@@ -112,7 +112,7 @@ class Gateway:
                     self.outward.error_frames += 1
                     continue
                 try:
-                    self._send_out(message)
+                    self._forward_out(message)
                     failures = 0
                 except (can.CanError, OSError) as error:
                     failures += 1
@@ -125,7 +125,7 @@ class Gateway:
         finally:
             self.over.set()
 
-    def _send_out(self, message: can.Message) -> None:
+    def _forward_out(self, message: can.Message) -> None:
         frame = to_frame(message)
         now_s = self.clock.monotonic_s()
         with self._lock:
@@ -150,7 +150,7 @@ class Gateway:
                     continue
                 failures = 0
                 if message is not None:
-                    self._take_in(message)
+                    self._forward_in(message)
                 if self.guard.storm:
                     self.far_gone = (
                         "what goes out to it comes back: another gateway joins the same two buses,"
@@ -162,7 +162,7 @@ class Gateway:
         finally:
             self.over.set()
 
-    def _take_in(self, message: can.Message) -> None:
+    def _forward_in(self, message: can.Message) -> None:
         counters = self.inward
         if message.is_error_frame:
             counters.error_frames += 1

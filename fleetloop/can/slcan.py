@@ -104,7 +104,7 @@ class Port:
             except OSError:
                 # EAGAIN: all read. EIO: no program has the device open, which is an event too.
                 return
-            reply, frames = self._adapter.hear(data)
+            reply, frames = self._adapter.process(data)
             self._kept += reply[: max(2 * KEPT_BYTES - len(self._kept), 0)]
             for frame in frames:
                 try:

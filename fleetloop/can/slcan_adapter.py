@@ -50,7 +50,7 @@ class Answer(NamedTuple):
 
 
 class Adapter:
-    """One adapter; `hear` what software writes, write to it what `show` returns."""
+    """One adapter; `process` what software writes, write to it what `show` returns."""
 
     __slots__ = ("_flags", "_line", "_listening", "_stamped", "opened")
 
@@ -61,8 +61,8 @@ class Adapter:
         self._flags = 0
         self._line = bytearray()
 
-    def hear(self, data: bytes) -> Answer:
-        """Take bytes, in any portions; the answer to the lines that are complete."""
+    def process(self, data: bytes) -> Answer:
+        """Process bytes, in any portions; return the answer to the lines that are complete."""
         reply = bytearray()
         frames: list[Frame] = []
         for byte in data:

@@ -67,7 +67,7 @@ class ControlPlane:
     def receive(self, link: Link, within_s: float) -> None:
         """Take the next message, waiting at most so long [s]."""
         if (arrival := link.receive(within_s)) is not None:
-            self.take(arrival)
+            self.process(arrival)
 
     def settle(self, link: Link, children: Sequence[Child], within_s: float) -> list[Child]:
         """Take messages until these have ended, at most so long [s]; return those that haven't."""
@@ -92,7 +92,7 @@ class ControlPlane:
         """Record what the launcher has noticed about a process."""
         self._tell(self.outcome.notices.setdefault(process, []), process, text)
 
-    def take(self, arrival: Arrival) -> None:
+    def process(self, arrival: Arrival) -> None:
         """Take one message."""
         process = keys.process_of(arrival.key)
         match arrival.tag:
@@ -102,14 +102,14 @@ class ControlPlane:
                 self.remote.note_token(process, self.now(), there=there)
             case "progress":
                 if (progress := self.words.progress(process, arrival.payload)) is not None:
-                    self._take_progress(process, progress)
+                    self._process_progress(process, progress)
             case "notice":
                 if (notice := self.words.notice(process, arrival.payload)) is not None:
                     self._tell(self.outcome.said.setdefault(process, []), process, notice.text)
             case _:
-                self._take_report(process, arrival.payload)
+                self._process_report(process, arrival.payload)
 
-    def _take_progress(self, process: str, progress: Progress) -> None:
+    def _process_progress(self, process: str, progress: Progress) -> None:
         silence = self.vitals.beat(process, progress.tick, self.now())
         if silence is not None:
             self.note(process, f"goes on after {silence.lasted_s:.1f} s")
@@ -119,7 +119,7 @@ class ControlPlane:
             self.outcome.wall_s = progress.wall_ns * 1e-9
             self._on_progress(progress)
 
-    def _take_report(self, process: str, payload: bytes) -> None:
+    def _process_report(self, process: str, payload: bytes) -> None:
         if (report := self.words.report(process, payload)) is not None:
             self.vitals.end(process)
             self.outcome.reports[process] = report

@@ -67,7 +67,7 @@ class Ending:
                 recorder.ask_to_stop()
             self._drain(link, recorder)
         for arrival in waiting(link):
-            plane.take(arrival)
+            plane.process(arrival)
         if recorder is not None:
             self._end_recorder(recorder)
 

@@ -42,13 +42,13 @@ class Record:
         """
         blocks: dict[tuple[int, Kind], list[np.ndarray]] = {}
 
-        def take(channel: int, messages: np.ndarray) -> None:
+        def keep(channel: int, messages: np.ndarray) -> None:
             kind = schema.kind_of(channel)
             if kind is not Kind.POSE:
                 number = schema.robot_number_of(channel)
                 blocks.setdefault((number, kind), []).append(messages["payload"])
 
-        found = scan(path, take)
+        found = scan(path, keep)
         if found.damaged and not damaged:
             raise RecordError(f"{path}: {found.lost}; --partial reads the part before it")
         layout = found.head.layout

@@ -55,8 +55,8 @@ class _Recorder:
         self.unfinished = set(sources)
         self.ticks = 0
 
-    def take(self, arrival: Arrival) -> bool:
-        """Take what may be taken; return whether the record has more now."""
+    def process(self, arrival: Arrival) -> bool:
+        """Store what may be stored; return whether the record has more now."""
         kind, _, robot = arrival.tag.partition("/")
         rows = Rows.decode(arrival.payload, self._row_sizes[arrival.tag])
         wrong = "not well formed" if rows is None else self._wrong(kind, robot, rows)
@@ -70,7 +70,7 @@ class _Recorder:
         if rows.length and kind == "can":
             self._record.traffic(robot, rows.rows)
         elif kind != "can":
-            self._take_rows(robot, "plant" if kind == "plant" else "controller", rows)
+            self._store_rows(robot, "plant" if kind == "plant" else "controller", rows)
         if rows.final:
             self.unfinished.discard(arrival.tag)
         return rows.length > 0 or rows.final
@@ -128,7 +128,7 @@ class _Recorder:
             return f"a frame at {frames['stamp_ns'].max() * 1e-9:.6g} s of bus time"
         return None
 
-    def _take_rows(self, robot: str, source: Source, rows: Rows) -> None:
+    def _store_rows(self, robot: str, source: Source, rows: Rows) -> None:
         if rows.length:
             self._record.add(robot, source, rows.first_tick, rows.rows)
             self.ticks = max(self.ticks, rows.first_tick + rows.length)
@@ -165,7 +165,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         await_hellos(
             link,
             Hellos(brief.hello_every_s),
-            recorder.take,
+            recorder.process,
             lambda: sorted(recorder.unheard),
             name=RECORDER.name,
             within_s=brief.start_deadline_s,
@@ -178,7 +178,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         while recorder.unfinished:
             arrival = link.receive(PROGRESS_EVERY_S)
             now = SYSTEM_CLOCK.monotonic_s()
-            if arrival is not None and recorder.take(arrival):
+            if arrival is not None and recorder.process(arrival):
                 quiet_since = now
             elif arrival is not None:
                 SYSTEM_CLOCK.sleep(0.0)  # of a flood: let the network's thread have its turn

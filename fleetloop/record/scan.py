@@ -30,7 +30,7 @@ from fleetloop.record.head import MAGIC, PREFIX, Head, HeadError, encoded, under
 
 _END, _LOST = "fleetloop.end", "lost"
 _FOOTER = struct.Struct("<QQI")
-Take = Callable[[int, np.ndarray], None]
+Visit = Callable[[int, np.ndarray], None]
 
 
 class RecordError(ScenarioError):
@@ -77,8 +77,8 @@ def end_record(lost: str) -> records.Metadata:
     return records.Metadata(_END, {_LOST: lost})
 
 
-def scan(path: Path, take: Take = lambda _channel, _messages: None) -> Scan:
-    """Scan a record file; `take` gets channel and messages of every chunk before a damage.
+def scan(path: Path, visit: Visit = lambda _channel, _messages: None) -> Scan:
+    """Scan a record file; `visit` gets channel and messages of every chunk before a damage.
 
     Raises:
         RecordError: it is no record, its head isn't whole, or it can't be read.
@@ -88,7 +88,7 @@ def scan(path: Path, take: Take = lambda _channel, _messages: None) -> Scan:
             file = _File(stream)
             found = _head(path, file)
             try:
-                _body(file, found, take)
+                _body(file, found, visit)
             except _CutError as cut:
                 found.lost = str(cut)
             except DamageError as damage:
@@ -158,26 +158,26 @@ def _head(path: Path, file: _File) -> Scan:
         raise RecordError(f"{path}: {error}") from error
 
 
-def _body(file: _File, found: Scan, take: Take) -> None:
+def _body(file: _File, found: Scan, visit: Visit) -> None:
     """Chunks, end and summary."""
     chunks = ChunkReader(found.head.layout)
     record = file.record()
     while record.opcode == Opcode.CHUNK:
         index = file.record()
-        with _at(record.start):
+        with _naming_place(record.start):
             if index.opcode != Opcode.MESSAGE_INDEX:
                 raise DamageError("a chunk without index")
             channel, messages = chunks.unpack(record.content, index.content)
         length, packed = index.start - record.start, packed_size(record.content)
         summary = summary_of(channel, messages, record.start, length, packed)
         found.chunks.append(Written(summary, channel, len(messages), record.crc_before))
-        take(channel, messages)
+        visit(channel, messages)
         found.end, found.crc = file.at, file.crc
         record = file.record()
-    with _at(record.start):
+    with _naming_place(record.start):
         lost = _missing(record)
     record = file.record()
-    with _at(record.start):
+    with _naming_place(record.start):
         if record.opcode != Opcode.DATA_END or len(record.content) != 4:
             raise DamageError("no end of the rows")
         if int.from_bytes(record.content, "little") != record.crc_before:
@@ -210,7 +210,7 @@ def _summary(file: _File) -> None:
     record = file.record()
     while record.opcode != Opcode.FOOTER:
         record = file.record()
-    with _at(start):
+    with _naming_place(start):
         if len(record.content) != _FOOTER.size:
             raise DamageError("the footer is damaged")
         summary_start, _, crc = _FOOTER.unpack(record.content)
@@ -222,7 +222,7 @@ def _summary(file: _File) -> None:
 
 
 @contextlib.contextmanager
-def _at(start: int) -> Iterator[None]:
+def _naming_place(start: int) -> Iterator[None]:
     """Name the place of a damage."""
     try:
         yield

@@ -39,8 +39,8 @@ class _Rows:
         self.blocks.append(block)
         self.count += len(block)
 
-    def take(self, count: int) -> np.ndarray:
-        """The first `count` rows, or all if there are fewer."""
+    def pop(self, count: int) -> np.ndarray:
+        """Remove and return the first `count` rows, or all if there are fewer."""
         rows = np.concatenate(self.blocks) if self.blocks else np.empty((0, 0))
         self.blocks = [rows[count:]] if len(rows) > count else []
         taken = rows[:count]
@@ -163,7 +163,7 @@ class RecordWriter:
     def _write_group(self, ticks: int) -> None:
         for (number, kind), held in self._sources.items():
             first = held.first_tick
-            rows = held.take(ticks)
+            rows = held.pop(ticks)
             if not len(rows):
                 continue
             channel = channel_id(number, kind)

@@ -119,13 +119,13 @@ class TimedBus:
                     for starved in waiting:
                         if self._transmitted:
                             yield self._ask(starved)
-                            self._take_answer()
+                            self._process_answer()
                         yield self._ask(starved)
-                        self._take_answer()
+                        self._process_answer()
                     break
                 waiting.remove(asked)
                 yield self._ask(asked)
-                self._take_answer()
+                self._process_answer()
             self._run(end_ns)
             yield None
 
@@ -136,7 +136,7 @@ class TimedBus:
         self._port.forward(self._now_ns, transmitted, robot)
         return robot
 
-    def _take_answer(self) -> None:
+    def _process_answer(self) -> None:
         for key in self._port.departed():
             self._detach(key)
         self.submit(self._port.submitted())
@@ -150,7 +150,7 @@ class TimedBus:
     def react(self, now_ns: int) -> None:
         """Submit the clients' frames to the wire."""
         self.advance(now_ns)
-        self._take_answer()
+        self._process_answer()
 
     def advance(self, now_ns: int) -> None:
         """Let everything happen through this instant, or through the last one if that is later."""

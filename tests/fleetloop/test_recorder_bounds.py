@@ -42,7 +42,7 @@ def rows(first: int, count: int, *, final: bool = False) -> bytes:
 
 
 def take(recorder: _Recorder, payload: bytes, tag: str = "controller/r1") -> list[str]:
-    recorder.take(Arrival(tag, "key", payload))
+    recorder.process(Arrival(tag, "key", payload))
     return recorder.refusals.lines()
 
 

@@ -1,5 +1,7 @@
 """A second drive protocol is a folder and a row: the one of `support.second_drive` runs a robot."""
 
+from pathlib import Path
+
 import pytest
 from support.second_drive.tools import PlainSection
 
@@ -101,6 +103,24 @@ def test_relations_of_its_keys_are_its_own() -> None:
     assert "two of drive.heartbeat_period_s need" in str(refused.value)
     assert "host.heartbeat_age_limit_s=0.001: two of drive.heartbeat_period_s" in str(refused.value)
     assert load("two_robots", (f"drive.protocol='{OWN}'", *short)).clock.countdown_s == 0.0
+
+
+def test_a_check_of_its_keys_that_fails_is_told_with_its_place(tmp_path: Path) -> None:
+    (tmp_path / "failing.py").write_text(
+        "from dataclasses import dataclass\n"
+        "from support.second_drive import ROW as PLAIN\n"
+        "@dataclass(frozen=True, slots=True, kw_only=True)\n"
+        "class Section(PLAIN.section):\n"
+        "    def problems(self, clock, host):\n"
+        "        yield 1 / 0\n"
+        "ROW = PLAIN._replace(section=Section)\n"
+    )
+    scenario = to_toml(load("two_robots", (f"drive.protocol='{OWN}'",)))
+    (tmp_path / "s.toml").write_text(scenario.replace(OWN, "failing:ROW"))
+    with pytest.raises(
+        ScenarioError, match=r"drive\.protocol = .*its check: .*failing\.py, line 6"
+    ):
+        load(tmp_path / "s.toml")
 
 
 def test_an_unknown_protocol_is_one_complaint() -> None:

@@ -43,7 +43,7 @@ def test_room_comes_back_with_what_is_taken() -> None:
 def test_little_messages_are_bounded_by_their_number() -> None:
     box = Mailbox(1 << 40)
     assert [box.admit(1) for _ in range(MOST_WAITING + 2)] == [True] * MOST_WAITING + [False] * 2
-    box.take(1)
+    box.release(1)
     assert box.admit(1)
     assert box.dropped == 2
 
@@ -52,7 +52,7 @@ def test_a_single_message_always_finds_room() -> None:
     box = Mailbox(10)
     assert box.admit(1_000_000)
     assert not box.admit(1)
-    box.take(1_000_000)
+    box.release(1_000_000)
     assert box.admit(1)
 
 

@@ -169,14 +169,14 @@ def test_no_line_whatever_breaks_the_reader_and_what_it_keeps_is_bounded() -> No
     head = "2026-11-26T17:19:09.991607Z TRACE acc-0 ThreadId(05) "
     accept = head + "zenoh_transport::unicast::establishment::accept: "
     for junk in ("", "x", head, accept, f"{accept}Establishment Accept OpenSyn: a => tcp/b. Rec"):
-        denials.take(junk)
+        denials.process(junk)
     for n in (*range(3 * MOST), 7, 7):
         user = f"u{n}".encode()
         login = bytes((0x42, len(user) + 1, len(user))) + user
         slices = ", ".join(f"{byte:02x}" for byte in login)
         syn = f"Establishment Accept OpenSyn: tcp/a => tcp/h:{n}. Received: "
-        denials.take(f"{accept}{syn}ext_auth: Some(ZExtZBuf {{ slices: [[{slices}]] }})")
-        denials.take(f"{accept}UsrPwd extension - Recv OpenSyn. Invalid user. at x.rs:1.")
+        denials.process(f"{accept}{syn}ext_auth: Some(ZExtZBuf {{ slices: [[{slices}]] }})")
+        denials.process(f"{accept}UsrPwd extension - Recv OpenSyn. Invalid user. at x.rs:1.")
     assert "refused the login of 'u7' from h: no identity of this run (3 times)" in denials.notes()
     assert "refused the login of 'u8' from h: no identity of this run" in denials.notes()
     assert len(denials.notes()) == MOST + 1

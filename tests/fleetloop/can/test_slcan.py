@@ -52,13 +52,13 @@ frames = st.builds(
     ],
 )
 def test_every_line_has_its_reply(lines: bytes, replies: bytes) -> None:
-    assert Adapter().hear(lines).reply == replies
+    assert Adapter().process(lines).reply == replies
 
 
 def test_frames_of_lines_are_those_of_the_manual() -> None:
     adapter = Adapter()
-    adapter.hear(b"O\r")
-    heard = adapter.hear(b"t10021133\rT0000010021133\rr1000\rr100\rR00000100 8\rR000001008\r")
+    adapter.process(b"O\r")
+    heard = adapter.process(b"t10021133\rT0000010021133\rr1000\rr100\rR00000100 8\rR000001008\r")
     assert heard.frames == (
         Frame(0x100, b"\x11\x33"),
         Frame(0x100 | EFF, b"\x11\x33"),
@@ -71,10 +71,10 @@ def test_frames_of_lines_are_those_of_the_manual() -> None:
 @given(frames, st.integers(0, 10**12))
 def test_what_is_shown_is_what_is_parsed(frame: Frame, stamp_ns: int) -> None:
     adapter = Adapter()
-    adapter.hear(b"O\r")
+    adapter.process(b"O\r")
     line = adapter.show(frame, stamp_ns)
     assert parse(line.removesuffix(b"\r")) == frame
-    adapter.hear(b"Z1\r")
+    adapter.process(b"Z1\r")
     assert adapter.show(frame, stamp_ns) == (
         line[:-1] + f"{stamp_ns // 10**6 % 60_000:04X}\r".encode()
     )
@@ -83,19 +83,19 @@ def test_what_is_shown_is_what_is_parsed(frame: Frame, stamp_ns: int) -> None:
 @given(st.lists(st.binary(max_size=40), max_size=5))
 def test_no_bytes_can_raise_and_portions_do_not_matter(portions: list[bytes]) -> None:
     whole, parted = Adapter(), Adapter()
-    replies = [parted.hear(portion) for portion in portions]
-    together = whole.hear(b"".join(portions))
+    replies = [parted.process(portion) for portion in portions]
+    together = whole.process(b"".join(portions))
     assert b"".join(reply.reply for reply in replies) == together.reply
     assert sum((reply.frames for reply in replies), ()) == together.frames
 
 
 def test_status_flags_tell_of_errors_and_dropped_frames_once() -> None:
     adapter = Adapter()
-    adapter.hear(b"O\r")
+    adapter.process(b"O\r")
     assert adapter.show(Frame(ERR | 0x80, bytes(8)), 0) == b""
-    assert adapter.hear(b"F\rF\r").reply == b"F80\rF00\r"
+    assert adapter.process(b"F\rF\r").reply == b"F80\rF00\r"
     adapter.overrun()
-    assert adapter.hear(b"F\r").reply == b"F08\r"
+    assert adapter.process(b"F\r").reply == b"F08\r"
 
 
 def test_a_closed_adapter_shows_nothing() -> None:

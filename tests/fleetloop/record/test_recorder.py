@@ -43,7 +43,7 @@ def record(path: Path, *arrivals: Arrival) -> tuple[_Recorder, Record]:
     with RunRecord(path, dict.fromkeys(brief.robots, SIGNALS), "", brief.period_ns) as file:
         recorder = _Recorder(brief, file)
         for arrival in arrivals:
-            recorder.take(arrival)
+            recorder.process(arrival)
     return recorder, Record.open(path)
 
 
