@@ -4,6 +4,7 @@
     fig4  positions and orientations             s, v_r_hat, torques: what the fleet agreed on and
     fig5, fig6, fig7  x_e, y_e, θ_e                    what it cost
     law_signals  whatever else the laws record   clock  lateness and round trips, in real time
+    ages, edge_states  age of the data of each edge, where it varies
 
 Lines, colours and panels are `fleetloop.results.drawing`'s.
 """
@@ -33,6 +34,8 @@ from fleetloop.results.drawing import (
     style_of,
 )
 from fleetloop.results.graph_drawing import drawn
+from fleetloop.results.network import ages_of
+from fleetloop.results.network_figures import ages, edge_states
 
 _COLUMNS, _PANEL_IN, _TITLE_IN, _STRETCHES = 3, 1.1, 0.5, 300
 """Of the figure of the laws' signals."""
@@ -65,6 +68,8 @@ def all_figures(record: Record, scenario: Scenario) -> list[Captioned]:
         chosen = list(_FIGURES)
         if any(map(law_table, record.signals.values())):
             chosen.append(_LAW)
+        if any(map(ages_of, record.controller.values())):
+            chosen += _NETWORK
         if scenario.clock.mode == "realtime":
             chosen.append(_CLOCK)
         return [Captioned(name, caption, draw(record, scenario)) for name, caption, draw in chosen]
@@ -256,4 +261,8 @@ _FIGURES: Sequence[tuple[str, str, Callable[[Record, Scenario], Figure]]] = (
     ("torques", "Commanded wheel torques, equation (34).", torques),
 )
 _LAW = ("law_signals", "What the robots' laws record of themselves.", law_signals)
+_NETWORK = (
+    ("ages", "Age of the data that each edge gave, below the errors over the edges.", ages),
+    ("edge_states", "Mean age of what came over each edge.", edge_states),
+)
 _CLOCK = ("clock", "How the wall clock was kept: all ticks of all controllers.", clock_figures)

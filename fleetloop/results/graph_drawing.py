@@ -1,7 +1,9 @@
 """A drawing of a directed graph: layers by distance from the leader, weights that aren't 1."""
 
 from collections import Counter
+from collections.abc import Mapping
 from math import hypot
+from typing import NamedTuple
 
 import networkx as nx
 from matplotlib.axes import Axes
@@ -22,8 +24,18 @@ _BEND_BESIDE_OPPOSITE, _BEND_AROUND_NODE = 0.18, 0.4
 Places = dict[str, tuple[float, float]]
 
 
-def drawn(graph: Graph, title: str) -> Figure:
-    """The graph as a figure."""
+class EdgeStyle(NamedTuple):
+    """How an edge is drawn."""
+
+    colour: str
+    label: str
+
+
+_NO_STYLES: Mapping[Edge, EdgeStyle] = {}
+
+
+def drawn(graph: Graph, title: str, styles: Mapping[Edge, EdgeStyle] = _NO_STYLES) -> Figure:
+    """The graph as a figure; edges without a style are black, with their weight if it isn't 1."""
     digraph = graph.digraph()
     if not graph.links:
         digraph.remove_node(LEADER)
@@ -56,7 +68,11 @@ def drawn(graph: Graph, title: str) -> Figure:
         )
     nx.draw_networkx_labels(digraph, places, ax=axes, font_size=8)
     for edge in digraph.edges:
-        _arrow(axes, digraph, edge, places, labelled=digraph.size() <= _LABELLED)
+        weight = digraph.edges[edge]["weight"]
+        plain = EdgeStyle("black", "" if weight == 1.0 else f"{weight:.3g}")
+        colour, label = styles.get(edge, plain)
+        style = EdgeStyle(colour, label if digraph.size() <= _LABELLED else "")
+        _arrow(axes, digraph, edge, places, style)
     axes.set_xlim(min(across) - 0.6, max(across) + 0.6)
     axes.set_ylim(min(up) - 0.6, max(up) + 0.6)
     return figure
@@ -81,38 +97,34 @@ def _places(digraph: "nx.DiGraph", graph: Graph) -> Places:
     return places
 
 
-def _arrow(
-    axes: Axes, digraph: "nx.DiGraph", edge: Edge, places: Places, *, labelled: bool
-) -> None:
+def _arrow(axes: Axes, digraph: "nx.DiGraph", edge: Edge, places: Places, style: EdgeStyle) -> None:
     """One edge; bowed where a straight one would cross a node or lie on its opposite."""
     speaker, hearer = edge
-    weight = digraph.edges[edge]["weight"]
     bend = _BEND_BESIDE_OPPOSITE if digraph.has_edge(hearer, speaker) else 0.0
     if _crosses(edge, places):
         bend = _BEND_AROUND_NODE
-    style = "dashed" if speaker == LEADER else "solid"
     axes.annotate(
         "",
         xy=places[hearer],
         xytext=places[speaker],
         arrowprops={
             "arrowstyle": "-|>,head_width=0.25,head_length=0.5",
-            "linestyle": style,
-            "color": "black",
+            "linestyle": "dashed" if speaker == LEADER else "solid",
+            "color": style.colour,
             "linewidth": 1.1,
             "shrinkA": 18 if speaker == LEADER else 13,
             "shrinkB": 13,
             "connectionstyle": f"arc3,rad={bend}",
         },
     )
-    if weight != 1.0 and labelled:
+    if style.label:
         (x0, y0), (x1, y1) = places[speaker], places[hearer]
         # A third of the way, on the bow: where opposite arrows or crossing ones are apart.
         part = 0.4
         bow = 2.0 * part * (1.0 - part) * bend
         x, y = x0 + part * (x1 - x0) + bow * (y1 - y0), y0 + part * (y1 - y0) - bow * (x1 - x0)
         box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
-        axes.text(x, y, f"{weight:.3g}", fontsize=7, ha="center", va="center", bbox=box)
+        axes.text(x, y, style.label, fontsize=7, ha="center", va="center", bbox=box)
 
 
 def _crosses(edge: Edge, places: Places) -> bool:

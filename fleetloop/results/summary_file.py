@@ -63,6 +63,24 @@ class _Expectation(BaseModel):
         return self
 
 
+class _Age(BaseModel):
+    mean: float
+    p99: float
+    max: float
+
+
+class _Edge(BaseModel):
+    """Counts of an emulated edge; the age where it is recorded."""
+
+    sent: int = 0
+    delivered: int = 0
+    lost: int = 0
+    duplicated: int = 0
+    reordered: int = 0
+    late: int = 0
+    age_s: _Age | None = None
+
+
 class _Realtime(BaseModel):
     miss_percent: float
     late_us: dict[str, float]
@@ -118,6 +136,7 @@ class _Summary(BaseModel):
     record_lost: str
     stopped_robots: dict[str, str]
     notices: dict[str, list[str]]
+    network: dict[str, _Edge] | None = None
     overruns: int
     frames_per_bus: dict[str, int]
     bus_troubles: dict[str, str]

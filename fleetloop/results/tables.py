@@ -20,6 +20,8 @@ _RULE = box.Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
 """`box.SIMPLE_HEAD` in ASCII."""
 HOLDS_PERCENT = 2.0
 """More misses than this, and the machine is said not to hold the rate."""
+MOST_EDGES = 8
+"""Of which lines tell; summary.json has all."""
 EARLY_S = 0.05
 """A robot whose rows end so long before the run's took part in a part of it [s]."""
 _SYMBOLS = {"x_e_m": ("x_e", "m"), "y_e_m": ("y_e", "m"), "theta_e_rad": ("θ_e", "rad")}
@@ -59,7 +61,7 @@ def print_results(summary: Summary, folder: Path) -> None:
         )
     if summary["profile_us_per_tick"]:
         console.print_whole(_profile(summary["profile_us_per_tick"]))
-    for text in realtime_lines(summary):
+    for text in (*network_lines(summary), *realtime_lines(summary)):
         line(text)
     reason = f": {summary['reason']}" if summary["reason"] else ""
     line(f"verdict  {summary['verdict']}{reason}", "bold")
@@ -164,6 +166,28 @@ def machine_lines(summary: Summary) -> Iterator[str]:
             f"PLANT, or its machine, stalled {len(stalls)} times, longest {worst['lasted_s']:.2f} s"
             f" at t = {worst['t_s']:.2f} s"
         )
+
+
+def network_lines(summary: Summary) -> Iterator[str]:
+    """What the edges did, those with the oldest data first; nothing if it wasn't recorded."""
+    edges = summary.get("network") or {}
+
+    def oldest(edge: str) -> float:
+        return float((edges[edge].get("age_s") or {"max": -1.0})["max"])
+
+    order = sorted(edges, key=oldest, reverse=True)
+    for edge in order[:MOST_EDGES]:
+        counts, age = edges[edge], edges[edge].get("age_s")
+        said = (
+            [f"{counts['sent']} sent, {counts['delivered']} delivered"] if "sent" in counts else []
+        )
+        rare = ("lost", "duplicated", "reordered", "late")
+        said += [f"{counts[fate]} {fate}" for fate in rare if counts.get(fate)]
+        if age is not None:
+            said += [f"age {age['mean']:.3g} s, p99 {age['p99']:.3g} s, max {age['max']:.3g} s"]
+        yield f"{edge}: {', '.join(said) or 'nothing heard'}"
+    if len(order) > MOST_EDGES:
+        yield f"and {len(order) - MOST_EDGES} more edges in summary.json"
 
 
 def realtime_lines(summary: Summary) -> Iterator[str]:

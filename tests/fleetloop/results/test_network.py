@@ -3,6 +3,7 @@
 import numpy as np
 
 from fleetloop.results.network import network
+from fleetloop.results.tables import MOST_EDGES, network_lines
 
 
 def rows(**columns: list[float]) -> np.ndarray:
@@ -29,3 +30,14 @@ def test_an_edge_that_carried_nothing_has_no_age() -> None:
 
 def test_without_emulation_or_ages_there_is_nothing_to_say() -> None:
     assert network({"r1": rows(s=[0.0])}, {}) is None
+
+
+def test_lines_tell_of_the_edges_with_the_oldest_data_first() -> None:
+    age = {"mean": 0.1, "p99": 0.2, "max": 0.3}
+    edges = {f"r{n} -> r0": {"age_s": age | {"max": 0.1 * n}} for n in range(1, 11)}
+    edges["leader -> r0"] = {"sent": 5, "delivered": 3, "lost": 2, "late": 0}
+    lines = list(network_lines({"network": edges}))
+    assert lines[0] == "r10 -> r0: age 0.1 s, p99 0.2 s, max 1 s"
+    assert lines[-1] == f"and {11 - MOST_EDGES} more edges in summary.json"
+    alone = network_lines({"network": {"leader -> r0": edges["leader -> r0"]}})
+    assert list(alone) == ["leader -> r0: 5 sent, 3 delivered, 2 lost"]

@@ -1,0 +1,93 @@
+"""Figures of the network: ages of data per edge over time, and the graph with what they came to."""
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import Normalize, to_hex
+from matplotlib.figure import Figure
+
+from configs.edges import Edge
+from configs.scenario import Scenario
+from fleetloop.record.reader import Record
+from fleetloop.results.drawing import DPI, WIDTH_IN, envelope, style_of
+from fleetloop.results.graph_drawing import EdgeStyle, drawn
+from fleetloop.results.network import ages_of
+
+_MAP = colormaps["cividis"]
+COLUMNS = 600
+"""Of a strip."""
+_MOST_LABELS, _MOST_IN_LEGEND = 40, 12
+_ROW_IN = 0.22
+
+
+def edge_ages(record: Record) -> dict[Edge, np.ndarray]:
+    """Ages of the path states of every edge whose ages are recorded [s], over the ticks."""
+    return {
+        (speaker, hearer): ages
+        for hearer, rows in record.controller.items()
+        for speaker, ages in ages_of(rows).items()
+    }
+
+
+def ages(record: Record, _: Scenario) -> Figure:
+    """Differences over the edges, and below them the age of the data that each edge gave."""
+    edges = edge_ages(record)
+    strip_in = max(_ROW_IN * len(edges), 0.8)
+    figure = Figure(figsize=(WIDTH_IN, 2.6 + strip_in), dpi=DPI, layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, strip_in))
+    s = {robot: rows["s"] for robot, rows in record.controller.items()}
+    t = max((rows["t_s"] for rows in record.controller.values()), key=len)
+    for n, (speaker, hearer) in enumerate(edges):
+        both = min(len(s[hearer]), len(s[speaker]))
+        colour, dash = style_of(n)
+        x, y = envelope(t[:both], s[hearer][:both] - s[speaker][:both])
+        upper.plot(x, y, color=colour, linestyle=dash, label=f"{hearer} − {speaker}")
+    upper.set(ylabel="s$_i$ − s$_j$ [m]", title="Path parameter errors, and the age of the data")
+    if len(edges) <= _MOST_IN_LEGEND:
+        upper.legend(fontsize=7)
+    strips = np.array([oldest(ages, len(t)) for ages in edges.values()])
+    image = lower.imshow(
+        np.ma.masked_invalid(strips),
+        aspect="auto",
+        interpolation="nearest",
+        cmap=_MAP,
+        vmin=0.0,
+        extent=(float(t[0]), float(t[-1]), len(edges) - 0.5, -0.5),
+    )
+    lower.set_facecolor("white")
+    lower.grid(visible=False)
+    every = -(-len(edges) // _MOST_LABELS)
+    names = [f"{speaker} → {hearer}" for speaker, hearer in edges]
+    lower.set_yticks(range(0, len(edges), every), names[::every], fontsize=7)
+    lower.set_xlabel("t [s]")
+    figure.colorbar(image, ax=lower, label="age [s]")
+    return figure
+
+
+def oldest(values: np.ndarray, ticks: int) -> np.ndarray:
+    """The oldest age in each of at most `COLUMNS` stretches of the run; NaN: nothing heard."""
+    padded = np.full(ticks, np.nan)
+    padded[: len(values)] = values
+    stretch = -(-ticks // COLUMNS)
+    columns = np.full(-(-ticks // stretch) * stretch, np.nan)
+    columns[:ticks] = padded
+    blocks = columns.reshape(-1, stretch)
+    heard = np.isfinite(blocks)
+    oldest = np.where(heard, blocks, -np.inf).max(axis=1)
+    return np.where(heard.any(axis=1), oldest, np.nan)
+
+
+def edge_states(record: Record, scenario: Scenario) -> Figure:
+    """The graph; an arrow's colour and label are the mean age of what came over it."""
+    means = {
+        edge: float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
+        for edge, values in edge_ages(record).items()
+    }
+    known = [mean for mean in means.values() if np.isfinite(mean)]
+    scale = Normalize(0.0, max(known, default=1.0))
+    styles = {
+        edge: EdgeStyle(to_hex(_MAP(0.85 * scale(mean))), f"{mean:.3g} s")
+        if np.isfinite(mean)
+        else EdgeStyle("#bbbbbb", "silent")
+        for edge, mean in means.items()
+    }
+    return drawn(scenario.topology, "Mean age of what came over each edge", styles)
