@@ -1,5 +1,9 @@
 """A second drive protocol is a folder and a row: the one of `support.second_drive` runs a robot."""
 
+import os
+import pickle
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -103,6 +107,34 @@ def test_relations_of_its_keys_are_its_own() -> None:
     assert "two of drive.heartbeat_period_s need" in str(refused.value)
     assert "host.heartbeat_age_limit_s=0.001: two of drive.heartbeat_period_s" in str(refused.value)
     assert load("two_robots", (f"drive.protocol='{OWN}'", *short)).clock.countdown_s == 0.0
+
+
+def test_processes_receive_its_section_without_having_its_module_on_their_path(
+    tmp_path: Path,
+) -> None:
+    """A brief says where the file is, and is unpickled once the file is loaded."""
+    (tmp_path / "own_drive.py").write_text(
+        "from dataclasses import dataclass\n"
+        "from support.second_drive import ROW as PLAIN\n"
+        "@dataclass(frozen=True, slots=True, kw_only=True)\n"
+        "class Section(PLAIN.section):\n"
+        "    gain: float = 1.0\n"
+        "ROW = PLAIN._replace(section=Section)\n"
+    )
+    text = to_toml(load("two_robots", (f"drive.protocol='{OWN}'",))).replace(OWN, "own_drive:ROW")
+    (tmp_path / "s.toml").write_text(text)
+    scenario = load(tmp_path / "s.toml", ("drive.gain=2.5",))
+    sent = pickle.dumps(agent_brief(scenario, "r1", network=NETWORK, bus=()))
+    program = "import pickle, sys; print(pickle.load(sys.stdin.buffer).drives.section.gain)"
+    path = os.pathsep.join(entry for entry in sys.path if entry != str(tmp_path))
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        input=sent,
+        capture_output=True,
+        timeout=30,
+        env=os.environ | {"PYTHONPATH": path},
+    )
+    assert done.stdout == b"2.5\n", done.stderr.decode()
 
 
 def test_a_check_of_its_keys_that_fails_is_told_with_its_place(tmp_path: Path) -> None:
