@@ -15,7 +15,7 @@ SCENARIO = """
 schema = 1
 name = "own_drive"
 clock = { mode = "lockstep" }
-drive = { protocol = "my_drive:ROW", options = { torque_unit_shaft_N_m = 0.01 } }
+drive = { protocol = "my_drive:ROW", torque_unit_shaft_N_m = 0.01 }
 robot = [{ name = "r1", pose = { x_m = -3.5, y_m = 0.0, theta_rad = 0.0 } }]
 """
 
