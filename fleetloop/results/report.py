@@ -121,7 +121,9 @@ def _facts(summary: Summary) -> Iterable[tuple[str, str]]:
     yield "overruns", f"{summary['overruns']}"
     frames = (f"{bus} {count}" for bus, count in summary["frames_per_bus"].items())
     yield "frames per bus", ", ".join(frames)
-    for text in (*network_lines(summary), *realtime_lines(summary)):
+    for text in network_lines(summary):
+        yield "network", text
+    for text in realtime_lines(summary):
         yield "clock", text
     cpu = (f"{process} {seconds:g} s" for process, seconds in summary["cpu_s"].items())
     yield "processor time", ", ".join(cpu)

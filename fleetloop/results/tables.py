@@ -178,9 +178,9 @@ def network_lines(summary: Summary) -> Iterator[str]:
     order = sorted(edges, key=oldest, reverse=True)
     for edge in order[:MOST_EDGES]:
         counts, age = edges[edge], edges[edge].get("age_s")
-        said = (
-            [f"{counts['sent']} sent, {counts['delivered']} delivered"] if "sent" in counts else []
-        )
+        said = []
+        if sent := counts.get("sent"):
+            said = [f"{sent} sent, {counts.get('delivered', 0)} delivered"]
         rare = ("lost", "duplicated", "reordered", "late")
         said += [f"{counts[fate]} {fate}" for fate in rare if counts.get(fate)]
         if age is not None:
