@@ -80,8 +80,8 @@ class Admission:
 
     def admits_leader_speed(self, speed: LeaderSpeed) -> bool:
         """Whether the leader's speed is plausible; one that isn't is counted."""
-        for _, value in speed.steps:
-            if far := self._reach.too_fast(value, "v_r"):
+        for change in speed.changes:
+            if far := self._reach.too_fast(change.speed_m_s, "v_r"):
                 self.refusals.note("speed", LEADER, "reach", far)
                 return False
         return True

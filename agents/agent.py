@@ -44,6 +44,7 @@ from bridge.frame import Frame
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.network.telemetry import RowBuffer
 from configs.brief import AgentBrief
+from configs.leader_speed import speed_at
 from configs.signals import AGE_PREFIX
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
@@ -300,7 +301,7 @@ class Agent:
         if self._network is not None:
             v_r = self._network.leader_speed(tick, self._leader, v_hat)
         else:
-            v_r = self._leader.speed_at(t_ns) if self._leader is not None else 0.0
+            v_r = speed_at(self._leader.changes, t_ns) if self._leader is not None else 0.0
         after = self._coordinator.advance(coordination, sums, self._leader_weight, v_r)
         along = _new(PathVariable, (s, s_dot, (after[0] + after[1] - s_dot) / self._h))
         guard = self._guard

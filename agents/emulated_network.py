@@ -20,6 +20,7 @@ from bridge.netem.channel import Channel
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from configs.brief import AgentBrief
 from configs.edges import LEADER
+from configs.leader_speed import speed_at
 from configs.netem import LOCALISATION
 
 EARLY = -1
@@ -132,9 +133,9 @@ class EmulatedNetwork:
         now_ns = tick * self._schedule.period_ns
         channel = self._leader
         if channel is None or leader is None:
-            return without if leader is None else leader.speed_at(now_ns)
+            return without if leader is None else speed_at(leader.changes, now_ns)
         if self._schedule.shares(tick):
-            channel.send(now_ns, leader.speed_at(now_ns))
+            channel.send(now_ns, speed_at(leader.changes, now_ns))
         for sent_ns, v_r in channel.receive(now_ns):
             if self._v_r != self._v_r or sent_ns >= self._v_r_ns:
                 self._v_r, self._v_r_ns = v_r, sent_ns

@@ -19,6 +19,7 @@ from configs.connections import NetworkLink, Settings
 from configs.curves import FormationOffset, ReferencePath
 from configs.edges import InEdge
 from configs.host import Host
+from configs.leader_speed import SpeedChange
 from configs.netem import Effects
 from configs.parameters import Parameters
 from configs.plugins import Choice
@@ -278,12 +279,9 @@ class PlantBrief:
 
 @dataclass(frozen=True, slots=True)
 class LeaderBrief:
-    """The virtual leader.
+    """The virtual leader."""
 
-    V_r(t) as steps (from scenario time [ns], speed [m/s]), in order of time.
-    """
-
-    speed_steps: tuple[tuple[int, float], ...]
+    speed_changes: tuple[SpeedChange, ...]  # v_r(t), in order of time
 
 
 @dataclass(frozen=True, slots=True)

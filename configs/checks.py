@@ -21,7 +21,13 @@ from configs.wording import MISSING, guess, remedy_of
 
 def cross_problems(scenario: Scenario) -> list[Problem]:
     """All problems that no section can see alone."""
-    problems = [*_names(scenario), *_laws(scenario), *_periods(scenario), *drive_problems(scenario)]
+    problems = [
+        *_names(scenario),
+        *_leader(scenario),
+        *_laws(scenario),
+        *_periods(scenario),
+        *drive_problems(scenario),
+    ]
     edges = edge_problems(scenario)
     problems += [*_host(scenario), *_expects(scenario, sound_edges=not edges)]
     if not edges:
@@ -59,9 +65,21 @@ def _names(scenario: Scenario) -> Iterator[Problem]:
             yield Problem("path.points_m", points, remedy)
         if scenario.path.closed and len(points) < 3:
             yield Problem("path.points_m", points, "a closed spline needs three points or more")
-    steps = [step.t_s for step in scenario.leader.steps]
-    if any(b <= a for a, b in itertools.pairwise(steps)):
-        yield Problem("leader.steps", steps, "t_s must increase")
+
+
+def _leader(scenario: Scenario) -> Iterator[Problem]:
+    """Changes of v_r follow each other: none begins before the one before it is over."""
+    for n, (one, other) in enumerate(itertools.pairwise(scenario.leader.steps), 1):
+        if other.t_s <= one.t_s:
+            remedy = f"t_s must increase: above {one.t_s:g}, that of the step before"
+            yield Problem(f"leader.steps.{n}.t_s", other.t_s, remedy)
+        elif round((one.t_s + one.ramp_s) * 1e9) > round(other.t_s * 1e9):
+            remedy = (
+                f"begins within the ramp before it, from {one.t_s:g} s to"
+                f" {one.t_s + one.ramp_s:g} s: let it begin then, or lower that ramp_s ="
+                f" {one.ramp_s:g} to {other.t_s - one.t_s:g} or less"
+            )
+            yield Problem(f"leader.steps.{n}.t_s", other.t_s, remedy)
 
 
 def _laws(scenario: Scenario) -> Iterator[Problem]:

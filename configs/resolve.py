@@ -24,6 +24,7 @@ from configs.curves import formation_offset, reference_path
 from configs.drives import Drive
 from configs.edges import LEADER
 from configs.emulated_edges import EmulatedEdge, effects_of
+from configs.leader_speed import SpeedChange
 from configs.netem import LOCALISATION, Effects
 from configs.parameters import extended
 from configs.reach import Reach, reach_of
@@ -218,10 +219,10 @@ def wire_model(scenario: Scenario) -> WireModel | None:
 
 
 def leader_brief(scenario: Scenario) -> LeaderBrief:
-    """The speed of the virtual leader, from the start and from each of its steps on."""
+    """The speed of the virtual leader from the start on, and its changes."""
     leader = scenario.leader
-    later = tuple((round(step.t_s * 1e9), step.speed_m_s) for step in leader.steps)
-    return LeaderBrief(((0, leader.speed_m_s), *later))
+    later = (SpeedChange(_ns(one.t_s), one.speed_m_s, _ns(one.ramp_s)) for one in leader.steps)
+    return LeaderBrief((SpeedChange(0, leader.speed_m_s), *later))
 
 
 def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief:

@@ -214,15 +214,18 @@ class GraphSection(Parameters):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedStep(Parameters):
-    """From this time on, this speed."""
+    """From this time on, this speed; or towards it along a ramp."""
 
     t_s: SecondsOrZero
     speed_m_s: Finite
+    ramp_s: SecondsOrZero = parameter(
+        0.0, "the speed changes linearly over this time, from t_s on; 0: at once"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Leader(Parameters):
-    """The virtual leader's speed v_r."""
+    """The virtual leader's speed v_r; at 0 the formation stands."""
 
     speed_m_s: Finite = 0.6
     steps: Annotated[tuple[SpeedStep, ...], Len(0, 1000)] = ()

@@ -172,7 +172,7 @@ class InProcessRun:
         self._steps = [bus.steps() for bus in self._buses.values()]
         for agent in self._agents:
             if agent.brief.leader_link is not None:
-                agent.receive_leader_speed(LeaderSpeed(leader.speed_steps))
+                agent.receive_leader_speed(LeaderSpeed(leader.speed_changes))
         self.ticks = 0
         self.wall_s = 0.0
 

@@ -2,7 +2,7 @@
 
     x_e, y_e, θ_e: the reference seen from the robot                                 (8)
     v̄ = −k_1 x_e + v̄_d ṡ cos θ_e                                                    (15)
-    θ̄ = −atan(k_2 y_e)                                                              (17)
+    θ̄ = −atan(k_2 σ(ṡ) y_e)                                                         (17)
     γ_1 α_θ' + α_θ = θ̄,  α_θ(0) = θ̄(0)                                              (19)
     γ_2 α_v' + α_v = v̄,  α_v(0) = v̄(0)                                              (20)
     ω̄ = −k_3 (θ_e − θ̄) + ω̄_d ṡ + α_θ'                                               (25)
@@ -18,7 +18,8 @@
     B = (1/r) [[1, b], [1, −b]]: from body to (right, left) wheel
     sgn(e) is tanh(e / width), so that the torque is continuous
 
-Filters and κ̂ are advanced exactly, Θ̂ by Euler's rule. `proj` is in `agents.laws.dsc_terms`.
+Filters and κ̂ are advanced exactly, Θ̂ by Euler's rule. `proj` is in `agents.laws.dsc_terms`, as is
+σ(ṡ), 1 wherever ṡ ≥ 0: the paper has none, and needs ṡ > 0.
 """
 
 from collections.abc import Sequence
@@ -32,6 +33,7 @@ from agents.laws.dsc_terms import (
     Row,
     SurfaceGains,
     adapt,
+    sense,
     smoothing,
     wheel_torques,
 )
@@ -136,7 +138,7 @@ class AdaptiveDsc(Law):
         x_d, y_d, theta_d, v_bar_d, omega_bar_d = reference
         s_dot = along[1]
         x_e, y_e, theta_e = path_errors(x, y, theta, x_d, y_d, theta_d)  # (8)
-        approach, bar_theta = self._approach(x_e, y_e, k1, k2)  # (17)
+        approach, bar_theta = self._approach(x_e, sense(s_dot) * y_e, k1, k2)  # (17)
         bar_v = approach + v_bar_d * s_dot * cos(theta_e)  # (15)
         turn = -k3 * (theta_e - bar_theta) + omega_bar_d * s_dot
         if state is None:
@@ -185,6 +187,7 @@ class AdaptiveDsc(Law):
 
     SPEED_GAIN = "k4"
     LOOP_GAINS = ("k1", "k3", "k2", "k4")
+    REVERSES = True
     SATURATION = (
         "the paper's law learns the limit;"
         ' control.law = "adaptive_dsc_robust" doesn\'t, or start closer'

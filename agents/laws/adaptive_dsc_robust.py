@@ -3,7 +3,7 @@
 Four changes to `agents.laws.adaptive_dsc`, all of them that law again to first order on the path:
 
     v̄ = −V tanh(k_1 x_e / V) + v̄_d ṡ cos θ_e           bounded approach speed    (15)
-    θ̄ = −atan(k_2 y_e / (1 + k_2 |x_e|))                 no spinning far off       (17)
+    θ̄ = −atan(k_2 σ(ṡ) y_e / (1 + k_2 |x_e|))            no spinning far off       (17)
     |τ| ≤ `torque_limit_wheel_N_m`; Θ̂ and κ̂ hold still while a wheel is at it           (34)
     Θ̂_r' divided by 1 + h |K_5 F_r²| / (k_4/4)           stable when sampled       (35)
 """

@@ -2,9 +2,10 @@
 
     x_e' = v − A cos θ_e + ω y_e,  y_e' = A sin θ_e − ω x_e,  θ_e' = ω − W           (9)
     v̄ = −k_1 x_e + A cos θ_e                                                        (15)
-    θ̄ = −atan(k_2 y_e)                                                              (17)
+    θ̄ = −atan(K y_e),  K = k_2 σ(ṡ)                                                (17)
 
-with A = v̄_d ṡ, W = ω̄_d ṡ. For G = k_2 / (1 + k_2² y_e²) the derivative of θ̄ has ω itself in it,
+with A = v̄_d ṡ, W = ω̄_d ṡ, and σ of `agents.laws.dsc_terms`, 1 for ṡ ≥ 0, its derivative neglected
+where it isn't 0. For G = K / (1 + K² y_e²) the derivative of θ̄ has ω itself in it,
 
     θ̄' = −G y_e' = −G A sin θ_e + G x_e ω                                           [1]
 
@@ -26,7 +27,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan, cos, inf, sin
 
-from agents.laws.dsc_terms import Eight, wheel_torques
+from agents.laws.dsc_terms import Eight, sense, wheel_torques
 from agents.laws.fixed_dsc import PAPER_THETA, scaled
 from agents.laws.interface import (
     PATH_ERRORS,
@@ -130,10 +131,11 @@ class BacksteppingAnalytic(Law):
         v_bar = -g.k1 * x_e + a * c  # (15)
         v_bar_rate = -g.k1 * x_rate + a_rate * c - a * n * theta_rate
 
-        square = 1.0 + g.k2 * g.k2 * y_e * y_e
-        slope = g.k2 / square  # G
-        slope_rate = -2.0 * g.k2**3 * y_e * y_rate / (square * square)
-        bar_theta, bar_theta_rate = -atan(g.k2 * y_e), -slope * y_rate  # (17), [1]
+        k2 = g.k2 * sense(s_dot)  # K
+        square = 1.0 + k2 * k2 * y_e * y_e
+        slope = k2 / square  # G
+        slope_rate = -2.0 * k2**3 * y_e * y_rate / (square * square)
+        bar_theta, bar_theta_rate = -atan(k2 * y_e), -slope * y_rate  # (17), [1]
         above = -g.k3 * (theta_e - bar_theta) + w - slope * a * n
         above_rate = -g.k3 * (theta_rate - bar_theta_rate) + w_rate
         above_rate -= slope_rate * a * n + slope * (a_rate * n + a * c * theta_rate)
@@ -153,6 +155,7 @@ class BacksteppingAnalytic(Law):
 
     SPEED_GAIN = "k4"
     LOOP_GAINS = ("k1", "k3", "k2", "k4")
+    REVERSES = True
 
     @classmethod
     def torque_limit_wheel_N_m(cls, gains: "BacksteppingAnalytic.Gains") -> float:  # noqa: ARG003

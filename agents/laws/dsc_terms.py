@@ -8,6 +8,12 @@ The paper prints `proj` of (35) without the factor π in its conditions; with it
     proj(π, σ̂) = (1 − Ξ) π   if Ξ > 0 and σ̂ π > 0,   else π
 
 which keeps |σ̂| ≤ σ_M + k; a clip to that bound guards against a long sampling period.
+
+By (18), (22) and (55) y_e is damped with v̄_d ṡ sin(θ̄), θ̄ = −atan(k_2 y_e) of (17): only for ṡ > 0.
+At ṡ = 0 the robot stands and y_e stays; at ṡ < 0 the paper's y_e grows. So (17) has σ(ṡ) y_e for
+y_e, σ the sense in which the path is followed, and the product is damped in both:
+
+    σ(ṡ) = 1 for ṡ ≥ 0 (the paper's law unchanged),  −1 for ṡ ≤ −`REVERSE_M_S`, linear in between
 """
 
 from dataclasses import dataclass
@@ -16,6 +22,8 @@ from typing import NamedTuple
 
 from configs.parameters import Finite, Parameters, Positive, Seconds, parameter
 
+REVERSE_M_S = 0.05
+"""Path variables that go back this fast are followed backwards."""
 Row = tuple[float, float, float, float]
 """Four of the eight parameters: those of one row of Ω."""
 Eight = tuple[Finite, Finite, Finite, Finite, Finite, Finite, Finite, Finite]
@@ -33,6 +41,13 @@ class SurfaceGains(Parameters):
     gamma_1_s: Positive = parameter(0.01, "filter (19)")
     gamma_2_s: Seconds = parameter(0.01, "filter (20)")
     gamma_3_s: Seconds = parameter(0.01, "filter (27)")
+
+
+def sense(s_dot: float) -> float:
+    """σ(ṡ): the sense in which the path is followed, 1 forwards, −1 backwards."""
+    if s_dot >= 0.0:
+        return 1.0
+    return max(1.0 + s_dot * (2.0 / REVERSE_M_S), -1.0)
 
 
 def smoothing(period_s: float, time_constant_s: float) -> float:

@@ -171,6 +171,9 @@ class Law(Protocol):
         """The part of an error across the path that is closed per distance ahead [1/m], as (18)."""
         return None
 
+    REVERSES: ClassVar[bool] = False
+    """Whether an error across the path is closed as well where ṡ < 0, driving backwards."""
+
     @classmethod
     def speed_gain_N_m_s(cls, gains: Any) -> float | None:  # noqa: ARG003
         """Gain of the speed loop, in the units of u in (34) per m/s and rad/s."""

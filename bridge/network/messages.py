@@ -9,7 +9,7 @@ still be impossible: readers that know the run check that.
     message        layout                                        key
     PathState      [1, tick, t_ns, s, v_hat]                     robot/<name>/path
     PoseFix        [1, tick, t_ns, x_m, y_m, theta_rad]          robot/<name>/pose
-    LeaderSpeed    [1, [[from_t_ns, speed_m_s], ...]]            leader/speed
+    LeaderSpeed    [1, [[from_t_ns, speed_m_s, ramp_ns], ...]]   leader/speed
     Rows           [1, first_tick, length, rows, final]          robot/<name>/truth, telemetry
     Progress       [1, tick, t_ns, wall_ns]                      @progress/<process>
     Notice         [1, text]                                     @notice/<process>
@@ -19,6 +19,7 @@ still be impossible: readers that know the run check that.
 from typing import NamedTuple
 
 from bridge.network.packing import MAX_BYTES, finite, ints, pack, printable, unpack
+from configs.leader_speed import SpeedChange, in_order
 
 MOST_BYTES = {
     "path": 128,
@@ -35,7 +36,7 @@ MOST_BYTES = {
 need."""
 MAX_NOTICE = 500
 """Characters of a notice."""
-_MAX_STEPS = 10_000
+_MAX_CHANGES = 10_000
 
 
 class PathState(NamedTuple):
@@ -82,25 +83,13 @@ class PoseFix(NamedTuple):
 
 
 class LeaderSpeed(NamedTuple):
-    """The virtual leader's speed v_r as steps (from scenario time [ns], speed [m/s]), in order."""
+    """The virtual leader's speed v_r: see `configs.leader_speed`."""
 
-    steps: tuple[tuple[int, float], ...]
-
-    def speed_at(self, t_ns: int) -> float:
-        """Speed at a time [m/s]; the first step holds before it too."""
-        steps = self.steps
-        if len(steps) == 1:
-            return steps[0][1]
-        speed = steps[0][1]
-        for from_ns, value in steps:
-            if from_ns > t_ns:
-                break
-            speed = value
-        return speed
+    changes: tuple[SpeedChange, ...]
 
     def encode(self) -> bytes:
         """Bytes for the wire."""
-        return pack(self.steps)
+        return pack(self.changes)
 
     @classmethod
     def decode(cls, payload: bytes) -> "LeaderSpeed | None":
@@ -108,15 +97,15 @@ class LeaderSpeed(NamedTuple):
         fields = unpack(payload, 2)
         if fields is None or not isinstance(fields[1], list):
             return None
-        if not 1 <= len(fields[1]) <= _MAX_STEPS:
+        if not 1 <= len(fields[1]) <= _MAX_CHANGES:
             return None
-        for step in fields[1]:
-            if not (isinstance(step, list) and len(step) == 2):
+        for change in fields[1]:
+            if not (isinstance(change, list) and len(change) == 3):
                 return None
-            if not (ints(step[:1]) and finite(step[1:])):
+            if not (ints(change[::2]) and finite(change[1:2]) and change[2] >= 0):
                 return None
-        times = [step[0] for step in fields[1]]
-        return cls(tuple((t, v) for t, v in fields[1])) if times == sorted(times) else None
+        changes = tuple(SpeedChange(*change) for change in fields[1])
+        return cls(changes) if in_order(changes) else None
 
 
 class Rows(NamedTuple):

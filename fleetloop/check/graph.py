@@ -15,7 +15,7 @@ from configs.graph import Graph
 from configs.scenario import Scenario
 from fleetloop.check.coordination import Forecast, Matrix, delay_margin_s, radii
 from fleetloop.check.finding import Finding, Level
-from fleetloop.check.law import lateral_gain_1_m
+from fleetloop.check.law import lateral_gain_1_m, reverses
 from fleetloop.settling import FINAL_S, LOST_M, SETTLE_BAND
 
 SETTLED_PART = 0.1
@@ -134,7 +134,10 @@ def _sharing(scenario: Scenario, ahead: Forecast) -> Finding:
 
 
 def _leader(scenario: Scenario) -> list[Finding]:
-    """ṡ > 0: by (18) y_e is damped with k_2 v̄_d ṡ, so it grows where ṡ is negative."""
+    """By (18) y_e is damped with k_2 v̄_d ṡ: it stays at ṡ = 0, and grows at ṡ < 0.
+
+    Not with a law that follows its path backwards as well.
+    """
     title = "ṡ > 0: the leader's speed"
     leader = scenario.leader
     speeds = {"leader.speed_m_s": leader.speed_m_s} | {
@@ -143,6 +146,9 @@ def _leader(scenario: Scenario) -> list[Finding]:
     key, slowest = min(speeds.items(), key=lambda item: item[1])
     if slowest < 0.0:
         controls = [scenario.control_of(robot) for robot in scenario.robot]
+        controls = [one for one in controls if not reverses(one)]
+        if not controls:
+            return [Finding("ok", title, f"v_r ≥ {slowest:g} m/s: robots drive backwards as well")]
         k2 = max(
             (gain for one in controls if (gain := lateral_gain_1_m(one)) is not None), default=0
         )
@@ -160,7 +166,9 @@ def _leader(scenario: Scenario) -> list[Finding]:
         text = (
             "v_r = 0: while they stand, robots don't come any closer to their paths sideways (18)"
         )
-        return [Finding("warning", title, text, key=key)]
+        if key == "leader.speed_m_s":
+            return [Finding("warning", title, text, key=key)]
+        return [Finding("ok", title, text)]
     return [Finding("ok", title, f"v_r ≥ {slowest:g} m/s")]
 
 
@@ -202,19 +210,20 @@ def _settling(
 
 
 def _backwards(scenario: Scenario, ahead: Forecast) -> list[Finding]:
-    """Robots whose path variable goes back for a while, though the leader goes on."""
+    """Robots whose path variable goes back for a while, though the leader doesn't."""
     if len(ahead.t_s) < 2 or ahead.v_r.min() < 0.0:
         return []
     step_s = float(ahead.t_s[1] - ahead.t_s[0])
     back = -np.minimum(ahead.s_dot, 0.0).sum(axis=0) * step_s
-    return [
-        Finding(
-            "warning",
-            "ṡ > 0: path variables",
-            f"goes back by {distance:.2g} m to meet the others: start s_0 closer together",
-            (robot.name,),
-            f"robot.{robot.name}.s_0",
-        )
-        for robot, distance in zip(scenario.robot, back.tolist(), strict=True)
-        if distance > BACKWARDS_M
-    ]
+    found = []
+    for robot, distance in zip(scenario.robot, back.tolist(), strict=True):
+        if distance <= BACKWARDS_M:
+            continue
+        text = f"goes back by {distance:.2g} m to meet the others"
+        if reverses(scenario.control_of(robot)):
+            found.append(Finding("ok", "ṡ > 0: path variables", text, (robot.name,)))
+            continue
+        text += ": start s_0 closer together, or let the leader stop along a longer ramp"
+        key = f"robot.{robot.name}.s_0"
+        found.append(Finding("warning", "ṡ > 0: path variables", text, (robot.name,), key))
+    return found

@@ -75,6 +75,11 @@ def lateral_gain_1_m(control: Choice) -> float | None:
     return gain
 
 
+def reverses(control: Choice) -> bool:
+    """Whether it follows its path backwards as well; not if unknown."""
+    return bool(getattr(control.load(), "REVERSES", False))
+
+
 def speed_gain(control: Choice) -> float | None:
     """Gain of its speed loop, as k_4 of (34); None if unknown."""
     gain: float | None = _asked(control, "speed_gain_N_m_s").value

@@ -172,7 +172,7 @@ class ProcessRun:
         run, ticks = self._run, self._schedule
         go = link.publisher(keys.go(run))
         hellos = Hellos(ticks.hello_every_s, clock=self._clock)
-        speed = LeaderSpeed(leader_brief(self._scenario).speed_steps)
+        speed = LeaderSpeed(leader_brief(self._scenario).speed_changes)
         hellos.add(link.publisher(keys.leader_speed(run)), speed.encode())
         deadline = self._now() + ticks.start_deadline_s
         countdown_ns = ticks.countdown_ticks * ticks.period_ns + GO_AHEAD_NS

@@ -17,6 +17,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from configs.resolve import leader_brief
 from configs.scenario import Scenario
 from configs.signals import law_table
 from fleetloop.record.reader import Record
@@ -36,6 +37,7 @@ from fleetloop.results.drawing import (
 from fleetloop.results.graph_drawing import drawn
 from fleetloop.results.network import ages_of
 from fleetloop.results.network_figures import ages, edge_states
+from fleetloop.results.summary import leader_speed
 
 _COLUMNS, _PANEL_IN, _TITLE_IN, _STRETCHES = 3, 1.1, 0.5, 300
 """Of the figure of the laws' signals."""
@@ -156,14 +158,22 @@ def speed_estimates(record: Record, scenario: Scenario) -> Figure:
     figure = over_time(record, series, "Estimates of the reference speed", "v̂$_r$ [m/s]")
     axes = figure.axes[0]
     end = max(rows["t_s"][-1] for rows in record.controller.values() if len(rows))
-    steps = [(0.0, scenario.leader.speed_m_s)]
-    steps += [(step.t_s, step.speed_m_s) for step in scenario.leader.steps if step.t_s <= end]
-    times, speeds = zip(*steps, (end, steps[-1][1]), strict=True)
-    axes.step(times, speeds, where="post", color="black", linewidth=0.8, label="leader v$_r$")
+    corners_ns = _corners_ns(scenario, end)
+    speeds = leader_speed(scenario)(corners_ns)
+    axes.plot(corners_ns * 1e-9, speeds, color="black", linewidth=0.8, label="leader v$_r$")
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, 0.0), max(high, 1e-3))
     legend(axes, len(series) + 1)
     return figure
+
+
+def _corners_ns(scenario: Scenario, end_s: float) -> np.ndarray:
+    """Instants between which the leader's speed is a straight line [ns]; two at a step."""
+    end_ns = round(end_s * 1e9)
+    changes = leader_brief(scenario).speed_changes
+    corners_ns = {t_ns for one in changes for t_ns in (one.from_ns - 1, one.from_ns, one.to_ns)}
+    inner_ns = {t_ns for t_ns in corners_ns if 0 < t_ns < end_ns}
+    return np.array(sorted({0, *inner_ns, end_ns}), dtype=np.int64)
 
 
 def torques(record: Record, _: Scenario) -> Figure:

@@ -4,11 +4,13 @@ import json
 import platform
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
+from configs.leader_speed import speed_at
 from configs.resolve import leader_brief
 from configs.roles import LAUNCHER, RECORDER
 from configs.scenario import Scenario
@@ -68,8 +70,9 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         verdict = expectations.verdict(expected, stopped=stopped, cut_short=bool(cut_short))
         if verdict == "not checked":
             reason = why_not_checked(expected, cut_short)
-    speed = leader_speed(scenario)
-    robots = {robot: _robot(rows, speed) for robot, rows in controllers.items()}
+    longest = max(controllers.values(), key=len, default=None)
+    v_r = np.empty(0) if longest is None else leader_speed(scenario)(_nanoseconds(longest["t_s"]))
+    robots = {robot: _robot(rows, v_r) for robot, rows in controllers.items()}
     simulated_s = round(ticks * scenario.clock.control_period_s, 9)
     return {
         "verdict": verdict,
@@ -135,14 +138,8 @@ def _final(t: np.ndarray) -> slice:
 
 def leader_speed(scenario: Scenario) -> Callable[[np.ndarray], np.ndarray]:
     """v_r over scenario time [ns] → [m/s], as the leader says it."""
-    steps = leader_brief(scenario).speed_steps
-    since, speeds = np.array([step[0] for step in steps]), np.array([step[1] for step in steps])
-
-    def at(t_ns: np.ndarray) -> np.ndarray:
-        found: np.ndarray = speeds[np.maximum(np.searchsorted(since, t_ns, side="right") - 1, 0)]
-        return found
-
-    return at
+    changes = leader_brief(scenario).speed_changes
+    return np.vectorize(partial(speed_at, changes), otypes=[np.float64])
 
 
 def _cut_short(record: Record, scenario: Scenario, stats: RunStats) -> dict[str, str]:
@@ -159,7 +156,13 @@ def _cut_short(record: Record, scenario: Scenario, stats: RunStats) -> dict[str,
     return short
 
 
-def _robot(rows: np.ndarray, speed: Callable[[np.ndarray], np.ndarray]) -> dict[str, Any]:
+def _nanoseconds(t_s: np.ndarray) -> np.ndarray:
+    """Times of the record as the controllers had them."""
+    rounded: np.ndarray = np.rint(t_s * 1e9).astype(np.int64)
+    return rounded
+
+
+def _robot(rows: np.ndarray, v_r: np.ndarray) -> dict[str, Any]:
     t, last = rows["t_s"], _final(rows["t_s"])
     torque = max(_peak(rows["tau_right_wheel_N_m"]), _peak(rows["tau_left_wheel_N_m"]))
     return {
@@ -168,7 +171,7 @@ def _robot(rows: np.ndarray, speed: Callable[[np.ndarray], np.ndarray]) -> dict[
         "final_max": {name: _peak(rows[name][last]) for name in ERRORS},
         "final_from_s": _seconds(t[last][0]),
         "peak_torque_wheel_N_m": torque,
-        "settle_s_dot_s": settle_s(t, rows["s_dot"] - speed(np.rint(t * 1e9).astype(np.int64))),
+        "settle_s_dot_s": settle_s(t, rows["s_dot"] - v_r[: len(rows)]),
     }
 
 

@@ -14,6 +14,7 @@ from agents.lockstep import deliver
 from bridge.network.link import Arrival
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from configs.brief import LEAD_TICKS
+from configs.leader_speed import SpeedChange
 from configs.loading import load
 from configs.resolve import agent_brief
 
@@ -138,8 +139,9 @@ def test_poses_are_dated_like_path_states_and_of_this_world() -> None:
 
 def test_a_leader_that_is_faster_than_the_scenario_is_not_followed() -> None:
     admission = admission_at(0)
-    assert admission.admits_leader_speed(LeaderSpeed(((0, 0.6),)))
-    assert not admission.admits_leader_speed(LeaderSpeed(((0, 0.6), (10, 1e9))))
+    assert admission.admits_leader_speed(LeaderSpeed((SpeedChange(0, 0.6),)))
+    ramp = SpeedChange(0, 0.6), SpeedChange(10, 1e9, 5)
+    assert not admission.admits_leader_speed(LeaderSpeed(ramp))
     (line,) = admission.refusals.lines()
     assert line.startswith("refused 1 speed of the leader: v_r = 1e+09 m/s")
 

@@ -11,6 +11,7 @@ from bridge.frame import Frame
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.network.telemetry import RowBuffer, row_of
 from configs.errors import InfrastructureError
+from configs.leader_speed import SpeedChange
 from configs.resolve import agent_brief
 
 
@@ -72,7 +73,7 @@ def test_what_is_missing_is_named() -> None:
     brief = agent_brief(SCENARIO, "r1", network=NOWHERE, bus=())
     agent = Agent(brief, RowBuffer(row_of(brief.signals), lambda *_: None))
     assert agent.missing_to_start() == ["the localisation system", "the leader"]
-    agent.receive_leader_speed(LeaderSpeed(((0, 0.6),)))
+    agent.receive_leader_speed(LeaderSpeed((SpeedChange(0, 0.6),)))
     agent.receive_pose(PoseFix(-1, 0, 0.0, 0.0, 0.0))
     assert agent.missing_to_start() == []
     bench = Bench("r2")
@@ -100,7 +101,7 @@ def test_a_row_holds_what_was_used_and_commanded() -> None:
 
 def test_a_leader_link_moves_the_estimate_and_its_absence_does_not() -> None:
     hearing, deaf = Bench("r1"), Bench("r2")
-    hearing.agent.receive_leader_speed(LeaderSpeed(((0, 1.0),)))
+    hearing.agent.receive_leader_speed(LeaderSpeed((SpeedChange(0, 1.0),)))
     for bench in (hearing, deaf):
         bench.run(bench.schedule.countdown_ticks)
         bench.run(3)

@@ -112,15 +112,15 @@ def test_check_of_an_unsound_scenario_ends_with_1(tmp_path: Path) -> None:
 
 
 def test_run_refuses_what_check_calls_an_error_unless_it_is_forced(tmp_path: Path) -> None:
-    backwards = "--in-process", "--no-report", "--json", "--set", "leader.speed_m_s=-0.4"
-    refused = fleetloop(tmp_path, "run", "two_robots", *backwards)
+    stiff = "--in-process", "--no-report", "--json", "--set", "control.k4=30.0"
+    refused = fleetloop(tmp_path, "run", "two_robots", *stiff)
     assert (refused.returncode, refused.stdout) == (2, "")
-    assert "error: ṡ > 0: the leader's speed: v_r = -0.4 m/s" in refused.stderr
+    assert "error: r1, r2: sampled speed loop" in refused.stderr
     assert "--force runs it" in refused.stderr
     assert list(tmp_path.iterdir()) == []
-    forced = fleetloop(tmp_path, "run", "two_robots", *backwards, "--force", "--duration", "0.5")
-    assert json.loads(forced.stdout)["verdict"] == "not checked"
-    assert "error: ṡ > 0" in forced.stderr
+    forced = fleetloop(tmp_path, "run", "two_robots", *stiff, "--force", "--duration", "0.5")
+    assert json.loads(forced.stdout)["verdict"] == "failed"
+    assert "error: r1, r2: sampled speed loop" in forced.stderr
 
 
 def test_a_path_that_stands_still_is_refused_by_check_and_run(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from agents.coordination import CoordinationState, Coordinator
 from agents.neighbours import Neighbours
 from bridge.netem.channel import Channel
 from configs.graph import Graph
+from configs.leader_speed import SpeedChange, speed_at
 from configs.netem import Effects
 from configs.sections import Coordination
 
@@ -22,6 +23,7 @@ def coordinated_fleet(
     h_s: float,
     share_every: int = 1,
     v_r: float = 0.6,
+    changes: Sequence[SpeedChange] = (),
     starts: Sequence[float] | None = None,
     effects: Effects = NO_EFFECTS,
     seed: int = 1,
@@ -34,7 +36,8 @@ def coordinated_fleet(
         ticks: how many.
         h_s: control period [s].
         share_every: ticks between two path states.
-        v_r: speed of the leader [m/s].
+        v_r: speed of the leader at the start [m/s].
+        changes: of that speed.
         starts: s(0) [m]; 0 if not given.
         effects: of every edge.
         seed: of the edges' random streams.
@@ -50,6 +53,7 @@ def coordinated_fleet(
     states = {
         r: CoordinationState(coordination.v_hat_0, coordination.mu_0, at_start[r]) for r in robots
     }
+    profile = (SpeedChange(0, v_r), *changes)
     history = np.empty((ticks + 1, len(robots), 3))
     history[0] = [states[r] for r in robots]
     for tick in range(ticks):
@@ -60,6 +64,7 @@ def coordinated_fleet(
             for sent_ns, said in channel.receive(now_ns):
                 receivers[hearer].receive(speaker, sent_ns, said.s, said.v_hat)
         sums = {r: receivers[r].sums(now_ns, states[r].s) for r in robots}
-        states = {r: coordinators[r].advance(states[r], sums[r], links[r], v_r) for r in robots}
+        speed = speed_at(profile, now_ns)
+        states = {r: coordinators[r].advance(states[r], sums[r], links[r], speed) for r in robots}
         history[tick + 1] = [states[r] for r in robots]
     return history

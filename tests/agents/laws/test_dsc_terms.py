@@ -10,6 +10,7 @@ from agents.laws.dsc_terms import (
     Projection,
     adapt,
     project,
+    sense,
     smoothing,
     wheel_torques,
 )
@@ -17,6 +18,11 @@ from agents.laws.dsc_terms import (
 
 def test_a_filter_goes_the_exact_share_of_the_way() -> None:
     assert smoothing(0.001, 0.01) == pytest.approx(1 - exp(-0.1))
+
+
+def test_a_path_is_followed_in_the_papers_sense_unless_the_path_variable_goes_back() -> None:
+    senses = [sense(s_dot) for s_dot in (0.6, 0.0, -0.025, -0.05, -0.6)]
+    assert senses == [1.0, 1.0, 0.0, -1.0, -1.0]
 
 
 BOUNDS = Projection.of(1.0, 0.1)

@@ -1,5 +1,6 @@
 """Messages: there and back, and bounded decoding of anything at all."""
 
+from itertools import pairwise
 from math import inf, nan
 
 import msgpack
@@ -18,6 +19,7 @@ from bridge.network.messages import (
     Rows,
 )
 from bridge.network.packing import MAX_BYTES
+from configs.leader_speed import SpeedChange
 
 ints = st.integers(-(2**62), 2**62)
 floats = st.floats(allow_nan=False, allow_infinity=False)
@@ -33,9 +35,16 @@ def test_a_pose_survives_the_wire(fix: PoseFix) -> None:
     assert PoseFix.decode(fix.encode()) == fix
 
 
-@given(st.lists(st.tuples(ints, floats), min_size=1, max_size=5).map(sorted))
-def test_a_leader_speed_survives_the_wire(steps: list[tuple[int, float]]) -> None:
-    speed = LeaderSpeed(tuple(steps))
+@given(
+    st.lists(st.tuples(st.integers(0, 2**40), floats), min_size=1, max_size=5),
+    st.floats(0.0, 1.0),
+)
+def test_a_leader_speed_survives_the_wire(said: list[tuple[int, float]], share: float) -> None:
+    times = [t_ns for t_ns, _ in sorted(said)]
+    gaps = [after - before for before, after in pairwise(times)] + [2**40]
+    speeds = [speed for _, speed in said]
+    ramps = [int(share * gap) for gap in gaps]
+    speed = LeaderSpeed(tuple(map(SpeedChange, times, speeds, ramps)))
     assert LeaderSpeed.decode(speed.encode()) == speed
 
 
@@ -117,21 +126,19 @@ def test_what_is_too_long_is_not_even_looked_at() -> None:
     assert Notice.decode(msgpack.packb([1, "y" * MAX_BYTES])) is None
 
 
-def test_the_leader_speed_holds_from_each_step_on_and_before_the_first() -> None:
-    speed = LeaderSpeed(((0, 0.6), (10, 0.4), (20, 0.5)))
-    assert [speed.speed_at(t) for t in (-5, 0, 9, 10, 19, 20, 99)] == [
-        0.6,
-        0.6,
-        0.6,
-        0.4,
-        0.4,
-        0.5,
-        0.5,
-    ]
-
-
-def test_steps_out_of_order_are_no_leader_speed() -> None:
-    assert LeaderSpeed.decode(msgpack.packb([1, [[10, 0.4], [0, 0.6]]])) is None
+@pytest.mark.parametrize(
+    "changes",
+    [
+        [[10, 0.4, 0], [0, 0.6, 0]],  # out of order
+        [[0, 0.4, 11], [10, 0.6, 0]],  # one within the other
+        [[0, 0.4, -1]],
+        [[0, 0.4]],
+        [[0, nan, 0]],
+        [],
+    ],
+)
+def test_changes_that_do_not_follow_each_other_are_no_leader_speed(changes) -> None:
+    assert LeaderSpeed.decode(msgpack.packb([1, changes])) is None
 
 
 @given(st.text(max_size=600))

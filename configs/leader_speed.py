@@ -1,0 +1,42 @@
+"""The virtual leader's speed over time: steps, and ramps between two speeds.
+
+    v_r(t) = v_k−1                                        t < t_k
+           = v_k−1 + (v_k − v_k−1) (t − t_k) / T_k        t_k ≤ t < t_k + T_k
+           = v_k                                          t_k + T_k ≤ t < t_k+1
+
+with T_k = 0 for a step. Before the first change its speed holds. v_r = 0: the formation stands.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+
+class SpeedChange(NamedTuple):
+    """A change of v_r: a step, or a linear ramp from the speed before."""
+
+    from_ns: int  # scenario time at which it begins
+    speed_m_s: float  # after it
+    ramp_ns: int = 0  # how long it takes
+
+    @property
+    def to_ns(self) -> int:
+        """Scenario time from which on the speed holds."""
+        return self.from_ns + self.ramp_ns
+
+
+def speed_at(changes: Sequence[SpeedChange], t_ns: float) -> float:
+    """v_r at a scenario time [m/s]; `changes`: at least one, in order, none within another."""
+    before = changes[0].speed_m_s
+    for from_ns, speed, ramp_ns in changes:
+        if t_ns < from_ns:
+            break
+        if t_ns < from_ns + ramp_ns:
+            return before + (speed - before) * ((t_ns - from_ns) / ramp_ns)
+        before = speed
+    return before
+
+
+def in_order(changes: Sequence[SpeedChange]) -> bool:
+    """Whether each change begins when the one before it is over."""
+    return all(one.to_ns <= other.from_ns for one, other in pairwise(changes))

@@ -1,0 +1,58 @@
+"""The virtual leader's speed over time."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from configs.errors import ScenarioError
+from configs.leader_speed import SpeedChange, in_order, speed_at
+from configs.loading import load
+
+PROFILE = (
+    SpeedChange(0, 0.6),
+    SpeedChange(10, 0.4),
+    SpeedChange(20, 0.0, 8),
+    SpeedChange(28, 0.5, 4),
+)
+
+
+@pytest.mark.parametrize(
+    ("t_ns", "speed"),
+    [
+        *((-5, 0.6), (0, 0.6), (9, 0.6), (10, 0.4), (20, 0.4), (22, 0.3), (26, 0.1)),
+        *((28, 0.0), (29, 0.125), (32, 0.5), (99, 0.5)),
+    ],
+)
+def test_speeds_hold_step_and_ramp(t_ns: int, speed: float) -> None:
+    assert speed_at(PROFILE, t_ns) == pytest.approx(speed, abs=1e-15)
+
+
+@given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.integers(0, 1000), st.integers(0, 1200))
+def test_a_ramp_stays_between_its_speeds(before, after, ramp_ns, t_ns) -> None:
+    v_r = speed_at((SpeedChange(0, before), SpeedChange(100, after, ramp_ns)), t_ns)
+    assert min(before, after) - 1e-12 <= v_r <= max(before, after) + 1e-12
+
+
+def test_a_change_may_begin_when_the_ramp_before_it_is_over_and_not_earlier() -> None:
+    assert in_order(PROFILE)
+    assert not in_order((SpeedChange(0, 0.6), SpeedChange(20, 0.0, 8), SpeedChange(27, 0.5)))
+
+
+@pytest.mark.parametrize(
+    ("steps", "key", "remedy"),
+    [
+        ("{t_s=5.0, speed_m_s=0.2}, {t_s=5.0, speed_m_s=0.3}", "1.t_s", "t_s must increase"),
+        (
+            "{t_s=5.0, speed_m_s=0.2, ramp_s=4.0}, {t_s=8.0, speed_m_s=0.3}",
+            "1.t_s",
+            "within the ramp before it, from 5 s to 9 s: let it begin then, or lower that"
+            " ramp_s = 4 to 3 or less",
+        ),
+        ("{t_s=5.0, speed_m_s=0.2, ramp_s=-1.0}", "0.ramp_s", "must be 0 or more"),
+    ],
+)
+def test_steps_that_overlap_are_refused_by_key_and_cause(steps, key, remedy) -> None:
+    with pytest.raises(ScenarioError) as raised:
+        load("paper", [f"leader.steps=[{steps}]"])
+    assert f"leader.steps.{key}" in str(raised.value)
+    assert remedy in str(raised.value)
