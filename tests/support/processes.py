@@ -17,7 +17,7 @@ import can
 import psutil
 from support.command_line import fleetloop
 
-WAIT_S = 60.0
+WAIT_S = 120.0
 
 
 class Run:

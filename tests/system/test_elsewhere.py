@@ -38,7 +38,7 @@ class Agent:
             text=True,
         )
 
-    def end(self, within_s: float = 60.0) -> tuple[int, str]:
+    def end(self, within_s: float = 120.0) -> tuple[int, str]:
         """(exit status, what it said)."""
         _, said = self.process.communicate(timeout=within_s)
         return self.process.returncode, said
