@@ -182,6 +182,15 @@ class InProcessRun:
         return {name: bus.crossed for name, bus in self._buses.items()}
 
     @property
+    def nodes(self) -> dict[str, dict[str, int]]:
+        """Frames of the nodes of buses with bit timing, by bus/node and by their fate."""
+        return {
+            f"{name}/{node}": counts
+            for name, bus in self._buses.items()
+            for node, counts in bus.node_counts().items()
+        }
+
+    @property
     def stopped_robots(self) -> dict[str, str]:
         """Robots that stopped themselves or whose motion diverged, and why."""
         stopped = {

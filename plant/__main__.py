@@ -194,6 +194,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
             stopped_robots=diverged_robots(emulated, brief.schedule.period_ns),
             bus_troubles=bus_troubles(end.troubles(), emulated),
             stalls=tuple(stalls),
+            nodes=counters.nodes,
         )
         report.put(summary.encode())
         stop.await_release()

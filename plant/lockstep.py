@@ -51,6 +51,11 @@ class PlantCounters:
     waited_ns: int = 0
     overruns: int = 0
     frames: dict[str, int] = field(default_factory=dict)
+    nodes: dict[str, dict[str, int]] = field(default_factory=dict)  # of wires, by bus/node
+
+    def add_nodes(self, bus: str, counts: Mapping[str, dict[str, int]]) -> None:
+        """Add the nodes of a bus."""
+        self.nodes |= {f"{bus}/{node}": of_node for node, of_node in counts.items()}
 
 
 class _Lane:
@@ -145,6 +150,7 @@ class LockstepLoop:
         self.counters.wall_ns = self._clock.monotonic_ns() - self._start_ns
         for bus, lane in self._lanes.items():
             self.counters.frames[bus] = lane.bus.crossed
+            self.counters.add_nodes(bus, lane.bus.node_counts())
 
     def progress(self) -> Progress:
         """The progress of the slowest robot."""

@@ -98,6 +98,7 @@ class RealtimeLoop:
         self.counters.wall_ns = max(self._clock.monotonic_ns() - epoch_ns, 0)
         for name, bus in self._buses.items():
             self.counters.frames[name] = bus.crossed
+            self.counters.add_nodes(name, bus.node_counts())
 
     def _serve(self, wait_s: float, power_up_ns: int) -> None:
         """Serve the buses until something came or is due, at most `wait_s`."""

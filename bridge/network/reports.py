@@ -7,7 +7,8 @@ of another role.
     process        layout
     every role     [1, failure, left_early, notices, flooders, missing_privileges, cpu_ns,
                     durations_ns, profile_ns]
-    plant          the same, then [overruns, frames, stopped_robots, bus_troubles, stalls]
+    plant          the same, then [overruns, frames, stopped_robots, bus_troubles, stalls,
+                    nodes]
     agent/<robot>  the same, then [stop_reason, stop_tick, deadlines, messages]
     launcher       [1, reason]
 
@@ -97,6 +98,8 @@ class PlantReport(Report):
     """Buses that failed, and how."""
     stalls: Stalls = ()
     """In real time, when the plant or its machine stood still."""
+    nodes: CountsByName = field(default_factory=dict)
+    """Frames of the nodes of buses with bit timing, by bus/node and by their fate."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

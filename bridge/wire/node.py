@@ -45,6 +45,10 @@ class NodeCounters:
         self.dropped = 0  # lost with a node that left or went off the bus, or by a fault
         self.errors = 0  # attempts to send that failed
 
+    def as_dict(self) -> dict[str, int]:
+        """By name."""
+        return {name: getattr(self, name) for name in self.__slots__}
+
 
 class Node:
     """One controller on the wire; made by `Wire.attach`, to be read only by others."""

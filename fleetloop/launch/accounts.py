@@ -56,6 +56,7 @@ def _add_report(stats: RunStats, process: str, report: Report) -> None:
             stats.overruns = report.overruns
             stats.frames_per_bus = dict(report.frames)
             stats.bus_troubles = dict(report.bus_troubles)
+            stats.nodes = report.nodes
         case AgentReport():
             if report.messages:
                 stats.messages[name] = report.messages

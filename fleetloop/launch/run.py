@@ -210,6 +210,7 @@ def _in_process(
         wall_s=run.wall_s,
         startup_s=startup_s,
         frames_per_bus=run.frames,
+        nodes=run.nodes,
         stopped_robots=run.stopped_robots,
         notices=run.notices,
         messages=run.messages,

@@ -39,6 +39,7 @@ class RunStats:
     teardown_s: float = 0.0
     overruns: int = 0
     frames_per_bus: dict[str, int] = field(default_factory=dict)
+    nodes: Mapping[str, Mapping[str, int]] = field(default_factory=dict)  # of wires, by bus/node
     waits_s: dict[str, dict[str, float]] = field(default_factory=dict)
     stopped_robots: dict[str, str] = field(default_factory=dict)
     notices: dict[str, list[str]] = field(default_factory=dict)
@@ -103,6 +104,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         "overruns": stats.overruns,
         "machine": stats.machine or None,
         "frames_per_bus": stats.frames_per_bus,
+        "nodes": {node: dict(counts) for node, counts in stats.nodes.items()} or None,
         "bus_troubles": stats.bus_troubles,
         "waits_s": stats.waits_s,
         "cpu_s": stats.cpu_s,

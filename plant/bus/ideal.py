@@ -46,6 +46,10 @@ class IdealBus:
             robot.brief.drive.encoder_period_ns < schedule.period_ns for robot in robots
         )
 
+    def node_counts(self) -> dict[str, dict[str, int]]:
+        """Nothing: without bit timing there is no wire."""
+        return {}
+
     # --- lockstep --------------------------------------------------------------------------------
 
     def steps(self) -> Steps:

@@ -51,6 +51,9 @@ class Bus(Protocol):
     acts_between_ticks: bool
     """In real time, whether `next_ns` has to be looked at between two ticks."""
 
+    def node_counts(self) -> dict[str, dict[str, int]]:
+        """Frames of each node on the wire by their fate; nothing without bit timing."""
+
     def steps(self) -> Steps:
         """The ticks from the first of the countdown to the closing one."""
 

@@ -101,6 +101,11 @@ class TimedBus:
         self.crossed = 0
         """Frames that ended on the wire, drives' and clients'."""
 
+    def node_counts(self) -> dict[str, dict[str, int]]:
+        """Frames of each drive and of each client that is still there, by their fate."""
+        nodes = (*(drive.node for drive in self._drives), *self._hosts.values())
+        return {node.name: node.counters.as_dict() for node in nodes}
+
     # --- lockstep --------------------------------------------------------------------------------
 
     def steps(self) -> Steps:

@@ -109,7 +109,9 @@ def test_nonsense_in_a_roles_report_and_progress_ends_nothing(tmp_path, monkeypa
                 report = link.publisher(attack.key(keys.report, role))
                 progress = link.publisher(attack.key(keys.progress, role))
                 honest = ["", "", ["\x1b[2J\x1b]0;owned\x07"], [], [], 0, {}, {}]
-                own = {"plant": [0, {}, {}, {}, []], "agent/r1": ["", 0, None, {}]}.get(role, [])
+                own = {"plant": [0, {}, {}, {}, [], {}], "agent/r1": ["", 0, None, {}]}.get(
+                    role, []
+                )
                 report.put(msgpack.packb([1, *honest, *own]))
                 for wrong in (
                     [1, *honest[:5], float("nan"), {}, {}, *own],

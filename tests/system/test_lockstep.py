@@ -19,6 +19,7 @@ LOSSY = (
     ' edge=[{edges=["leader -> *", "localisation -> *"], delay={kind="constant", delay_s=0.03}}]}'
 )
 WIRE = 'bus.timing="wire"'
+SIDES = (" right", " left")
 KINDS = ["blf", "log"]
 
 
@@ -44,6 +45,12 @@ def test_processes_and_one_process_leave_the_same_record_bit_for_bit(
     frames = [json.loads((x / "summary.json").read_text())["frames_per_bus"] for x in (a, b, c)]
     assert frames[0] == frames[1] == frames[2]
     assert min(frames[0].values()) > 4 * 2000
+    nodes = [json.loads((x / "summary.json").read_text())["nodes"] for x in (a, b, c)]
+    assert nodes[0] == nodes[1] == nodes[2]
+    if WIRE in overrides:
+        assert set(nodes[0]) == {f"{r}/{r}{side}" for r in ("r1", "r2") for side in ("", *SIDES)}
+        sent = nodes[0]["r1/r1"]
+        assert sent["sent"] == sent["accepted"] > 2 * 4000
     ticks = 4000 if WIRE in overrides else 2000
     assert f"identical: {ticks} ticks of 2 robots" in capsys.readouterr().out
     recorded = ["record.mcap", *(f"can/{bus}.{kind}" for bus in ("r1", "r2") for kind in KINDS)]

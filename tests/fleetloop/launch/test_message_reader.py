@@ -29,7 +29,7 @@ SCHEDULE = schedule(SCENARIO)
 
 
 HONEST = ["", "", [], [], [], 0, {}, {}]
-OWN = {"plant": [0, {}, {}, {}, []], "agent/r1": ["", 0, None, {}]}
+OWN = {"plant": [0, {}, {}, {}, [], {}], "agent/r1": ["", 0, None, {}]}
 
 
 def said(process: str, changes: dict[int, object]) -> bytes:
@@ -119,6 +119,7 @@ reports = st.fixed_dictionaries(
             stopped_robots=by_name,
             bus_troubles=by_name,
             stalls=st.lists(stalls, max_size=4).map(tuple),
+            nodes=st.dictionaries(st.sampled_from(["r1/r1", "r1/r1 left"]), counts, max_size=2),
         ),
         "agent/r1": st.builds(
             AgentReport,
