@@ -20,6 +20,7 @@ from bridge.can_bus.pythoncan import open_bus, to_message
 from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.client import StoppedError, open_polled
+from bridge.network.clock_exchange import answer_pings
 from bridge.network.launcher import follow_launcher
 from bridge.network.link import Arrival, Link, Publisher
 from bridge.network.messages import Notice, Rows
@@ -60,6 +61,7 @@ def run(brief: AgentBrief, stop: Stop) -> str:
     with link:
         if brief.detached:
             follow_launcher(link, brief.network.run, stop)
+            answer_pings(link, brief.network.run, AGENT.process(brief.robot))
         with open_bus(brief.robot, brief.bus) as bus:
             return _run(brief, stop, link, bus)
 

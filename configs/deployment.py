@@ -21,7 +21,7 @@ from configs.complaints import complaints, refusal
 from configs.connections import OURS, Settings
 from configs.errors import Complaint, Problem, ScenarioError
 from configs.files import expanded
-from configs.parameters import FilePath, Name, Parameters, Pattern, as_tuples, parameter
+from configs.parameters import FilePath, Name, Parameters, Pattern, Positive, as_tuples, parameter
 from configs.roles import AGENT, ROLES, STARTED, identity_of, processes_of
 from configs.scenario import Scenario
 from configs.tls import ROUTER, TlsFiles, files_in
@@ -74,6 +74,9 @@ class NetworkSection(Parameters):
     )
     run: Annotated[str, Pattern(patterns.RUN)] | None = parameter(
         None, "the run's name in every key; the scenario's if not given"
+    )
+    clock_tolerance_m: Positive = parameter(
+        0.02, "a run is refused whose clocks displace a robot by more than that for one hop"
     )
     users: FilePath | None = parameter(
         None,

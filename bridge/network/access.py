@@ -216,6 +216,8 @@ def _rights(role: Role, robot: str, graph: _Graph) -> Rights:
     if role.module:
         control = keys.progress(run, process), keys.notice(run, process), keys.report(run, process)
     reports = tuple(keys.report(run, other) for other in role.watches)
+    if role.module and not role.beside_launcher:
+        control, reports = (*control, keys.pong(run, process)), (*reports, keys.ping(run))
     return Rights(
         puts=(*graph.keys(role.puts, robot), *control),
         hears=(*graph.keys(role.hears, robot), *reports),
@@ -229,7 +231,8 @@ def _launcher(graph: _Graph, bus_guests: Iterable[str]) -> Rights:
     run, users = graph.run, tuple(bus_guests)
     processes = processes_of(tuple(graph.robots))
     said = [of(run, it) for it in processes for of in (keys.progress, keys.notice, keys.report)]
-    own = keys.go(run), keys.leader_speed(run), keys.report(run, LAUNCHER.name)
+    said += [keys.pong(run, process) for process in processes]
+    own = keys.go(run), keys.leader_speed(run), keys.report(run, LAUNCHER.name), keys.ping(run)
     return Rights(
         puts=(*own, *(keys.guest_lines("down", user) for user in users)),
         hears=(*said, *(keys.guest_lines("up", user) for user in users)),

@@ -8,6 +8,8 @@
     fleetloop/<run>/leader/speed             v_r; heard by the robots with h_i = 1
     fleetloop/<run>/@live/<process>          liveliness token: "ready"
     fleetloop/<run>/@clock/go                from the launcher to plant and controllers
+    fleetloop/<run>/@clock/ping              what is the time? from the launcher
+    fleetloop/<run>/@pong/<process>          the time of a process on another machine, to it
     fleetloop/<run>/@progress/<process>      how far a process is, to the launcher
     fleetloop/<run>/@notice/<process>        what has just happened, in words, to the launcher
     fleetloop/<run>/@report/<process>        a process's last word, to the launcher
@@ -59,6 +61,16 @@ def leader_speed(run: str) -> str:
 def go(run: str) -> str:
     """Key of the start message."""
     return f"{_run(run)}/@clock/go"
+
+
+def ping(run: str) -> str:
+    """Key of the launcher's question for the time."""
+    return f"{_run(run)}/@clock/ping"
+
+
+def pong(run: str, process: str) -> str:
+    """Key of a process's answer to it."""
+    return f"{_run(run)}/@pong/{_process(process)}"
 
 
 def live(run: str, process: str) -> str:

@@ -14,6 +14,8 @@ still be impossible: readers that know the run check that.
     Progress       [1, tick, t_ns, wall_ns]                      @progress/<process>
     Notice         [1, text]                                     @notice/<process>
     Go             [1, epoch_ns, ticks]                          @clock/go
+    ClockPing      [1, sent_ns]                                  @clock/ping
+    ClockPong      [1, sent_ns, received_ns, answered_ns]        @pong/<process>
 """
 
 from typing import NamedTuple
@@ -25,6 +27,7 @@ MOST_BYTES = {
     "path": 128,
     "pose": 128,
     "progress": 128,
+    "pong": 128,
     "notice": 1 << 12,
     "truth": 1 << 16,
     "telemetry": 1 << 16,
@@ -182,4 +185,38 @@ class Go(NamedTuple):
     def decode(cls, payload: bytes) -> "Go | None":
         """The message in the bytes, None if there is none."""
         fields = unpack(payload, 3)
+        return cls(*fields[1:]) if fields is not None and ints(fields[1:]) else None
+
+
+class ClockPing(NamedTuple):
+    """The launcher asks for the time, at this reading of its wall clock."""
+
+    sent_ns: int
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return pack(*self)
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "ClockPing | None":
+        """The message in the bytes, None if there is none."""
+        fields = unpack(payload, 2)
+        return cls(*fields[1:]) if fields is not None and ints(fields[1:]) else None
+
+
+class ClockPong(NamedTuple):
+    """The answer: when the question was sent, came and was answered, each by its own wall clock."""
+
+    sent_ns: int
+    received_ns: int
+    answered_ns: int
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return pack(*self)
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "ClockPong | None":
+        """The message in the bytes, None if there is none."""
+        fields = unpack(payload, 4)
         return cls(*fields[1:]) if fields is not None and ints(fields[1:]) else None

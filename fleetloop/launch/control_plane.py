@@ -13,6 +13,7 @@ from bridge.network.messages import Progress
 from configs.brief import Schedule
 from configs.roles import PLANT, is_observer
 from fleetloop.launch.child import Child
+from fleetloop.launch.clock_offsets import ClockOffsets
 from fleetloop.launch.machine import WATCH_EVERY_S
 from fleetloop.launch.message_reader import MessageReader
 from fleetloop.launch.outcome import Outcome
@@ -44,6 +45,7 @@ class ControlPlane:
     ) -> None:
         self.outcome = Outcome()
         self.words = MessageReader(schedule)
+        self.clocks = ClockOffsets(remote.processes)
         self.vitals = Vitals()
         self.remote = remote
         self.children: list[Child] = []
@@ -57,6 +59,7 @@ class ControlPlane:
 
     def subscribe(self, link: Link, run: str, processes: Iterable[str]) -> None:
         """Subscribe to the messages of these processes."""
+        self.clocks.open(link, run)
         # One by one: a wildcard is wider than any identity's rights and would be refused.
         for process in processes:
             link.watch_live(keys.live(run, process), "live")
@@ -103,6 +106,9 @@ class ControlPlane:
             case "progress":
                 if (progress := self.words.progress(process, arrival.payload)) is not None:
                     self._process_progress(process, progress)
+            case "pong":
+                if not self.clocks.take(process, arrival.payload):
+                    self.words.refusals.note("time", process, "not well formed")
             case "notice":
                 if (notice := self.words.notice(process, arrival.payload)) is not None:
                     self._tell(self.outcome.said.setdefault(process, []), process, notice.text)

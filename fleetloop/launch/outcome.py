@@ -21,6 +21,8 @@ class Outcome:
     reports: dict[str, Report] = field(default_factory=dict)
     said: dict[str, list[str]] = field(default_factory=dict)  # notices of a process, as they came
     notices: dict[str, list[str]] = field(default_factory=dict)  # about a process, by the launcher
+    clocks: dict[str, dict[str, float]] = field(default_factory=dict)
+    """Offsets of other machines' clocks, by process (`fleetloop.launch.clock_offsets`)."""
     refused: dict[str, dict[str, int]] = field(default_factory=dict)
     """How often the router refused an identity, by kind (`bridge.network.router_refusals`)."""
     machine: dict[str, Any] = field(default_factory=dict)

@@ -12,8 +12,9 @@ from configs.connections import NetworkLink, Outside, Settings
 from configs.deployment import Deployment, NetworkSection, passwords
 from configs.errors import ScenarioError
 from configs.resolve import channels
-from configs.roles import LAUNCHER, LOCALISATION, identity_of, processes_of
+from configs.roles import AGENT, LAUNCHER, LOCALISATION, PLANT, identity_of, processes_of
 from configs.scenario import Scenario
+from fleetloop.launch.clock_offsets import Hop
 
 if TYPE_CHECKING:
     from fleetloop.certificates.folder import CertificateFolder
@@ -180,6 +181,13 @@ def access_plan(scenario: Scenario, deployment: Deployment, run: str) -> access.
         return planned
     with _named_certificates(network.certificates) as folder:
         return replace(planned, expiries=folder.expiries())
+
+
+def hops(scenario: Scenario, deployment: Deployment) -> list[Hop]:
+    """Which process uses what another one dates: neighbours' path states, poses of the plant."""
+    paths = [Hop(AGENT.process(j), AGENT.process(i)) for j, i in scenario.topology.edges]
+    emulated = [robot for robot in scenario.names if deployment.emulates(robot)]
+    return paths + [Hop(PLANT.name, AGENT.process(robot)) for robot in emulated]
 
 
 def is_external(deployment: Deployment) -> bool:

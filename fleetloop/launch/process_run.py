@@ -32,6 +32,12 @@ from configs.roles import LAUNCHER, PLANT, identity_of, processes_of
 from configs.scenario import Scenario
 from fleetloop.launch import open_files, placement
 from fleetloop.launch.child import GAVE_UP, Failure, end, refuse_shadowed_roles
+from fleetloop.launch.clock_offsets import (
+    EVERY_S,
+    START_EVERY_S,
+    WAITED_S,
+    too_far_apart,
+)
 from fleetloop.launch.control_plane import ControlPlane
 from fleetloop.launch.ending import DRAIN_S, Ending
 from fleetloop.launch.fork_server import ForkServer
@@ -85,6 +91,7 @@ class ProcessRun:
         limit_s = self._schedule.tick_deadline_s
         self._ending = Ending(self._plane, self._run, self._machine, record, limit_s)
         self._next_look_s = 0.0
+        self._ready_s: float | None = None
         self._links: dict[str, NetworkLink] = {}
 
     @property
@@ -176,7 +183,7 @@ class ProcessRun:
         hellos.add(link.publisher(keys.leader_speed(run)), speed.encode())
         deadline = self._now() + ticks.start_deadline_s
         countdown_ns = ticks.countdown_ticks * ticks.period_ns + GO_AHEAD_NS
-        gone = False
+        gone, clocks = False, self._plane.clocks
         while not stop.requested:
             ready = self._plane.alive.issuperset(self._processes)
             if ready and self._plane.ticking:
@@ -193,13 +200,41 @@ class ProcessRun:
                 raise InfrastructureError(
                     f"not ready within {ticks.start_deadline_s:g} s: {_with_refusals(absent, link)}"
                 )
-            if ready and not gone:
+            clocks.ask(START_EVERY_S)
+            if ready and not gone and self._clocks_known():
+                self._refuse_clocks()
                 gone = True
                 epoch_ns = wall_of(self._clock.monotonic_ns() + countdown_ns, self._clock)
                 hellos.add(go, Go(epoch_ns, ticks.ticks).encode())
             self._plane.receive(link, min(hellos.say(), WATCH_EVERY_S))
             self._report_refusals(link)
         return None
+
+    def _clocks_known(self) -> bool:
+        """Whether the clocks of other machines are known, or were waited for long enough."""
+        if self._ready_s is None:
+            self._ready_s = self._now()
+        return self._plane.clocks.enough() or self._now() > self._ready_s + WAITED_S
+
+    def _refuse_clocks(self) -> None:
+        """Refuse a run whose machines' clocks are too far apart.
+
+        Raises:
+            InfrastructureError: they are; the text names them.
+        """
+        network, clocks = self._deployment.network, self._plane.clocks
+        clocks.at_start = clocks.offsets()
+        if network is None or not self._schedule.realtime:
+            return
+        changes = leader_brief(self._scenario).speed_changes
+        speed_m_s = max(abs(change.speed_m_s) for change in changes)
+        hops = placement.hops(self._scenario, self._deployment)
+        far = too_far_apart(clocks.at_start, hops, speed_m_s, network.clock_tolerance_m)
+        if far:
+            raise InfrastructureError(
+                f"{'; '.join(far)}: more than network.clock_tolerance_m ="
+                f" {network.clock_tolerance_m:g}; keep the machines' clocks together (chrony, PTP)"
+            )
 
     # --- run ---------------------------------------------------------------------------------
 
@@ -210,6 +245,7 @@ class ProcessRun:
         while not stop.requested:
             plane.receive(link, WATCH_EVERY_S)
             self._report_refusals(link)
+            plane.clocks.ask(EVERY_S)
             supervision.name_the_frozen()
             if (failure := supervision.failure()) is not None:
                 return supervision.root_of(failure, link, actors)
@@ -245,6 +281,7 @@ class ProcessRun:
         outcome.machine = self._machine.report()
         if refusals := link.denials.notes():
             outcome.notices["router"] = refusals
+        outcome.clocks = self._plane.clocks.account()
         outcome.refused = link.denials.counts()
         words.note_dropped(link.dropped())
         if refusals := words.refusals.lines():

@@ -19,14 +19,14 @@ class RemoteRoles:
     """State of the roles on other machines."""
 
     def __init__(self, processes: Iterable[str]) -> None:
-        self._processes = frozenset(processes)
+        self.processes = frozenset(processes)
         self._reports: dict[str, Report] = {}
         self._there: set[str] = set()
         self._gone_s: dict[str, float] = {}
 
     def note_token(self, process: str, now_s: float, *, there: bool) -> None:
         """A liveliness token came or went."""
-        if process not in self._processes:
+        if process not in self.processes:
             return
         if there:
             self._there.add(process)
@@ -36,16 +36,16 @@ class RemoteRoles:
 
     def note_report(self, process: str, report: Report) -> None:
         """A process said its last word."""
-        if process in self._processes:
+        if process in self.processes:
             self._reports[process] = report
 
     def absent(self) -> list[str]:
         """Those that have not come yet."""
-        return sorted(self._processes - self._there)
+        return sorted(self.processes - self._there)
 
     def ended(self) -> bool:
         """Whether all of them have said their last word or are lost."""
-        return self._processes <= self._reports.keys() | self._gone_s.keys()
+        return self.processes <= self._reports.keys() | self._gone_s.keys()
 
     def failure(self, now_s: float) -> Failure | None:
         """Why one of them ended before its time, None if none did."""

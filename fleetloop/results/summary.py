@@ -43,6 +43,7 @@ class RunStats:
     waits_s: dict[str, dict[str, float]] = field(default_factory=dict)
     stopped_robots: dict[str, str] = field(default_factory=dict)
     notices: dict[str, list[str]] = field(default_factory=dict)
+    clocks: dict[str, dict[str, float]] = field(default_factory=dict)  # offsets, by process
     refused: dict[str, dict[str, int]] = field(default_factory=dict)  # by kind, by identity
     messages: dict[str, Mapping[str, Mapping[str, int]]] = field(default_factory=dict)  # of edges
     machine: dict[str, Any] = field(default_factory=dict)  # of `fleetloop.launch.machine`
@@ -100,6 +101,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         },
         "notices": stats.notices,
         "refused": stats.refused,
+        "clock_offsets": stats.clocks,
         "network": network(controllers, stats.messages),
         "overruns": stats.overruns,
         "machine": stats.machine or None,

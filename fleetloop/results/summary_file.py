@@ -89,6 +89,12 @@ class _Realtime(BaseModel):
     missing_privileges: list[str]
 
 
+class _ClockOffset(BaseModel):
+    ahead_ms: float
+    uncertain_ms: float
+    drift_ms: float
+
+
 class _Stall(BaseModel):
     t_s: float
     lasted_s: float
@@ -142,6 +148,7 @@ class _Summary(BaseModel):
     bus_troubles: dict[str, str]
     cpu_s: dict[str, float]
     realtime: _Realtime | None
+    clock_offsets: dict[str, _ClockOffset] = {}
     machine: _Machine | None
     seed: int
     versions: dict[str, str]

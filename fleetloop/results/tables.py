@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from bridge.process.profile import PARTS
+from configs.roles import short_name
 from fleetloop.results.summary import ERRORS, Summary
 from fleetloop.settling import FINAL_S
 from fleetloop.terminal import ResultConsole, say
@@ -202,6 +203,11 @@ def realtime_lines(summary: Summary) -> Iterator[str]:
         f" {trip.get('p50', 0):.0f} p99 {trip.get('p99', 0):.0f} max {trip.get('max', 0):.0f} µs,"
         f" processor {kept['cpu_percent_of_one_core']:g} % of one core"
     )
+    for process, offset in summary.get("clock_offsets", {}).items():
+        yield (
+            f"clock of {short_name(process)}: {offset['ahead_ms']:+.3g} ms"
+            f" (± {offset['uncertain_ms']:.2g} ms), drift {offset['drift_ms']:+.2g} ms"
+        )
     if kept["missing_privileges"]:
         missing = ", ".join(kept["missing_privileges"])
         yield f"note: this user lacks privileges, so the clock jitters more: {missing}"

@@ -27,11 +27,19 @@ class Agent:
     """A `fleetloop agent` that is going on."""
 
     def __init__(
-        self, robot: str, deployment: Path, *args: str, scenario: Sequence[str] = SCENARIO
+        self,
+        robot: str,
+        deployment: Path,
+        *args: str,
+        scenario: Sequence[str] = SCENARIO,
+        ahead_s: float = 0.0,
     ) -> None:
+        program = ("-m", "fleetloop")
+        if ahead_s:
+            program = (str(Path(__file__).parents[1] / "support/shifted_agent.py"), str(ahead_s))
         self.process = subprocess.Popen(
             [
-                *(sys.executable, "-m", "fleetloop", "agent", scenario[0], robot, *scenario[1:]),
+                *(sys.executable, *program, "agent", scenario[0], robot, *scenario[1:]),
                 *("--deployment", str(deployment), *args),
             ],
             stderr=subprocess.PIPE,
@@ -96,6 +104,27 @@ def test_a_controller_elsewhere_drives_its_robot_to_the_end_of_the_run(tmp_path,
         assert rows["tick"].tolist() == list(range(300))
     assert set(run.summary()["realtime"]["robots"]) == {"r1", "r2"}
     assert "router" not in run.summary()["notices"]
+    clock = run.summary()["clock_offsets"]["agent/r2"]
+    assert abs(clock["ahead_ms"]) <= clock["uncertain_ms"]  # it is the same clock
+
+
+def test_a_machine_whose_clock_is_off_is_refused_with_what_that_would_cost(
+    tmp_path, agents
+) -> None:
+    where = with_password(tmp_path)
+    agents.append(Agent("r2", where, ahead_s=0.2))
+    run = start(tmp_path, where)
+    try:
+        status, out = run.end()
+        assert status == 3
+        assert agents[0].end()[0] == 3
+    finally:
+        run.kill()
+    found = re.search(r"the clock of r2 is \+(\S+) ms \(± (\S+) ms\) off that of r1, which it", out)
+    assert found is not None, out
+    assert abs(float(found[1]) - 200.0) <= float(found[2]) + 1.0
+    assert "more than network.clock_tolerance_m = 0.02" in out
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_controller_elsewhere_runs_a_law_of_the_users_own(tmp_path, agents) -> None:

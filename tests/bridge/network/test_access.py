@@ -41,6 +41,7 @@ def test_rights_of_a_robot_are_its_graph(plan: access.AccessPlan) -> None:
     assert set(rights.hears) == {
         keys.pose(RUN, "r4"),
         keys.go(RUN),
+        keys.ping(RUN),
         keys.report(RUN, LAUNCHER.name),
         keys.path(RUN, "r2"),
         keys.path(RUN, "r3"),
