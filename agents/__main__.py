@@ -15,6 +15,7 @@ from agents.agent import Agent
 from agents.guard import Phase
 from agents.lockstep import LockstepCounters, LockstepLoop, deliver
 from agents.realtime import RealtimeCounters, RealtimeLoop
+from agents.subscriptions import Subscriptions
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import open_bus, to_message
 from bridge.network import keys
@@ -79,8 +80,7 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> str:
     notice = link.publisher(keys.notice(name, AGENT.process(robot)))
     agent.guard.announce = lambda text: notice.put(Notice(text).encode())
     link.subscribe(keys.pose(name, robot), "pose")
-    for edge in brief.hears:
-        link.subscribe(keys.path(name, edge.speaker), f"path/{edge.speaker}")
+    subscriptions = Subscriptions(link, brief)
     for other in brief.located:
         link.subscribe(keys.pose(name, other), f"place/{other}")
     link.subscribe(keys.go(name), "go")
@@ -91,7 +91,7 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> str:
     hellos.add(path, agent.share(-1).encode())
     hellos.add(telemetry, Rows(0, 0, b"", False).encode())
     run_loop = _realtime if brief.schedule.realtime else _lockstep
-    connections = _Connections(agent, bus, link, path, hellos, rows, report)
+    connections = _Connections(agent, bus, link, subscriptions, path, hellos, rows, report)
     return run_loop(connections, stop)
 
 
@@ -101,6 +101,7 @@ class _Connections(NamedTuple):
     agent: Agent
     bus: can.BusABC
     link: Link
+    subscriptions: Subscriptions
     path: Publisher
     hellos: Hellos
     rows: RowBuffer
@@ -182,7 +183,12 @@ def _lockstep(connections: _Connections, stop: Stop) -> str:
             f"{connections.agent.brief.robot}: lockstep needs a Fleetloop bus"
         )
     loop = LockstepLoop(
-        connections.agent, bus, connections.link, connections.path, connections.hellos
+        connections.agent,
+        bus,
+        connections.link,
+        connections.subscriptions,
+        connections.path,
+        connections.hellos,
     )
     connections.await_peers(loop.on_arrival, stop)
     first = loop.await_first_frame(stop)
@@ -201,6 +207,7 @@ def _realtime(connections: _Connections, stop: Stop) -> str:
         connections.agent,
         connections.bus,
         connections.link,
+        connections.subscriptions,
         connections.path,
         connections.hellos,
         progress,

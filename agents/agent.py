@@ -21,8 +21,7 @@ cleared again. After rearming the first set-point is 0, the limiter starts from 
 its first tick.
 
 A stopped robot goes on sharing its path variable, so that its neighbours aren't cut off. A dry run
-goes through the same phases without a frame. An agent's only inputs are CAN frames, messages and
-tick numbers; it reads no clock.
+goes through the same phases without a frame. Its only inputs are frames, messages, tick numbers.
 """
 
 from collections.abc import Sequence
@@ -33,6 +32,7 @@ from agents.admission import Admission
 from agents.coordination import CoordinationState, Coordinator
 from agents.emulated_network import HERE, EmulatedNetwork
 from agents.guard import UNCHANGED, Guard, Phase, TorqueOutcome
+from agents.in_edges import InEdges
 from agents.laws.build import build
 from agents.laws.failure import DIVERGED, failure
 from agents.laws.interface import PathVariable, Reference, RobotMotion
@@ -79,7 +79,7 @@ class Agent:
         self._localiser = Localiser(brief.localisation, brief.wheels, self._history)
         self._neighbours = Neighbours(brief.hears, brief.coordination, self._h)
         self._coordinator = Coordinator(brief.coordination, self._h)
-        self._leader_weight = brief.leader_link.weight if brief.leader_link else 0.0
+        self._edges = InEdges(brief.hears, brief.leader_link, self._neighbours)
         start = brief.coordination
         self._coordination = CoordinationState(start.v_hat_0, start.mu_0, brief.s_0)
         self.feedback_since = self._drives.feedback_since
@@ -94,8 +94,8 @@ class Agent:
         self._path_states: dict[int, dict[str, PathState]] = {}  # by tick, until due
         self._fix_tick = -1  # of the newest fix of the emulated network
         self._records_ages = any(signal.name.startswith(AGE_PREFIX) for signal in brief.signals)
-        self._awaited = {edge.speaker for edge in brief.hears}
         self._realtime = brief.schedule.realtime
+        self._awaited = {e.speaker for e in brief.hears if e.exists(0) or not self._realtime}
         self._encoder_check = EncoderCheck(brief.host.encoder_mismatch_limit_wheel_rad, self._h)
         fused = brief.localisation == "fused"
         self._pose_mismatch_m = brief.host.pose_mismatch_limit_m if fused else inf
@@ -140,6 +140,9 @@ class Agent:
 
     def receive_path_state(self, robot: str, state: PathState) -> None:
         """Store the path state of an in-neighbour; ticks below 0: its start value."""
+        if not self._edges.exists(robot, state.tick):  # discarded unseen
+            self._awaited.discard(robot)
+            return
         if not self._admission.admits_path_state(robot, state):
             return
         self._awaited.discard(robot)
@@ -181,11 +184,7 @@ class Agent:
             missing += self._network.missing(place_tick)
         if self._schedule.shares(tick):
             heard = self._path_states.get(tick, {})
-            missing += [
-                f"path state of {edge.speaker}"
-                for edge in self.brief.hears
-                if edge.speaker not in heard
-            ]
+            missing += [f"path state of {r}" for r in self._edges.follow(tick) if r not in heard]
         return missing
 
     # --- one period --------------------------------------------------------------------------
@@ -202,6 +201,7 @@ class Agent:
             InfrastructureError: the drives were not armed when control had to start.
         """
         self._admission.tick = tick
+        self._edges.follow(tick)
         wheel_motion = self._drives.motion()
         if wheel_motion is None:
             return self._guard.arm(tick)
@@ -302,7 +302,7 @@ class Agent:
             v_r = self._network.leader_speed(tick, self._leader, v_hat)
         else:
             v_r = speed_at(self._leader.changes, t_ns) if self._leader is not None else 0.0
-        after = self._coordinator.advance(coordination, sums, self._leader_weight, v_r)
+        after = self._coordinator.advance(coordination, sums, self._edges.h, v_r)
         along = _new(PathVariable, (s, s_dot, (after[0] + after[1] - s_dot) / self._h))
         guard = self._guard
         try:

@@ -16,6 +16,7 @@ from agents.admission import LEADER, LOCALISATION
 from agents.agent import Agent
 from agents.bus_clock import BusClock
 from agents.guard import Phase
+from agents.subscriptions import Subscriptions
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import can_id_of, to_message
 from bridge.frame import Frame
@@ -67,6 +68,7 @@ class LockstepLoop:
         agent: Agent,
         bus: FleetloopBus,
         link: Link,
+        subscriptions: Subscriptions,
         path: Publisher,
         hellos: Hellos,
         *,
@@ -78,6 +80,7 @@ class LockstepLoop:
         self._robot = agent.brief.robot
         self._bus = bus
         self._link = link
+        self._subscriptions = subscriptions
         self._path = path
         self._hellos = hellos
         self.counters = LockstepCounters()
@@ -116,6 +119,7 @@ class LockstepLoop:
             BusClock(self._schedule, agent.feedback_since),
             self._schedule,
         )
+        subscriptions = self._subscriptions
         timeout_s = BUS_SHARE * schedule.tick_deadline_s
         while True:
             if message is None:
@@ -130,6 +134,8 @@ class LockstepLoop:
                     self._await_messages(tick, stop)
                 heard_ns = self._clock.monotonic_ns()
                 self._send(agent.step(tick) if not stop.requested else agent.shut_down())
+                if tick >= subscriptions.next_change:
+                    subscriptions.change(tick)
                 if schedule.shares(tick + 1):
                     self._path.put(agent.share(tick + 1).encode())
                 counters.bus_ns += came_ns - asked_ns

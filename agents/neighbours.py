@@ -13,13 +13,13 @@ received ones and of v_r, with fixed positive weights. So where the leader reach
 v̂ → v_r at any share period, with any delay, on any graph, also on one that changes. Extrapolated by
 its slope, v̂_j would diverge on graphs with cycles and slow shares.
 
-Each counts with its weight a_ij. A neighbour silent for longer than `silence_limit_s` leaves the
-sums until its next path state. Sums run in the order of names, so they don't depend on the order of
-arrival.
+Each counts with its weight a_ij. A neighbour silent for longer than `silence_limit_s`, or whose
+edge is gone, leaves the sums until its next path state. Sums run in the order of names, so they
+don't depend on the order of arrival.
 """
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from math import nan
 from typing import NamedTuple
@@ -42,6 +42,7 @@ class Sums(NamedTuple):
 @dataclass(slots=True)
 class _Neighbour:
     weight: float
+    exists: bool = True  # the edge
     t_ns: int = 0
     s: float = 0.0
     v_hat: float = 0.0
@@ -76,14 +77,26 @@ class Neighbours:
             self._own_past = deque(maxlen=round(limits.age_limit_s / period_s) + 1)
 
     def receive(self, name: str, t_ns: int, s: float, v_hat: float) -> None:
-        """Store the path state of `name` at time `t_ns`; one that is not newer is ignored."""
+        """Store the path state of `name` at time `t_ns`.
+
+        It is ignored if it isn't newer, or if the edge doesn't exist.
+        """
         neighbour = self._by_name[name]
+        if not neighbour.exists:
+            return
         if neighbour.heard and t_ns <= neighbour.t_ns:
             return
         neighbour.t_ns = t_ns
         neighbour.s = s
         neighbour.v_hat = v_hat
         neighbour.heard = True
+
+    def follow(self, names: Collection[str]) -> None:
+        """Let these be the edges that exist; a neighbour over a new one counts once it is heard."""
+        for name, neighbour in self._by_name.items():
+            if neighbour.exists and name not in names:
+                neighbour.heard = False
+            neighbour.exists = name in names
 
     def sums(self, now_ns: int, own_s: float) -> Sums:
         """The sums for the period that begins at `now_ns`, at the robot's own s [m]."""

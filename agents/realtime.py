@@ -22,6 +22,7 @@ from agents.agent import Agent
 from agents.bus_health import BusHealth
 from agents.guard import Phase
 from agents.lockstep import deliver, did_not_start
+from agents.subscriptions import Subscriptions
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import can_id_of, to_frame, to_message
 from bridge.frame import ERR, Frame
@@ -71,6 +72,7 @@ class RealtimeLoop:
         agent: Agent,
         bus: can.BusABC,
         link: Link,
+        subscriptions: Subscriptions,
         path: Publisher,
         hellos: Hellos,
         progress: Publisher,
@@ -83,6 +85,7 @@ class RealtimeLoop:
         self._robot = agent.brief.robot
         self._bus = bus
         self._link = link
+        self._subscriptions = subscriptions
         self._path = path
         self._hellos = hellos
         self._progress = progress
@@ -144,7 +147,7 @@ class RealtimeLoop:
         period_ns, phase_ns = schedule.period_ns, agent.brief.phase_ns
         self._power_up_ns = epoch_ns - schedule.countdown_ticks * period_ns
         tick = -schedule.countdown_ticks
-        lateness = self._lateness
+        lateness, subscriptions = self._lateness, self._subscriptions
         self._drop_backlog()
         while agent.phase is not Phase.DONE:
             due_ns = epoch_ns + tick * period_ns + phase_ns
@@ -169,6 +172,8 @@ class RealtimeLoop:
             self.counters.ticks += tick >= 0
             if tick % self._progress_ticks == 0:
                 self._progress.put(Progress(tick, tick * period_ns, 0).encode())
+            if tick >= subscriptions.next_change:
+                subscriptions.change(tick)
             tick += 1
             if schedule.shares(tick):
                 self._path.put(agent.share(tick).encode())

@@ -7,10 +7,11 @@ from math import ceil, floor, inf
 from pydantic import ValidationError
 
 from configs.drive_checks import drive_problems
+from configs.edge_checks import multiple_problem, no_such_robot
 from configs.edges import LEADER
 from configs.emulated_edges import emulation_problems
 from configs.errors import Problem
-from configs.graph_checks import edge_problems, graph_problems, no_such_robot
+from configs.graph_checks import edge_problems, graph_problems
 from configs.paths import Spline, Varying
 from configs.plugins import Recorded
 from configs.scenario import ETSRO, Scenario
@@ -139,16 +140,8 @@ def _periods(scenario: Scenario) -> Iterator[Problem]:
     if scenario.localisation.delay_s is not None:
         multiples["localisation.delay_s"] = scenario.localisation.delay_s
     for key, value in multiples.items():
-        ratio = value / clock.control_period_s
         least = 0 if key in ("clock.countdown_s", "localisation.delay_s") else 1
-        if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < least:
-            below = max(int(ratio), 1) * clock.control_period_s
-            yield Problem(
-                key,
-                value,
-                f"must be a whole multiple of clock.control_period_s = {clock.control_period_s:g}"
-                f", for example {below:g}",
-            )
+        yield from multiple_problem(key, value, clock.control_period_s, least=least)
     silence_s = scenario.coordination.silence_limit_s
     if clock.share_period_s > silence_s:
         yield Problem(
@@ -191,7 +184,7 @@ def _expects(scenario: Scenario, *, sound_edges: bool) -> Iterator[Problem]:
             yield Problem(f"{where}.signal", expect.signal, remedy)
         for robot in expect.robots or ():
             if robot not in scenario.names:
-                yield Problem(f"{where}.robots", robot, no_such_robot(scenario))
+                yield Problem(f"{where}.robots", robot, no_such_robot(scenario.names))
         yield from _bounds(where, expect)
         yield from _window(where, expect, scenario)
 

@@ -7,18 +7,21 @@ Two conditions are needed for the robots to move abreast at the leader's speed: 
 every robot (L + H is nonsingular), and the robots' own graph is rooted: one robot reaches all
 others (L has a simple zero eigenvalue). Text about directed graphs often turns the arrows round;
 here a root is a robot that *reaches* all others along the flow of information.
+
+Of a graph that switches, edges have windows of ticks (`configs.switching`). Its edges, roots and
+matrices are those of the union over all times; `at` and `phases` give what exists at one time.
 """
 
 import itertools
 import random
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from configs.edges import LEADER, Edge, InEdge
+from configs.edges import FOREVER, LEADER, Edge, InEdge, Windows, next_change
 
 Matrix = NDArray[np.float64]
 
@@ -38,6 +41,7 @@ class Graph:
         edges: Iterable[Edge],
         leader: Sequence[str],
         weights: Mapping[Edge, float] | None = None,
+        windows: Mapping[Edge, Windows | None] | None = None,
     ) -> "Graph":
         """A graph from (speaker, hearer) pairs and robots that hear the leader.
 
@@ -46,16 +50,21 @@ class Graph:
             edges: between robots.
             leader: robots with h_i > 0.
             weights: a_ij, h_i by edge; 1 if not given.
+            windows: of edges that exist at times only.
         """
-        weight = (weights or {}).get
+        weight, times = (weights or {}).get, (windows or {}).get
+
+        def in_edge(edge: Edge) -> InEdge:
+            return InEdge(edge[0], weight(edge, 1.0), times(edge))
+
         speakers: dict[str, set[str]] = {robot: set() for robot in robots}
         for speaker, hearer in edges:
             speakers[hearer].add(speaker)
         hears = {
-            robot: tuple(InEdge(other, weight((other, robot), 1.0)) for other in sorted(heard))
+            robot: tuple(in_edge((other, robot)) for other in sorted(heard))
             for robot, heard in speakers.items()
         }
-        links = {robot: InEdge(LEADER, weight((LEADER, robot), 1.0)) for robot in leader}
+        links = {robot: in_edge((LEADER, robot)) for robot in leader}
         return cls(tuple(robots), hears, links)
 
     @property
@@ -75,26 +84,63 @@ class Graph:
 
     @property
     def max_in_degree(self) -> float:
-        """d_max, the largest in-degree d_i = Σ_j a_ij."""
+        """d_max, the largest in-degree d_i."""
         return max(map(self.in_degree, self.robots))
 
     @property
-    def weights(self) -> tuple[float, ...]:
-        """Weights of all edges and leader links."""
-        return tuple(edge.weight for robot in self.robots for edge in self._all_to(robot))
+    def windows(self) -> dict[Edge, Windows | None]:
+        """The windows of all edges and leader links; None: always."""
+        return {
+            (edge.speaker, robot): edge.windows
+            for robot in self.robots
+            for edge in self._all_to(robot)
+        }
+
+    @property
+    def switches(self) -> bool:
+        """Whether edges come and go."""
+        return any(edge.windows is not None for edge in self.in_edges)
+
+    def phases(self) -> Iterator[tuple[int, "Graph"]]:
+        """The graphs without windows that exist in turn, with the ticks at which they begin."""
+        tick, in_edges = 0, self.in_edges
+        while tick < FOREVER:
+            yield tick, self.at(tick)
+            tick = next_change(in_edges, tick)
+
+    def at(self, tick: int) -> "Graph":
+        """The edges and links that exist at a tick."""
+        hears = {
+            robot: tuple(replace(edge, windows=None) for edge in heard if edge.exists(tick))
+            for robot, heard in self.hears.items()
+        }
+        links = {
+            robot: replace(link, windows=None)
+            for robot, link in self.links.items()
+            if link.exists(tick)
+        }
+        return Graph(self.robots, hears, links)
+
+    @property
+    def in_edges(self) -> tuple[InEdge, ...]:
+        """All edges and leader links."""
+        return tuple(edge for robot in self.robots for edge in self._all_to(robot))
 
     def in_degree(self, robot: str) -> float:
-        """d_i = Σ_j a_ij, summed in the order of names."""
-        return sum((edge.weight for edge in self.hears[robot]), 0.0)
+        """d_i = Σ_j a_ij, summed in the order of names; the largest at one time if it switches."""
+        heard, tick = self.hears[robot], 0
+        largest = 0.0
+        while tick < FOREVER:
+            largest = max(largest, sum(edge.weight for edge in heard if edge.exists(tick)))
+            tick = next_change(heard, tick)
+        return largest
 
     def normalised(self) -> "Graph":
         """The same edges with a_ij / d_i, so that every in-degree is 1 or 0."""
-        hears = {
-            robot: tuple(
-                replace(edge, weight=edge.weight / self.in_degree(robot)) for edge in heard
-            )
-            for robot, heard in self.hears.items()
-        }
+        hears = {}
+        for robot, heard in self.hears.items():
+            degree = self.in_degree(robot)
+            hears[robot] = tuple(replace(edge, weight=edge.weight / degree) for edge in heard)
         return replace(self, hears=hears)
 
     def adjacency(self) -> Matrix:

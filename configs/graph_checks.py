@@ -2,22 +2,22 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from configs.edge_checks import edge_problem, link_problems
 from configs.edges import LEADER, LEAST_WEIGHT, MOST_WEIGHT, edge_text, parse_edge
 from configs.errors import Problem
 from configs.graph import Graph
 from configs.scenario import Scenario
+from configs.switch_checks import count_problems, switch_problems
 
 _SOURCES = ("edges", "generator", "adjacency")
-
-
-def no_such_robot(scenario: Scenario) -> str:
-    """The remedy of a name that no robot has."""
-    return f"no such robot; known: {', '.join(dict.fromkeys(scenario.names))}"
 
 
 def edge_problems(scenario: Scenario) -> list[Problem]:
     """Problems of single edges, links, weights; of weights only where the edges are all right."""
     problems = [*_sources(scenario), *_links(scenario), *_matrix(scenario)]
+    problems += switch_problems(scenario)
+    if not problems:
+        problems += count_problems(scenario)
     if not problems and not isinstance(scenario.graph.weights, str):
         problems += _weights(scenario, scenario.graph.weights)
     return problems
@@ -30,28 +30,14 @@ def _sources(scenario: Scenario) -> Iterator[Problem]:
         remedy = f"give one of {', '.join(_SOURCES)}: it is the whole graph"
         yield Problem(f"graph.{given[1]}", getattr(graph, given[1]), remedy)
     for text in graph.edges or ():
-        yield from _edge(scenario, "graph.edges", text)
+        yield from edge_problem(scenario.names, "graph.edges", text)
 
 
 def _links(scenario: Scenario) -> Iterator[Problem]:
     leader = scenario.graph.leader
-    for robot in leader or ():
-        if robot not in scenario.names:
-            yield Problem("graph.leader", robot, no_such_robot(scenario))
-    if leader is not None and not leader:
+    yield from link_problems(scenario.names, "graph.leader", leader or ())
+    if leader is not None and not leader and not scenario.graph.switch:
         yield Problem("graph.leader", [], "at least one robot must hear the leader")
-
-
-def _edge(scenario: Scenario, key: str, text: str) -> Iterator[Problem]:
-    edge = parse_edge(text)
-    if edge is None:
-        yield Problem(key, text, 'must read "r1 -> r2": r2 hears r1')
-        return
-    for robot in edge:
-        if robot not in scenario.names:
-            yield Problem(key, text, f"{robot}: {no_such_robot(scenario)}")
-    if edge[0] == edge[1]:
-        yield Problem(key, text, "a robot doesn't hear itself")
 
 
 def _matrix(scenario: Scenario) -> Iterator[Problem]:
@@ -101,19 +87,20 @@ def graph_problems(scenario: Scenario) -> Iterator[Problem]:
     """The two conditions of Theorem 3.1, of a scenario whose edges are all right."""
     graph = scenario.topology
     unreached, transposed = graph.unreached_from(graph.leader), _transposed(scenario)
+    ever = ", whatever exists of it when" if graph.switches else ""
     if unreached:
         yield Problem(
             "graph.leader",
             list(graph.leader),
             f"the leader does not reach {', '.join(unreached)}: add an edge to them from a robot"
-            f" that it reaches, or a leader link{transposed}",
+            f" that it reaches, or a leader link{ever}{transposed}",
         )
     if not graph.roots():
         yield Problem(
             "graph.edges",
             [edge_text(edge) for edge in graph.edges],
             "no robot reaches all others (the graph has no root), so s_i − s_j would never vanish:"
-            f" join the parts by an edge{transposed}",
+            f" join the parts by an edge{ever}{transposed}",
         )
 
 

@@ -9,10 +9,11 @@ starts, μ(0), and the time τ that they need to agree on a speed:
 
     s(t) ∈ [min s(0) − m + v_min t,  max s(0) + m + v_max t]
     m = 1 + 2 A (max s(0) − min s(0) + |μ(0)|/p + τ (v_max − v_min))    [m]
-    τ = max(1/p, 1/√(q a), p/(q a))
+    τ = max(1/p, 1/√(q a), p/(q a)) + T
 
-with a ≤ 1 the least weight of an edge. A ≥ 1 is how much an underdamped chain (ζ < 1,
-ζ = p / (2 √(q d)) with in-degree d ≥ 1) amplifies from robot to robot:
+with a ≤ 1 the least weight of an edge, of one that comes and goes times the part of the run in
+which it exists, and T the longest absence of an edge. A ≥ 1 is how much an underdamped chain
+(ζ < 1, ζ = p / (2 √(q d)) with in-degree d ≥ 1) amplifies from robot to robot:
 coth(π ζ / (2 √(1 − ζ²))) each, `MOST_AMPLIFIED` in all. 0 is in the hull because a path variable
 may stand still; v̂ is allowed as much again beyond it. The margins are generous: of 1,100 random
 scenarios whose coordination settles none used more than four tenths of m, and v̂ never left the
@@ -75,6 +76,7 @@ def reach_of(
     q: float,
     max_in_degree: float,
     least_weight: float = 1.0,
+    longest_absence_s: float = 0.0,
 ) -> Reach:
     """The bounds of a scenario.
 
@@ -85,11 +87,12 @@ def reach_of(
         p: of (45) [1/s].
         q: of (45) [1/s²].
         max_in_degree: the largest Σ_j a_ij.
-        least_weight: of all edges and leader links.
+        least_weight: of all edges and leader links, times the part of the run that has it.
+        longest_absence_s: of all edges and leader links.
     """
     v_min, v_max = min(0.0, *speeds_m_s), max(0.0, *speeds_m_s)
     pull = max(q * min(least_weight, 1.0), _LEAST_PULL_1_S2)
-    agreed_s = min(max(1.0 / p, 1.0 / sqrt(pull), p / pull), LONGEST_S)
+    agreed_s = min(max(1.0 / p, 1.0 / sqrt(pull), p / pull) + longest_absence_s, LONGEST_S)
     apart_m = max(starts_m) - min(starts_m)
     apart_m += min(abs(mu_0) / p, abs(mu_0) * LONGEST_S) + agreed_s * (v_max - v_min)
     margin_m = 1.0 + 2.0 * _amplified(p, q, max_in_degree, len(starts_m) - 1) * apart_m

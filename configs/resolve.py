@@ -27,7 +27,6 @@ from configs.emulated_edges import EmulatedEdge, effects_of
 from configs.leader_speed import SpeedChange
 from configs.netem import LOCALISATION, Effects
 from configs.parameters import extended
-from configs.reach import Reach, reach_of
 from configs.scenario import Scenario
 from configs.signals import Signal, controller_signals
 
@@ -84,7 +83,7 @@ def agent_brief(
         wheels=Wheels(body.wheel_radius_m, body.half_track_m),
         coordination=scenario.coordination,
         s_0=robot.s_0,
-        reach=reach(scenario),
+        reach=scenario.reach,
         path=reference_path(scenario.path),
         offset=formation_offset(robot.offset),
         hears=graph.hears[name],
@@ -115,20 +114,6 @@ def channels(scenario: Scenario, name: str) -> tuple[ChannelModel, ...]:
 def signals_of(scenario: Scenario, robot: sections.Robot) -> tuple[Signal, ...]:
     """The recorded signals of a robot's controller, one row per tick."""
     return controller_signals(scenario.control_of(robot).load().SIGNALS, scenario.aged(robot.name))
-
-
-def reach(scenario: Scenario) -> Reach:
-    """Bounds of the path variables and speed estimates of a run."""
-    coordination, leader, graph = scenario.coordination, scenario.leader, scenario.topology
-    return reach_of(
-        [robot.s_0 for robot in scenario.robot],
-        [coordination.v_hat_0, leader.speed_m_s, *(step.speed_m_s for step in leader.steps)],
-        mu_0=coordination.mu_0,
-        p=coordination.p,
-        q=coordination.q,
-        max_in_degree=graph.max_in_degree,
-        least_weight=min(graph.weights, default=1.0),
-    )
 
 
 def _drive_link(scenario: Scenario, robot: sections.Robot, drive: DriveModel) -> DriveLink:

@@ -13,14 +13,16 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from configs.choices import chosen_anew, shared_part
 from configs.drives import Drive
-from configs.edges import Edge, parse_edge
+from configs.edges import LEADER, Edge, parse_edge, presence
 from configs.graph import Graph, generated, of_matrix, random_rooted
+from configs.graph_section import GraphSection
 from configs.host import Host
 from configs.netem import Effects
 from configs.parameters import Name, Seconds, Seed, changed
 from configs.paths import Cosine, PathShape
 from configs.plugins import Choice
 from configs.powertrain import Encoder, Motor, Supply
+from configs.reach import Reach, reach_of
 from configs.sections import (
     LAW,
     PROTOCOL,
@@ -32,13 +34,13 @@ from configs.sections import (
     Disturbance,
     DriveChoice,
     Expect,
-    GraphSection,
     Leader,
     Localisation,
     Mounting,
     Network,
     Robot,
 )
+from configs.switching import switched
 
 ETSRO = "etsro"
 """The robot type that every scenario knows: the paper's."""
@@ -84,7 +86,8 @@ class Scenario(BaseModel):
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with these sections instead of its own; what was made of the old ones goes."""
         copied = super().model_copy(update=update, deep=deep)
-        copied.__dict__.pop("topology", None)
+        for made in ("topology", "reach"):
+            copied.__dict__.pop(made, None)
         return copied
 
     @property
@@ -100,7 +103,7 @@ class Scenario(BaseModel):
     def aged(self, name: str) -> tuple[str, ...]:
         """In-neighbours of a robot whose ages are recorded: all, where ages vary."""
         emulated = self.network.default != Effects() or bool(self.network.edge)
-        if not emulated and self.clock.mode == "lockstep":
+        if not emulated and not self.topology.switches and self.clock.mode == "lockstep":
             return ()
         return tuple(edge.speaker for edge in self.topology.hears[name])
 
@@ -133,15 +136,39 @@ class Scenario(BaseModel):
 
     @cached_property
     def topology(self) -> Graph:
-        """The directed graph with its weights, its generator carried out."""
+        """The directed graph with its weights, its generator and its switching carried out."""
         graph, names = self.graph, self.names
-        leader = graph.leader if graph.leader is not None else names[:1]
-        if graph.adjacency is not None:
-            weights = of_matrix(names, graph.adjacency)
-            made = Graph.of(names, weights, leader, weights)
-        else:
-            made = Graph.of(names, self._edges(), leader, self._weights())
+        weights = self._weights()
+        longest_s = max(self.duration_s, self.ends_at_s)
+        windows = switched(
+            self.first_edges, graph.switch, names, self.clock.control_period_s, longest_s
+        )
+        made = Graph.of(
+            names,
+            [edge for edge in windows if edge[0] != LEADER],
+            [hearer for speaker, hearer in windows if speaker == LEADER],
+            weights,
+            windows,
+        )
         return made.normalised() if graph.weights == "normalised" else made
+
+    @cached_property
+    def reach(self) -> Reach:
+        """Bounds of the path variables and speed estimates of a run."""
+        coordination, leader, graph = self.coordination, self.leader, self.topology
+        period_s = self.clock.control_period_s
+        ticks = round(self.ends_at_s / period_s)
+        presences = [(edge, *presence(edge.windows, ticks)) for edge in graph.in_edges]
+        return reach_of(
+            [robot.s_0 for robot in self.robot],
+            [coordination.v_hat_0, leader.speed_m_s, *(step.speed_m_s for step in leader.steps)],
+            mu_0=coordination.mu_0,
+            p=coordination.p,
+            q=coordination.q,
+            max_in_degree=graph.max_in_degree,
+            least_weight=min((edge.weight * there for edge, there, _ in presences), default=1.0),
+            longest_absence_s=max((gone for *_, gone in presences), default=0) * period_s,
+        )
 
     def body_of(self, robot: Robot) -> Body:
         """The body of a robot: its type's, with what the robot says differently."""
@@ -160,14 +187,24 @@ class Scenario(BaseModel):
         """How a robot's drives are mounted: the fleet's, with what the robot says differently."""
         return changed(self.mounting, robot.mounting)
 
+    @property
+    def first_edges(self) -> tuple[Edge, ...]:
+        """Edges and leader links of [graph]: before it switches."""
+        links = self.graph.leader if self.graph.leader is not None else self.names[:1]
+        return tuple(dict.fromkeys([*self._edges(), *((LEADER, robot) for robot in links)]))
+
     def _weights(self) -> dict[Edge, float]:
         table = self.graph.weights
+        if self.graph.adjacency is not None:
+            return of_matrix(self.names, self.graph.adjacency)
         if isinstance(table, str):
             return {}
         return {edge: a for text, a in table.items() if (edge := parse_edge(text)) is not None}
 
     def _edges(self) -> Sequence[Edge]:
         graph = self.graph
+        if graph.adjacency is not None:
+            return list(of_matrix(self.names, graph.adjacency))
         if graph.edges is not None:
             return [edge for text in graph.edges if (edge := parse_edge(text)) is not None]
         if graph.generator == "random":

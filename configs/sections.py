@@ -12,14 +12,11 @@ from annotated_types import Ge, Gt, Le, Len
 from configs import patterns
 from configs.choices import Changes, Chooser
 from configs.drives import DEFAULT, DRIVES, Drive
-from configs.edges import Weight
 from configs.netem import EdgeEffects, Effects
 from configs.parameters import (
     MOST_S,
-    FilePath,
     Finite,
     Name,
-    NameOrTable,
     Node,
     NotNegative,
     Parameters,
@@ -27,7 +24,6 @@ from configs.parameters import (
     Positive,
     Seconds,
     SecondsOrZero,
-    Seed,
     changes_of,
     parameter,
 )
@@ -164,52 +160,6 @@ class Robot(Parameters):
     bus: Name | None = parameter(None, "robots may share one; of its own if not given")
     right_node: Node | None = parameter(None, "[drive] right_node, + 2 per robot on its bus")
     left_node: Node | None = parameter(None, "[drive] left_node, + 2 per robot on its bus")
-
-
-if TYPE_CHECKING:
-    Weights = Literal["unit", "normalised"] | dict[str, Weight]
-else:
-    Weights = Annotated[
-        Literal["unit", "normalised"] | dict[str, Weight],
-        NameOrTable('must be "unit", "normalised" or a table of edges, as "r1 -> r2" = 0.5'),
-    ]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GraphSection(Parameters):
-    """The directed graph: "r1 -> r2" means that r2 hears r1 (a_21 > 0).
-
-    Its edges are given by one of `edges`, `generator`, `adjacency`, `file`; without any it is a
-    chain.
-    """
-
-    edges: tuple[str, ...] | None = None
-    generator: Literal["chain", "ring", "tree", "star", "complete", "random"] | None = parameter(
-        None, "a named shape over the robots in their order, instead of edges"
-    )
-    adjacency: Annotated[tuple[tuple[NotNegative, ...], ...], Len(1, 256)] | None = parameter(
-        None,
-        "rows of a_ij, robots in their order, instead of edges: row i holds the weights of what"
-        " robot i hears, 0 of whom it doesn't",
-    )
-    file: FilePath | None = parameter(
-        None,
-        "GraphML or DOT, relative to the scenario, instead of edges: its edges, weights and leader"
-        " links are taken when the scenario is loaded",
-    )
-    weights: Weights = field(
-        default="unit",
-        hash=False,
-        metadata={
-            "description": "unit: a_ij = 1; normalised: a_ij divided by the in-degree of robot i;"
-            ' or a table "r1 -> r2" = a_21, "leader -> r1" = h_1, 1 where not given'
-        },
-    )
-    max_in_degree: Annotated[int, Ge(1), Le(256)] = parameter(2, "of the random graph")
-    seed: Seed = parameter(1, "of the random graph")
-    leader: tuple[str, ...] | None = parameter(
-        None, "robots that hear the virtual leader; the first one if not given"
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

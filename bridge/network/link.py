@@ -56,6 +56,9 @@ class Link(Protocol):
     def subscribe(self, key: str, tag: str, *, room_bytes: int = ROOM_BYTES) -> None:
         """Queue what is put on `key`, marked with `tag`, as long as there is room."""
 
+    def unsubscribe(self, key: str) -> None:
+        """End the subscription to `key`; it may be subscribed to again."""
+
     def receive(self, timeout_s: float) -> Arrival | None:
         """The next message, waiting at most `timeout_s`; 0 polls."""
 

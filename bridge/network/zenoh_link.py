@@ -10,7 +10,7 @@ import os
 import threading
 from collections.abc import Callable
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import zenoh
 from zenoh.handlers import Callback, RingChannel
@@ -34,6 +34,7 @@ class ZenohLink:
         self._session = session
         self._inbox = Inbox()
         self._declared: list[object] = []
+        self._subscribers: dict[str, zenoh.Subscriber[Any]] = {}  # by key
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
         self.receive = self._inbox.receive
 
@@ -56,11 +57,13 @@ class ZenohLink:
             payload = sample.payload
             put(str(sample.key_expr), payload.to_bytes, len(payload))
 
-        self._declared.append(
-            self._session.declare_subscriber(
-                key, Callback(on_sample, indirect=False), allowed_origin=zenoh.Locality.REMOTE
-            )
+        self._subscribers[key] = self._session.declare_subscriber(
+            key, Callback(on_sample, indirect=False), allowed_origin=zenoh.Locality.REMOTE
         )
+
+    def unsubscribe(self, key: str) -> None:
+        """End the subscription to `key`; messages of it that wait already still arrive."""
+        self._subscribers.pop(key).undeclare()
 
     def each(self, key: str, act: Callable[[bytes], None]) -> None:
         """Call `act`, on the network's thread, with what others put on `key`."""
@@ -132,9 +135,11 @@ class ZenohLink:
             if closer.is_alive():
                 ZenohLink.stuck = True
                 keep(self._declared)
+                keep(self._subscribers)
                 keep(self._tokens)
                 return
         self._declared.clear()
+        self._subscribers.clear()
         self._tokens.clear()
 
     def __enter__(self) -> Self:
@@ -170,8 +175,13 @@ class PolledLink(ZenohLink):
         subscriber = self._session.declare_subscriber(
             key, RingChannel(self._depth), allowed_origin=zenoh.Locality.REMOTE
         )
-        self._declared.append(subscriber)
+        self._subscribers[key] = subscriber
         self._polled.append((tag, key, subscriber.try_recv))
+
+    def unsubscribe(self, key: str) -> None:
+        """End the subscription to `key`; messages of it that wait already are dropped."""
+        self._polled = [polled for polled in self._polled if polled[1] != key]
+        super().unsubscribe(key)
 
     def _receive(self, timeout_s: float) -> Arrival | None:
         if (arrival := self._look()) is not None or timeout_s <= 0.0:

@@ -116,9 +116,7 @@ def forecast(scenario: Scenario) -> Forecast:
     per_share = ceil(clock.share_period_s / STEP_S - 1e-9)
     step_s = clock.share_period_s / per_share
     steps = max(ceil(min(max(scenario.duration_s, scenario.ends_at_s), HORIZON_S) / step_s), 1) + 1
-    young = _one_step(graph, gains.p, gains.q, step_s, ageing=True)
-    old = _one_step(graph, gains.p, gains.q, step_s, ageing=False)
-    adjacency = graph.adjacency()
+    coupling = _Coupling(graph, gains.p, gains.q, step_s)
     count = len(graph.robots)
     state = np.zeros((count, 3))
     state[:, 0], state[:, 1] = gains.v_hat_0, gains.mu_0
@@ -126,30 +124,74 @@ def forecast(scenario: Scenario) -> Forecast:
     times: Matrix = np.arange(steps, dtype=np.float64) * step_s
     speeds = leader_speed(scenario)(np.round(times * 1e9))
     states = np.empty((steps, count, 3))
-    heard = np.zeros((count, 2))
+    told = state
     for n in range(steps):
         states[n] = state
-        if n % per_share == 0:
-            heard = adjacency @ state[:, [0, 2]]
-            age_s = 0.0
-        ageing = age_s < gains.age_limit_s
-        table = young if ageing else old
-        inputs = np.column_stack([state, heard, np.full(count, speeds[n])])
+        shares = n % per_share == 0
+        coupling.advance(round(times[n] / clock.control_period_s), shares=shares)
+        if shares:
+            told, age_s = state, 0.0
+        carried_on_s = min(age_s, gains.age_limit_s)
+        said = np.column_stack([told[:, 0], told[:, 2] + told[:, 0] * carried_on_s])
+        inputs = np.column_stack([state, coupling.heard @ said, np.full(count, speeds[n])])
+        table = coupling.tables(ageing=age_s < gains.age_limit_s)
         state = np.einsum("nij,nj->ni", table, inputs)
         age_s += step_s
-        if ageing:
-            heard = heard + heard[:, :1] * np.array([0.0, step_s])
     v_hat, mu, s = (states[:, :, n] for n in range(3))
     return Forecast(times, s, v_hat + mu, v_hat, speeds)
+
+
+class _Coupling:
+    """The coupling of the robots in the course of a forecast, as edges come and go."""
+
+    def __init__(self, graph: Graph, p: float, q: float, step_s: float) -> None:
+        self._phases = graph.phases()
+        self._gains = p, q, step_s
+        self._next: tuple[int, Graph] | None = next(self._phases)
+        self._tables: dict[bool, Matrix] = {}
+        self._maps: dict[tuple[float, float, bool], Matrix] = {}
+        self._there, self._h = graph.adjacency(), np.zeros(len(graph.robots))
+        self.heard: Matrix = np.zeros_like(self._there)
+        """a_ij of the edges that exist and over which something was said since they do."""
+
+    def advance(self, tick: int, *, shares: bool) -> None:
+        """Go on to a tick; at a share, all that exists is heard."""
+        before = self.heard
+        while self._next is not None and self._next[0] <= tick:
+            now = self._next[1]
+            self._there, self._h = now.adjacency(), _links(now)
+            self.heard = np.where(self._there > 0.0, self.heard, 0.0)
+            self._next = next(self._phases, None)
+            self._tables = {}
+        if shares:
+            self.heard = self._there
+        if self.heard is not before:
+            self._tables = {}
+
+    def tables(self, *, ageing: bool) -> Matrix:
+        """As `_one_step`, of what is heard."""
+        if ageing not in self._tables:
+            kinds = zip(self.heard.sum(axis=1).tolist(), self._h.tolist(), strict=True)
+            self._tables[ageing] = np.array([self._map(d, h, ageing) for d, h in kinds])
+        return self._tables[ageing]
+
+    def _map(self, degree: float, h: float, ageing: bool) -> Matrix:
+        kind = degree, h, ageing
+        if kind not in self._maps:
+            self._maps[kind] = _map(degree, h, *self._gains, ageing=ageing)
+        return self._maps[kind]
+
+
+def _links(graph: Graph) -> Matrix:
+    """h_i of all robots."""
+    return np.array([graph.links[r].weight if r in graph.links else 0.0 for r in graph.robots])
 
 
 def _one_step(graph: Graph, p: float, q: float, step_s: float, *, ageing: bool) -> Matrix:
     """(N, 3, 6): each robot's (v̂, μ, s) after a step from (v̂, μ, s, V, S, v_r)."""
     tables = {}
     rows = []
-    for robot in graph.robots:
-        link = graph.links.get(robot)
-        kind = graph.in_degree(robot), link.weight if link else 0.0
+    for kind in zip(map(graph.in_degree, graph.robots), _links(graph).tolist(), strict=True):
         if kind not in tables:
             tables[kind] = _map(*kind, p, q, step_s, ageing=ageing)
         rows.append(tables[kind])

@@ -7,6 +7,7 @@ switching between graphs whose union is rooted. Values shared now and then are h
 that makes of it is `fleetloop.check.coordination`'s.
 """
 
+from itertools import islice
 from math import inf, isfinite, isnan
 
 import numpy as np
@@ -22,6 +23,8 @@ SETTLED_PART = 0.1
 """Speed estimates have settled within this part of v_r as well, if that is less."""
 FINAL_PART = 0.25
 """The end of a short run, as a part of it: there all should have settled."""
+_MOST_INSTANTS = 1000
+"""Graphs of a switching one that (46) is looked at for."""
 _EFOLDS = 3.0
 """An error that grows for less than this many time constants stays small in a short run."""
 LARGE_FLEET = 100
@@ -46,21 +49,22 @@ def graph_findings(scenario: Scenario, ahead: Forecast) -> list[Finding]:
 
 
 def graph_conditions(graph: Graph) -> list[Finding]:
-    """The two conditions of Theorem 3.1 on the directed graph."""
+    """The two conditions of Theorem 3.1 on the directed graph, if it switches on the union."""
     roots = graph.roots()
     unreached = graph.unreached_from(graph.leader)
+    union = "the union of all times: " if graph.switches else ""
     return [
         Finding(
             "error" if unreached else "ok",
             "leader reaches every robot",
             f"not {', '.join(unreached)}"
             if unreached
-            else f"through {', '.join(graph.leader)}: L + H is nonsingular, every v̂_r → v_r",
+            else f"{union}through {', '.join(graph.leader)}: L + H is nonsingular, every v̂_r → v_r",
         ),
         Finding(
             "ok" if roots else "error",
             "robots' graph is rooted",
-            f"{', '.join(roots)} {'reaches' if len(roots) == 1 else 'reach'} all others"
+            f"{union}{', '.join(roots)} {'reaches' if len(roots) == 1 else 'reach'} all others"
             if roots
             else "no robot reaches all others: s_i − s_j would never vanish",
         ),
@@ -68,9 +72,11 @@ def graph_conditions(graph: Graph) -> list[Finding]:
 
 
 def synchronisation(graph: Graph, p: float, q: float) -> Finding:
-    """Inequality (46), both sides."""
+    """Inequality (46), both sides; of a graph that switches, of each graph that exists in turn."""
     left, right = p * p / q, _right_side(graph)
     title = "(46) p²/q > max Im(ζ)²/Re(ζ)"
+    if graph.switches:
+        title += ", at each time"
     if left > right:
         return Finding("ok", title, f"{left:g} > {right:.4g}")
     least = np.sqrt(q * right)
@@ -85,6 +91,12 @@ def delay_class(graph: Graph, p: float, q: float) -> Finding:
     title = "p²/(q d_max), largest in-degree d_max"
     if ratio >= 4:
         return Finding("ok", title, f"{ratio:g} ≥ 4: any delay, any switching with a rooted union")
+    if graph.switches:
+        text = (
+            f"{ratio:.3g} < 4: graphs that each pass (46) may diverge when they switch; raise"
+            f" coordination.p to {2.0 * np.sqrt(q * degree):.3g}"
+        )
+        return Finding("warning", title, text, key="coordination.p")
     if ratio >= 2:
         return Finding("ok", title, f"{ratio:g} ≥ 2: any delay; switching graphs needs 4")
     margin_s = delay_margin_s(graph, p, q)
@@ -101,6 +113,9 @@ def _positive(graph: Graph, p: float, q: float) -> bool:
 
 
 def _right_side(graph: Graph) -> float:
+    if graph.switches:
+        instants = {one.edges: one for _, one in islice(graph.phases(), _MOST_INSTANTS)}
+        return max(map(_right_side, instants.values()))
     eigenvalues = np.linalg.eigvals(graph.laplacian())
     largest = np.abs(eigenvalues).max()
     sides = [z.imag**2 / z.real for z in eigenvalues if z.real > 1e-9 * largest]
@@ -116,6 +131,8 @@ def _sharing(scenario: Scenario, ahead: Forecast) -> Finding:
         return Finding("ok", title, "the graph has no edges")
     if period_s <= gains.age_limit_s and _positive(graph, gains.p, gains.q):
         return Finding("ok", title, "p² ≥ 4 q d_max: averages, which converge at any period")
+    if graph.switches:
+        return Finding("ok", title, "no map from share to share: the graph switches")
     if len(graph.robots) > LARGE_FLEET:
         return Finding("ok", title, f"not looked at for more than {LARGE_FLEET} robots")
     speeds, places = radii(graph, gains.p, gains.q, period_s, gains.age_limit_s)

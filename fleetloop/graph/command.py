@@ -4,12 +4,13 @@ from pathlib import Path
 
 from rich.table import Table
 
-from configs.edges import LEADER
+from configs.edges import LEADER, edge_text, presence
 from configs.errors import InfrastructureError, ScenarioError
 from configs.graph import Graph
 from configs.graph_files import to_dot, to_graphml
 from configs.loading import load
 from configs.overrides import Overrides
+from configs.resolve import schedule
 from configs.scenario import Scenario
 from fleetloop.check.finding import Finding
 from fleetloop.check.graph import delay_class, graph_conditions, synchronisation
@@ -42,7 +43,10 @@ def show_graph(source: str, overrides: Overrides, *, out: Path | None, as_json: 
     if as_json:
         say_json(_described(graph, findings))
         return
-    ResultConsole().print_whole(_table(scenario.name, graph))
+    console = ResultConsole()
+    console.print_whole(_table(scenario.name, graph))
+    if graph.switches:
+        console.print_whole(_times(scenario))
     for finding in findings:
         say(f"{finding.title}: {finding.text}")
     if out is not None:
@@ -72,6 +76,23 @@ def _table(name: str, graph: Graph) -> Table:
     return table
 
 
+def _times(scenario: Scenario) -> Table:
+    """A row an edge that comes and goes: how much of the run it exists."""
+    ticks = schedule(scenario)
+    table = Table(title="edges that come and go", box=None, padding=(0, 1))
+    table.add_column("edge")
+    for column in ("exists", "windows", "longest absence"):
+        table.add_column(column, justify="right")
+    for edge, windows in scenario.topology.windows.items():
+        if windows is None:
+            continue
+        there, absent = presence(windows, ticks.ticks)
+        begun = sum(begin < ticks.ticks for begin, _ in windows)
+        row = f"{there:.1%}", str(begun), f"{absent * ticks.period_s:g} s"
+        table.add_row(edge_text(edge), *row)
+    return table
+
+
 def _shown(weight: float) -> str:
     return f"{weight:.4g}" if weight else "·"
 
@@ -88,6 +109,11 @@ def _described(graph: Graph, findings: list[Finding]) -> dict[str, object]:
         LEADER: {robot: link.weight for robot, link in graph.links.items()},
         "in_degrees": {robot: graph.in_degree(robot) for robot in graph.robots},
         "roots": list(graph.roots()),
+        "windows_ticks": {
+            edge_text(edge): [list(window) for window in windows]
+            for edge, windows in graph.windows.items()
+            if windows is not None
+        },
         "findings": [{"title": f.title, "level": f.level, "text": f.text} for f in findings],
     }
 

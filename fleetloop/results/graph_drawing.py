@@ -21,6 +21,9 @@ _LABELLED = 120
 _BEND_BESIDE_OPPOSITE, _BEND_AROUND_NODE = 0.18, 0.4
 """How far an arrow bows out, in parts of its length."""
 
+_SOMETIMES = "0.55"
+"""Colour of an edge that comes and goes: a grey."""
+
 Places = dict[str, tuple[float, float]]
 
 
@@ -35,8 +38,12 @@ _NO_STYLES: Mapping[Edge, EdgeStyle] = {}
 
 
 def drawn(graph: Graph, title: str, styles: Mapping[Edge, EdgeStyle] = _NO_STYLES) -> Figure:
-    """The graph as a figure; edges without a style are black, with their weight if it isn't 1."""
+    """The graph as a figure.
+
+    Edges without a style are black, or grey if they come and go, with their weight if it isn't 1.
+    """
     digraph = graph.digraph()
+    sometimes = {edge for edge, windows in graph.windows.items() if windows is not None}
     if not graph.links:
         digraph.remove_node(LEADER)
     places = _places(digraph, graph)
@@ -51,7 +58,7 @@ def drawn(graph: Graph, title: str, styles: Mapping[Edge, EdgeStyle] = _NO_STYLE
         layout="constrained",
     )
     axes = figure.add_subplot()
-    axes.set_title(title, fontsize=10)
+    axes.set_title(f"{title}; grey: not always" if sometimes and not styles else title, fontsize=10)
     axes.set_axis_off()
     axes.set_aspect("equal")  # so that weights lie on their bowed arrows
     for kind in ("robots", "leader"):
@@ -69,7 +76,8 @@ def drawn(graph: Graph, title: str, styles: Mapping[Edge, EdgeStyle] = _NO_STYLE
     nx.draw_networkx_labels(digraph, places, ax=axes, font_size=8)
     for edge in digraph.edges:
         weight = digraph.edges[edge]["weight"]
-        plain = EdgeStyle("black", "" if weight == 1.0 else f"{weight:.3g}")
+        colour = _SOMETIMES if edge in sometimes else "black"
+        plain = EdgeStyle(colour, "" if weight == 1.0 else f"{weight:.3g}")
         colour, label = styles.get(edge, plain)
         style = EdgeStyle(colour, label if digraph.size() <= _LABELLED else "")
         _arrow(axes, digraph, edge, places, style)

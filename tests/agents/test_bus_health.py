@@ -13,6 +13,7 @@ from support.robot_bench import ZERO, Bench, set_points
 from agents.bus_health import TOLERATED_NS, BusHealth
 from agents.guard import Phase
 from agents.realtime import RealtimeLoop
+from agents.subscriptions import Subscriptions
 from bridge.can_bus.pythoncan import to_frame, to_message
 from bridge.frame import ERR, Frame
 from bridge.network.barrier import Hellos
@@ -143,6 +144,7 @@ class Rig:
             self.bench.agent,
             self.wire,
             self.link,
+            Subscriptions(self.link, self.bench.agent.brief),
             nowhere,
             Hellos(0.02, clock=self.clock),
             nowhere,

@@ -28,7 +28,14 @@ class Ending:
         bus = SimpleNamespace(send=self._send, recv=lambda _: None)
         publisher = SimpleNamespace(put=lambda _: self.said.append("report"))
         self.connections = _Connections(
-            self.bench.agent, bus, None, publisher, Hellos(0.02), self.bench.agent._rows, publisher
+            agent=self.bench.agent,
+            bus=bus,
+            link=None,
+            subscriptions=None,
+            path=publisher,
+            hellos=Hellos(0.02),
+            rows=self.bench.agent._rows,
+            report=publisher,
         )
         self.stop = Stop()
         self.stop.release()

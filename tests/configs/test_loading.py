@@ -130,6 +130,86 @@ def test_the_schema_in_the_package_is_the_schema_of_the_types() -> None:
             "graph.weights",
             "entries of adjacency are the weights",
         ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{}]}",
+            "graph.switch.0",
+            "give one of edges, generator, rotate, random",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{edges=[], generator='ring'}]}",
+            "graph.switch.0",
+            "give one of",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{rotate=[['r1 -> r2']]}]}",
+            "graph.switch.0.dwell_s",
+            "must be given with rotate",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{edges=[], dwell_s=1.0}]}",
+            "graph.switch.0.dwell_s",
+            "goes with rotate or random",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{random=true, dwell_s=1.0}]}",
+            "graph.switch.0.random",
+            "give probability or pool",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{edges=[], probability=0.5}]}",
+            "graph.switch.0.probability",
+            "goes with random = true",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{edges=['r1 -> r9']}]}",
+            "graph.switch.0.edges",
+            "known: r1, r2",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{rotate=[['r1'], []], dwell_s=1.0}]}",
+            "graph.switch.0.rotate.0",
+            "must read",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{edges=['r2 -> leader']}]}",
+            "graph.switch.0.edges",
+            "leader: no such robot",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{edges=['leader -> r1'], leader=['r1']}]}",
+            "graph.switch.0.leader",
+            "give it those or leader",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{edges=[], leader=['r7']}]}",
+            "graph.switch.0.leader",
+            "known: r1, r2",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{at_s=0.0015, edges=[]}]}",
+            "graph.switch.0.at_s",
+            "whole multiple",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{rotate=[[]], dwell_s=0.0005}]}",
+            "graph.switch.0.dwell_s",
+            "whole multiple",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{at_s=30.0, edges=[]}]}",
+            "graph.switch.0.at_s",
+            "below duration_s = 30",
+        ),
+        (
+            "graph={edges=['r1 -> r2'], switch=[{at_s=2.0, edges=[]}, {at_s=2.0, edges=[]}]}",
+            "graph.switch",
+            "at_s must increase",
+        ),
+        (
+            "graph={edges=[], leader=['r1', 'r2'], switch=[{at_s=1.0, edges=[], leader=['r1']}]}",
+            "graph.edges",
+            "whatever exists of it when",
+        ),
         ("robot.r2.name='leader'", "robot.name", "virtual leader"),
         ("robot.r2.name='r1'", "robot.name", "two robots have this name"),
         ("robot.r2.type='tank'", "robot.r2.type", "known: etsro"),
@@ -330,3 +410,10 @@ def test_a_robot_may_differ_from_its_type_and_from_the_fleet() -> None:
     assert scenario.body_of(second).wheel_mass_kg == 0.28
     assert scenario.control_of(second).parameters.k4 == 1.5
     assert scenario.control_of(second).parameters.k1 == scenario.control.parameters.k1
+
+
+def test_graphs_that_switch_too_often_to_be_carried_out_are_refused() -> None:
+    random = "graph={edges=['r1 -> r2'], switch=[{random=true, probability=0.5, dwell_s=0.002}]}"
+    assert load("two_robots", [random]).topology.switches
+    with pytest.raises(ScenarioError, match=r"windows of edges in 3600 s; at most 100000"):
+        load("two_robots", [random, "duration_s=3600.0"])

@@ -6,9 +6,8 @@ import pytest
 
 from configs.loading import load
 from configs.reach import MOST_AMPLIFIED, Reach, reach_of, within_world
-from configs.resolve import reach
 
-PAPER = reach(load("paper"))
+PAPER = load("paper").reach
 
 
 def test_the_bounds_of_the_paper_s_scenario_are_the_documented_ones() -> None:

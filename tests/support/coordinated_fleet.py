@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from agents.coordination import CoordinationState, Coordinator
+from agents.in_edges import InEdges
 from agents.neighbours import Neighbours
 from bridge.netem.channel import Channel
 from configs.graph import Graph
@@ -45,7 +46,7 @@ def coordinated_fleet(
     robots = graph.robots
     receivers = {r: Neighbours(graph.hears[r], coordination, h_s) for r in robots}
     coordinators = {r: Coordinator(coordination, h_s) for r in robots}
-    links = {r: graph.links[r].weight if r in graph.leader else 0.0 for r in robots}
+    edges = {r: InEdges(graph.hears[r], graph.links.get(r), receivers[r]) for r in robots}
     channels: Mapping[tuple[str, str], Channel[CoordinationState]] = {
         (a, b): Channel(effects, f"{seed} {a} -> {b}", 2_000_000_000) for a, b in graph.edges
     }
@@ -58,13 +59,15 @@ def coordinated_fleet(
     history[0] = [states[r] for r in robots]
     for tick in range(ticks):
         now_ns = round(tick * h_s * 1e9)
+        for r in robots:
+            edges[r].follow(tick)
         for (speaker, hearer), channel in channels.items():
-            if tick % share_every == 0:
+            if tick % share_every == 0 and edges[hearer].exists(speaker, tick):
                 channel.send(now_ns, states[speaker])
             for sent_ns, said in channel.receive(now_ns):
                 receivers[hearer].receive(speaker, sent_ns, said.s, said.v_hat)
         sums = {r: receivers[r].sums(now_ns, states[r].s) for r in robots}
         speed = speed_at(profile, now_ns)
-        states = {r: coordinators[r].advance(states[r], sums[r], links[r], speed) for r in robots}
+        states = {r: coordinators[r].advance(states[r], sums[r], edges[r].h, speed) for r in robots}
         history[tick + 1] = [states[r] for r in robots]
     return history

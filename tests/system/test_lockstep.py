@@ -3,10 +3,12 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.processes import completed, running
 
 from fleetloop.results.diff import print_comparison
+from fleetloop.results.run_folder import read_record
 
 pytestmark = pytest.mark.system
 
@@ -56,6 +58,24 @@ def test_processes_and_one_process_leave_the_same_record_bit_for_bit(
     recorded = ["record.mcap", *(f"can/{bus}.{kind}" for bus in ("r1", "r2") for kind in KINDS)]
     for name in recorded:
         assert (a / name).read_bytes() == (b / name).read_bytes() == (c / name).read_bytes(), name
+
+
+SWITCHING = """graph={edges=["r1 -> r2", "r2 -> r1"], leader=["r2"], switch=[
+  {random=true, probability=0.5, dwell_s=0.03, seed=5},
+  {at_s=0.3, rotate=[["r1 -> r2", "leader -> r1"], ["r2 -> r1", "leader -> r2"]], dwell_s=0.07},
+  {at_s=0.6, edges=["r2 -> r1"]}]}"""
+
+
+def test_edges_come_and_go_at_the_same_ticks_over_processes(tmp_path: Path) -> None:
+    args = ("two_robots", "--duration", "0.8", "--allow-unchecked", "--set", SWITCHING)
+    assert completed(tmp_path / "a", *args)[0] == 0
+    assert completed(tmp_path / "b", *args, "--in-process")[0] == 0
+    records = [(tmp_path / name / "record.mcap").read_bytes() for name in "ab"]
+    assert records[0] == records[1]
+    rows = read_record(tmp_path / "a", partial=False).controller["r2"]
+    assert set(rows["neighbours"]) == {0.0, 1.0}
+    assert np.isnan(rows["age_of_r1_s"][rows["neighbours"] == 0.0]).all()
+    assert not np.isnan(rows["age_of_r1_s"][rows["neighbours"] == 1.0]).any()
 
 
 def test_a_robot_that_diverges_is_named_and_the_other_goes_on_in_either_mode(

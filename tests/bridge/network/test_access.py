@@ -2,17 +2,18 @@
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
 
 from bridge.network import access, keys
-from bridge.network.client import open_client
+from bridge.network.client import open_client, open_polled
 from bridge.network.router import RouterLink, open_router
-from bridge.network.zenoh_link import ZenohLink
+from bridge.network.zenoh_link import PolledLink, ZenohLink
 from configs.connections import NetworkLink
 from configs.errors import InfrastructureError
+from configs.loading import load
 from configs.roles import AGENT, LAUNCHER, LOCALISATION, PLANT
 
 ROBOTS = ("r1", "r2", "r3", "r4")
@@ -33,6 +34,11 @@ def router(plan: access.AccessPlan, tmp_path: Path) -> Iterator[RouterLink]:
 
 def client(router: RouterLink, plan: access.AccessPlan, user: str) -> ZenohLink:
     return open_client(NetworkLink(RUN, router.endpoint, user, plan.passwords[user]), 5.0)
+
+
+def polled(router: RouterLink, plan: access.AccessPlan, user: str) -> PolledLink:
+    login = NetworkLink(RUN, router.endpoint, user, plan.passwords[user])
+    return open_polled(login, 5.0, depth=64)
 
 
 def test_rights_of_a_robot_are_its_graph(plan: access.AccessPlan) -> None:
@@ -75,10 +81,13 @@ def heard_by(link: ZenohLink, seconds: float) -> set[tuple[str, bytes]]:
     return found
 
 
-@pytest.mark.system
-def test_a_robot_hears_exactly_its_in_neighbours_on_every_pair(
-    router: RouterLink, plan: access.AccessPlan
+def assert_heard(
+    router: RouterLink,
+    plan: access.AccessPlan,
+    hears: Mapping[str, Sequence[str]],
+    leader: Sequence[str],
 ) -> None:
+    """Every pair of robots, and the leader to each: what is granted carries, nothing else does."""
     links = {robot: client(router, plan, AGENT.identity(robot)) for robot in ROBOTS}
     try:
         for link in links.values():
@@ -86,10 +95,10 @@ def test_a_robot_hears_exactly_its_in_neighbours_on_every_pair(
                 link.subscribe(keys.path(RUN, other), other)
             link.subscribe(keys.leader_speed(RUN), "leader")
         mouths = {robot: link.publisher(keys.path(RUN, robot)) for robot, link in links.items()}
-        leader = router.publisher(keys.leader_speed(RUN))
+        voice = router.publisher(keys.leader_speed(RUN))
         expected = {
-            robot: {(other, b"from " + other.encode()) for other in HEARS[robot]}
-            | ({("leader", b"v_r")} if robot == "r1" else set())
+            robot: {(other, b"from " + other.encode()) for other in hears[robot]}
+            | ({("leader", b"v_r")} if robot in leader else set())
             for robot in ROBOTS
         }
         found: dict[str, set[tuple[str, bytes]]] = {robot: set() for robot in ROBOTS}
@@ -99,7 +108,7 @@ def test_a_robot_hears_exactly_its_in_neighbours_on_every_pair(
         while found != expected and time.monotonic() < deadline:
             for robot, mouth in mouths.items():
                 mouth.put(b"from " + robot.encode())
-            leader.put(b"v_r")
+            voice.put(b"v_r")
             for robot, link in links.items():
                 found[robot] |= heard_by(link, 0.05)
             assert all(found[robot] <= expected[robot] for robot in ROBOTS)
@@ -107,6 +116,55 @@ def test_a_robot_hears_exactly_its_in_neighbours_on_every_pair(
     finally:
         for link in links.values():
             link.close()
+
+
+@pytest.mark.system
+def test_a_robot_hears_exactly_its_in_neighbours_on_every_pair(
+    router: RouterLink, plan: access.AccessPlan
+) -> None:
+    assert_heard(router, plan, HEARS, ("r1",))
+
+
+@pytest.mark.system
+def test_a_subscription_that_ends_is_undeclared_and_may_be_declared_again(
+    router: RouterLink, plan: access.AccessPlan
+) -> None:
+    key = keys.path(RUN, "r1")
+    with client(router, plan, "agent-r1") as speaker, polled(router, plan, "agent-r2") as hearer:
+        mouth = speaker.publisher(key)
+
+        def is_heard(wanted: bool) -> bool:
+            """Whether the router comes to say that there is a subscriber, or none."""
+            deadline = time.monotonic() + 10.0
+            while mouth.matching_status.matching is not wanted and time.monotonic() < deadline:
+                hearer.receive(0.01)
+            return bool(mouth.matching_status.matching)
+
+        for word in (b"first", b"again"):
+            hearer.subscribe(key, "path/r1")
+            assert is_heard(True)
+            mouth.put(word)
+            mouth.put(word)
+            arrival = hearer.receive(10.0)
+            assert arrival is not None
+            assert (arrival.tag, arrival.payload) == ("path/r1", word)
+            hearer.unsubscribe(key)
+            assert not is_heard(False)
+            assert hearer.receive(0.0) is None  # what waited is dropped
+
+
+@pytest.mark.system
+def test_a_switching_graph_is_granted_the_union_of_its_edges_and_nothing_beyond(
+    tmp_path: Path,
+) -> None:
+    switch = "{at_s=1.0, rotate=[['r1 -> r2'], ['r3 -> r2', 'leader -> r3']], dwell_s=0.5}"
+    changes = f"graph={{edges=['r1 -> r2', 'r2 -> r3', 'r3 -> r4'], switch=[{switch}]}}"
+    graph = load("paper", [changes, "expect=[]"]).topology
+    assert graph.in_neighbours == {"r1": (), "r2": ("r1", "r3"), "r3": ("r2",), "r4": ("r3",)}
+    assert graph.leader == ("r1", "r3")
+    plan = access.plan(RUN, ROBOTS, graph.in_neighbours, graph.leader)
+    with open_router(None, plan, tmp_path) as router:
+        assert_heard(router, plan, graph.in_neighbours, graph.leader)
 
 
 @pytest.mark.system

@@ -35,8 +35,18 @@ def driven(scenario: Scenario, ticks: int) -> np.ndarray:
 WEIGHTS = "graph.weights={'r1 -> r2'=0.5, 'r4 -> r2'=0.2, 'leader -> r1'=3.0}"
 
 
+SWITCH = (
+    "graph.switch=[{random=true, probability=0.5, dwell_s=0.3}, {at_s=6.0, rotate=[['r1 -> r2',"
+    " 'leader -> r3'], ['r3 -> r4', 'r2 -> r4', 'leader -> r1'], ['r2 -> r3']], dwell_s=0.7}]"
+)
+
+
 @pytest.mark.parametrize(
-    ("share_s", "changes"), [(0.02, ()), (0.5, ()), (3.0, ()), (0.5, (WEIGHTS,))]
+    ("share_s", "changes"),
+    [
+        *((0.02, ()), (0.5, ()), (3.0, ()), (0.5, (WEIGHTS,))),
+        *((0.02, (SWITCH,)), (0.5, (SWITCH, WEIGHTS))),
+    ],
 )
 def test_the_forecast_is_what_the_controllers_will_do(
     share_s: float, changes: tuple[str, ...]

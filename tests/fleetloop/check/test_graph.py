@@ -7,7 +7,12 @@ from configs.graph import Graph, generated
 from configs.loading import load
 from fleetloop.check.coordination import forecast
 from fleetloop.check.finding import Finding
-from fleetloop.check.graph import delay_class, graph_findings, synchronisation
+from fleetloop.check.graph import (
+    delay_class,
+    graph_conditions,
+    graph_findings,
+    synchronisation,
+)
 
 
 def complete(n: int) -> Graph:
@@ -49,6 +54,27 @@ def test_in_degree_decides_how_much_delay_is_stood() -> None:
     assert "any switching" in delay_class(circulant(4, 1), p=2.0, q=1.0).text
     assert "any delay" in delay_class(circulant(4, 2), p=2.0, q=1.0).text
     assert "< 2" in delay_class(circulant(5, 3), p=2.0, q=1.0).text
+
+
+def test_46_says_nothing_of_switching_and_the_check_says_so() -> None:
+    scenario = load("rotating_counterexample")
+    gains = scenario.coordination
+    each_time = synchronisation(scenario.topology, gains.p, gains.q)
+    assert (each_time.level, each_time.text) == ("ok", "0.25 > 0")
+    assert "at each time" in each_time.title
+    switching = delay_class(scenario.topology, gains.p, gains.q)
+    assert (switching.level, switching.key) == ("warning", "coordination.p")
+    assert switching.text.endswith("raise coordination.p to 2")
+    assert delay_class(scenario.topology, 2.0, gains.q).level == "ok"
+    union = [finding.text for finding in graph_conditions(scenario.topology)]
+    assert all("the union of all times" in text for text in union)
+
+
+def test_46_is_looked_at_for_each_graph_that_exists_in_turn() -> None:
+    ring = "edges=['r1 -> r2','r2 -> r3','r3 -> r4'], switch=[{at_s=1.0, generator='ring'}]"
+    graph = load("paper", [f"graph={{{ring}}}", "expect=[]"]).topology
+    assert synchronisation(graph, 0.9, 1.0).level == "error"  # the ring of four needs 1
+    assert synchronisation(graph.at(0), 0.9, 1.0).level == "ok"
 
 
 def text_of(title: str, *overrides: str) -> Finding:

@@ -42,6 +42,15 @@ def test_json_has_the_matrix_and_the_findings(capsys) -> None:
     assert {finding["level"] for finding in said["findings"]} == {"ok"}
 
 
+def test_edges_that_come_and_go_are_listed_with_how_long_they_exist(capsys) -> None:
+    show_graph("switching", (), out=None, as_json=False)
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert ["r2", "->", "r3", "33.3%", "80", "1", "s"] in lines
+    show_graph("switching", (), out=None, as_json=True)
+    windows = json.loads(capsys.readouterr().out)["windows_ticks"]
+    assert windows["r2 -> r3"][:2] == [[50, 100], [200, 250]]
+
+
 @pytest.mark.parametrize("ending", ["graphml", "dot"])
 def test_a_written_graph_is_read_back(ending: str, tmp_path: Path) -> None:
     file = tmp_path / f"g.{ending}"
