@@ -16,9 +16,11 @@ from agents.realtime import RealtimeLoop
 from agents.subscriptions import Subscriptions
 from bridge.can_bus.pythoncan import to_frame, to_message
 from bridge.frame import ERR, Frame
+from bridge.network import keys
 from bridge.network.barrier import Hellos
 from bridge.network.messages import PoseFix
 from bridge.process.lifecycle import Stop
+from configs.edges import InEdge
 from configs.errors import InfrastructureError, PeerLostError
 
 S = 1_000_000_000
@@ -116,10 +118,20 @@ class PoseLink:
 
     def __init__(self, bench: Bench, clock: ManualClock, epoch_ns: int) -> None:
         self.bench, self.clock, self.epoch_ns = bench, clock, epoch_ns
+        self.declared: list[tuple[int, str, str]] = []  # tick, what was done, key
+
+    @property
+    def tick(self) -> int:
+        return (self.clock.now_ns - self.epoch_ns) // self.bench.schedule.period_ns
+
+    def subscribe(self, key: str, _tag: str) -> None:
+        self.declared.append((self.tick, "declare", key))
+
+    def unsubscribe(self, key: str) -> None:
+        self.declared.append((self.tick, "undeclare", key))
 
     def receive(self, _timeout_s: float) -> None:
-        period_ns = self.bench.schedule.period_ns
-        tick = (self.clock.now_ns - self.epoch_ns) // period_ns
+        period_ns, tick = self.bench.schedule.period_ns, self.tick
         if self.bench.schedule.localises(tick) and self.bench.pose is not None:
             self.bench.agent.receive_pose(PoseFix(tick, tick * period_ns, *self.bench.pose))
 
@@ -271,3 +283,14 @@ def test_drives_that_say_more_often_where_they_are_are_no_second_drive() -> None
     rig.run()
     assert rig.events == []
     assert rig.bench.agent.brief.drives.encoder_period_ns == 1_000_000
+
+
+def test_in_real_time_a_subscription_is_undeclared_when_its_edge_goes_and_declared_again() -> None:
+    gaps = ((0, 100), (200, 300))
+    rig = Rig("clock.mode='realtime'", duration_s=1.0, hears=(InEdge("r2", 1.0, gaps),))
+    rig.run()
+    before, *later = rig.link.declared
+    key = keys.path("test", "r2")
+    assert before[0] < 0
+    assert before[1:] == ("declare", key)
+    assert later == [(100, "undeclare", key), (200, "declare", key), (300, "undeclare", key)]

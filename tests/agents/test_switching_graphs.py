@@ -6,34 +6,38 @@ import numpy as np
 import pytest
 from support.coordinated_fleet import coordinated_fleet
 
+from configs.graph import Graph
 from configs.loading import load
+from configs.netem import BernoulliLoss, ConstantDelay, Effects
+from configs.scenario import Scenario
 
-SHARE_S = 0.05
+SHARE_S, TICK_S = 0.05, 0.025
 ROTATION = "[['r1 -> r2'], ['r2 -> r3'], ['r3 -> r4']]"
 
 
 def spread(switch: str, duration_s: float, *changes: str, **effects) -> np.ndarray:
-    """Of the path variables, at every share; from equal starts at rest."""
+    """Of the path variables, at every tick; from equal starts at rest."""
     scenario = load(
         "switching", [f"duration_s={duration_s}", f"graph.switch=[{switch}]", "expect=[]", *changes]
     )
     history = coordinated_fleet(
-        load_at_shares(scenario),
+        topology_by(scenario, TICK_S),
         scenario.coordination,
-        round(duration_s / SHARE_S),
-        h_s=SHARE_S,
+        round(duration_s / TICK_S),
+        h_s=TICK_S,
+        share_every=round(SHARE_S / TICK_S),
         **effects,
     )
     return np.ptp(history[:, :, 2], axis=1)
 
 
-def load_at_shares(scenario):
-    """The topology with a tick for every share: all else only costs time."""
+def topology_by(scenario: Scenario, tick_s: float) -> Graph:
+    """The topology with its windows in longer ticks: nothing else needs short ones."""
     clock = scenario.clock
     fast = type(clock)(
-        control_period_s=SHARE_S,
+        control_period_s=tick_s,
         share_period_s=SHARE_S,
-        localisation_period_s=SHARE_S,
+        localisation_period_s=tick_s,
         countdown_s=clock.countdown_s,
     )
     return scenario.model_copy(update={"clock": fast}).topology
@@ -43,6 +47,16 @@ def load_at_shares(scenario):
 def test_one_edge_alive_at_a_time_converges_where_p2_is_4_q_d_max(dwell_s: float) -> None:
     apart = spread(f"{{rotate={ROTATION}, dwell_s={dwell_s}}}", 120.0)
     assert apart.max() > 1.0
+    assert apart[-1] < 1e-4
+
+
+@pytest.mark.parametrize("dwell_s", [0.5, 5.0])
+def test_delay_and_loss_do_not_keep_it_from_converging(dwell_s: float) -> None:
+    late = Effects(
+        delay=ConstantDelay(kind="constant", delay_s=0.2),
+        loss=BernoulliLoss(kind="bernoulli", probability=0.3),
+    )
+    apart = spread(f"{{rotate={ROTATION}, dwell_s={dwell_s}}}", 200.0, effects=late)
     assert apart[-1] < 1e-4
 
 

@@ -44,7 +44,7 @@ class Bench:
         self.agent.receive_pose(PoseFix(-1, 0, 1.95, 0.05, 1.57))
         self.agent.receive_path_state(
             "r1", PathState(-1, -brief.schedule.period_ns, 0.0, 0.6)
-        ) if brief.hears else None
+        ) if any(edge.speaker == "r1" for edge in brief.hears) else None
 
     def _keep(self, _first: int, _count: int, rows: bytes, _final: bool) -> None:
         self.rows += self._row.iter_unpack(rows)
