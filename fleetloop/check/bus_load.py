@@ -6,6 +6,7 @@ are taken together.
 """
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from statistics import fmean
 
 from bridge.drives import protocol
@@ -15,6 +16,8 @@ from bridge.wire.response_time import Analysis, Message, analyse
 from configs.brief import RobotBrief
 from configs.scenario import Scenario
 from fleetloop.check.finding import Finding
+
+_BASIS = "frame lengths, worst-case response times"
 
 
 def bus_findings(scenario: Scenario, robots: Sequence[RobotBrief]) -> list[Finding]:
@@ -66,21 +69,26 @@ def _finding(scenario: Scenario, robots: tuple[str, ...], analysis: Analysis) ->
         timing = f"0x{slowest.can_id:X} takes up to {slowest.response_ns * 1e-6:.3g} ms"
         timing += f" of its {period_ms:g} ms"
     text = (
-        f"{count} messages, load {analysis.mean_load:.1%} mean, {analysis.worst_load:.1%} worst"
-        f" (ceiling {ceiling:.0%}); {timing}"
+        f"{count} messages, load {analysis.mean_load:.1%} mean, {analysis.worst_load:.1%} worst;"
+        f" {timing}"
     )
+    limit = f"≤ ceiling {ceiling:.0%}, in time"
+    fine = Finding("ok", title, text, robots, limit=limit, basis=_BASIS)
     if analysis.worst_load <= ceiling and analysis.schedulable:
-        return Finding("ok", title, text, robots)
+        return fine
     if late:
         text += f"; {late} of {count} can come too late"
     if scenario.bus.timing == "ideal":
-        return Finding("warning", title, f"{text}: no real bus can, the ideal one does", robots)
+        text += ": no real bus can, the ideal one does"
+        return replace(fine, level="warning", value=text)
+    key = "bus.bitrate_bit_s"
     if analysis.mean_load < 1.0:
         if late:
             usually = all(message.usually_schedulable for message in analysis.messages)
             text += ", but only when all are due at once" + (" and longest" if usually else "")
+        remedy = ""
         if analysis.worst_load > ceiling:
-            text += ": lower the rates, put fewer robots on a bus, or raise bus.load_ceiling"
-        return Finding("warning", title, text, robots, "bus.bitrate_bit_s")
-    text += ": lower the rates, or put fewer robots on a bus"
-    return Finding("error", title, text, robots, "bus.bitrate_bit_s")
+            remedy = "lower the rates, put fewer robots on a bus, or raise bus.load_ceiling"
+        return replace(fine, level="warning", value=text, key=key, remedy=remedy)
+    remedy = "lower the rates, or put fewer robots on a bus"
+    return replace(fine, level="error", value=text, key=key, remedy=remedy)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from rich.markup import escape
 from rich.table import Table
 
 from configs.deployment import Deployment, load_deployment
@@ -14,7 +15,7 @@ from configs.overrides import Overrides
 from configs.roles import AGENT
 from configs.scenario import Scenario
 from fleetloop.check.examine import examine
-from fleetloop.check.finding import Finding, named, worst
+from fleetloop.check.finding import Finding, named, resting_on, robots_of, worst
 from fleetloop.check.rehearsal import rehearse
 from fleetloop.terminal import ResultConsole, say, say_json
 
@@ -29,7 +30,7 @@ _MARKS = {"ok": "[green]ok[/]", "warning": "[yellow]warning[/]", "error": "[red]
 def check_scenario(
     source: str, overrides: Overrides, *, deployment: Path | None = None, as_json: bool
 ) -> int:
-    """Check a scenario, print the findings; exit status 1 if one of them is an error.
+    """Check a scenario, print the findings; exit status 1 if a necessary condition fails.
 
     With `as_json`, errors in the file itself are JSON as well; the exit status is then 2.
 
@@ -47,7 +48,12 @@ def check_scenario(
     if as_json:
         _say_json(findings=found)
         return ExitStatus.FAILED if unsound else ExitStatus.OK
-    ResultConsole().print(_table(scenario, found))
+    console = ResultConsole()
+    table = _table(scenario, found)
+    if console.is_terminal:
+        console.print(table)
+    else:  # a line for each
+        console.print_whole(table)
     say(_VERDICTS[worst(found)])
     return ExitStatus.FAILED if unsound else ExitStatus.OK
 
@@ -56,30 +62,39 @@ def _table(scenario: Scenario, findings: Sequence[Finding]) -> Table:
     """A row for each finding; those that are ok share the row of the first robot."""
     graph = scenario.topology
     table = Table(
+        "",
+        "what",
+        "robots",
+        "value",
+        "limit",
+        "rests on",
+        "to change",
         title=f"{scenario.name}: robots {len(graph.robots)}, edges {len(graph.edges)}",
-        show_header=False,
+        header_style="dim",
         box=None,
         padding=(0, 1),
     )
     by_title: dict[str, list[Finding]] = {}
     for finding in findings:
         by_title.setdefault(finding.title, []).append(finding)
-    for title, group in by_title.items():
-        shown = [finding for finding in group if finding.level != "ok"]
+    for group in by_title.values():
         well = [finding for finding in group if finding.level == "ok"]
         if well:
-            first = named(well[0].robots, graph.robots)
-            others = [robot for finding in well[1:] for robot in finding.robots]
-            text = (
-                f"{well[0].text}; likewise {named(others, graph.robots)}"
-                if others
-                else well[0].text
-            )
-            table.add_row(_MARKS["ok"], title, first, text)
-        for finding in shown:
-            robots = named(finding.robots, graph.robots)
-            table.add_row(_MARKS[finding.level], title, robots, finding.text)
+            others = robots_of(well[1:])
+            table.add_row(*_cells(well[0], graph.robots, likewise=named(others, graph.robots)))
+        for finding in group:
+            if finding.level != "ok":
+                table.add_row(*_cells(finding, graph.robots))
     return table
+
+
+def _cells(finding: Finding, everybody: Sequence[str], likewise: str = "") -> tuple[str, ...]:
+    robots = named(finding.robots, everybody) + (f", likewise {likewise}" if likewise else "")
+    key = "" if finding.key in finding.remedy else finding.key
+    change = ": ".join(part for part in (key, finding.remedy) if part)
+    what, value, limit = finding.title, finding.value, finding.limit
+    cells = what, robots, value, limit, finding.basis, change
+    return _MARKS[finding.level], *map(escape, cells)
 
 
 def _find(
@@ -88,9 +103,10 @@ def _find(
     scenario = load(source, overrides)
     found = examine(source, scenario, overrides)
     if worst(found) != "error":
-        found += rehearse(scenario)
+        found += resting_on("the run itself", rehearse(scenario))
     if deployment is not None:
-        found += place_findings(scenario, load_deployment(deployment, scenario))
+        placed = place_findings(scenario, load_deployment(deployment, scenario))
+        found += resting_on("the deployment", placed)
     return scenario, found
 
 

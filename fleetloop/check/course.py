@@ -47,6 +47,7 @@ class Course:
     omega: Series  # [rad/s]
     v_bar: Series  # (10), [m per unit of s]
     omega_bar: Series  # (11), [rad per unit of s]
+    place_m: Series  # of the reference, columns x, y
 
 
 def courses(scenario: Scenario, ahead: Forecast) -> list[Course]:
@@ -60,7 +61,9 @@ def courses(scenario: Scenario, ahead: Forecast) -> list[Course]:
         omega_bar = np.array([reference.omega_bar for reference in references])
         s_dot = ahead.s_dot[::every, n]
         t_s = ahead.t_s[::every]
-        found.append(Course(robot, t_s, v_bar * s_dot, omega_bar * s_dot, v_bar, omega_bar))
+        place_m = np.array([(reference.x, reference.y) for reference in references])
+        v, omega = v_bar * s_dot, omega_bar * s_dot
+        found.append(Course(robot, t_s, v, omega, v_bar, omega_bar, place_m))
     return found
 
 

@@ -25,6 +25,7 @@ STEP_M = 1e-4
 PLACES = 60
 PART = 0.01
 """A derivative that differs by more than this part of its largest value is wrong."""
+_BASIS = "differences of the values"
 _COORDINATES = {Kind.PATH: ("x", "y"), Kind.OFFSET: ("ahead", "left")}
 
 
@@ -60,16 +61,17 @@ def _finding(
     try:
         wrong = wrong_derivative(own_curve(shape), first, last, orders)
     except ShapeError as error:  # at a place that the run may not come to
-        return Finding("warning", title, str(error), robots, key)
+        return Finding("warning", title, str(error), robots, key, basis=_BASIS)
     if wrong is None:
-        return Finding("ok", title, f"fit its values from s = {first:.3g} to {last:.3g} m", robots)
+        text = f"fit its values from s = {first:.3g} to {last:.3g} m"
+        return Finding("ok", title, text, robots, basis=_BASIS)
     name = _COORDINATES[kind][wrong.coordinate]
     primes, before = "'" * wrong.order, "'" * (wrong.order - 1)
     text = (
         f"{name}{primes} at s = {wrong.s:.4g} m: jet returns {wrong.claimed:.4g}, but differences"
         f" of its {name}{before} give {wrong.found:.4g}"
     )
-    return Finding("error", title, text, robots, key)
+    return Finding("error", title, text, robots, key, basis=_BASIS)
 
 
 def wrong_derivative(

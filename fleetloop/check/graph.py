@@ -7,15 +7,16 @@ switching between graphs whose union is rooted. Values shared now and then are h
 that makes of it is `fleetloop.check.coordination`'s.
 """
 
+from dataclasses import replace
 from itertools import islice
-from math import inf, isfinite, isnan
+from math import inf
 
 import numpy as np
 
 from configs.graph import Graph
 from configs.scenario import Scenario
 from fleetloop.check.coordination import Forecast, Matrix, delay_margin_s, radii
-from fleetloop.check.finding import Finding, Level
+from fleetloop.check.finding import Finding, Level, resting_on
 from fleetloop.check.law import lateral_gain_1_m, reverses
 from fleetloop.settling import FINAL_S, LOST_M, SETTLE_BAND
 
@@ -27,6 +28,10 @@ _MOST_INSTANTS = 1000
 """Graphs of a switching one that (46) is looked at for."""
 _EFOLDS = 3.0
 """An error that grows for less than this many time constants stays small in a short run."""
+_POSITIVE, _SMALL_GAIN = 4.0, 2.0
+"""p²/(q d_max) from which (45) averages, and from which no delay is too long."""
+_AMPLE_S = 1.0
+"""A margin of delay that is worth no warning of its own."""
 LARGE_FLEET = 100
 """The map from share to share isn't computed for more robots."""
 BACKWARDS_M = 0.05
@@ -38,13 +43,15 @@ def graph_findings(scenario: Scenario, ahead: Forecast) -> list[Finding]:
     graph, gains = scenario.topology, scenario.coordination
     return [
         *graph_conditions(graph),
+        *_switching(scenario),
         synchronisation(graph, gains.p, gains.q),
-        delay_class(graph, gains.p, gains.q),
-        _sharing(scenario, ahead),
-        *_leader(scenario),
-        _agreement(scenario, ahead),
-        _speed_estimates(scenario, ahead),
-        *_backwards(scenario, ahead),
+        gain_class(graph, gains.p, gains.q),
+        *resting_on("(38), (40), (45) as shared", [_sharing(scenario, ahead)]),
+        *resting_on("(18)", [*_leader(scenario), *_backwards(scenario, ahead)]),
+        *resting_on(
+            "(38), (40), (45) of this run",
+            [_agreement(scenario, ahead), _speed_estimates(scenario, ahead)],
+        ),
     ]
 
 
@@ -60,6 +67,9 @@ def graph_conditions(graph: Graph) -> list[Finding]:
             f"not {', '.join(unreached)}"
             if unreached
             else f"{union}through {', '.join(graph.leader)}: L + H is nonsingular, every v̂_r → v_r",
+            key="graph.leader" if unreached else "",
+            remedy="add leader links or edges to them" if unreached else "",
+            basis="Theorem 3.1",
         ),
         Finding(
             "ok" if roots else "error",
@@ -67,49 +77,81 @@ def graph_conditions(graph: Graph) -> list[Finding]:
             f"{union}{', '.join(roots)} {'reaches' if len(roots) == 1 else 'reach'} all others"
             if roots
             else "no robot reaches all others: s_i − s_j would never vanish",
+            key="" if roots else "graph",
+            remedy="" if roots else "add edges from one robot on, until it reaches all",
+            basis="Theorem 3.1, Assumption 2.1",
         ),
     ]
+
+
+def _switching(scenario: Scenario) -> list[Finding]:
+    """Of a graph that switches: what holds at the start, and how long an edge stays away."""
+    graph = scenario.topology
+    if not graph.switches:
+        return []
+    now = graph.at(0)
+    unreached, roots = now.unreached_from(now.leader), now.roots()
+    reached = f"the leader doesn't reach {', '.join(unreached)}" if unreached else "reaches all"
+    period_s = scenario.clock.control_period_s
+    ticks = round(scenario.ends_at_s / period_s)
+    gone_s = max(edge.presence(ticks)[1] for edge in graph.in_edges) * period_s
+    value = f"at the start {reached}, roots {', '.join(roots) or 'none'}"
+    value += f"; an edge is gone for up to {gone_s:.3g} s"
+    return [Finding("ok", "switching", value, basis="jointly rooted over a window")]
 
 
 def synchronisation(graph: Graph, p: float, q: float) -> Finding:
     """Inequality (46), both sides; of a graph that switches, of each graph that exists in turn."""
     left, right = p * p / q, _right_side(graph)
-    title = "(46) p²/q > max Im(ζ)²/Re(ζ)"
+    title, value, limit = "p²/q > max Im(ζ)²/Re(ζ)", f"{left:g}", f"> {right:.4g}"
     if graph.switches:
         title += ", at each time"
     if left > right:
-        return Finding("ok", title, f"{left:g} > {right:.4g}")
-    least = np.sqrt(q * right)
-    text = f"{left:g} is not above {right:.4g}: raise coordination.p above {least:.3g}"
-    return Finding("error", title, text, key="coordination.p")
+        return Finding("ok", title, value, limit=limit, basis="(46)")
+    remedy = f"raise coordination.p above {np.sqrt(q * right):.3g}"
+    key = "coordination.p"
+    return Finding("error", title, value, key=key, limit=limit, remedy=remedy, basis="(46)")
 
 
-def delay_class(graph: Graph, p: float, q: float) -> Finding:
-    """Margins of the coordination for delay and switching."""
+def gain_class(graph: Graph, p: float, q: float) -> Finding:
+    """Classes of p² against q d_max, and what each promises.
+
+    ≥ 4  positive     (45) averages: consensus under any switching with a jointly rooted union
+    ≥ 2  small gain   any delay with the own value fresh; string stable, |q d G(jω)| ≤ 1
+    < 2  spectral     this graph as it is, by (46)
+    """
     degree = graph.max_in_degree
     ratio = p * p / (q * degree) if degree else inf
-    title = "p²/(q d_max), largest in-degree d_max"
-    if ratio >= 4:
-        return Finding("ok", title, f"{ratio:g} ≥ 4: any delay, any switching with a rooted union")
+    fine = Finding(
+        "ok",
+        "p²/(q d_max), largest in-degree d_max",
+        f"{ratio:.3g}",
+        limit="≥ 4: any delay, any switching with a jointly rooted union; string stable",
+        basis="gain and sign of (45)",
+    )
+    if ratio >= _POSITIVE:
+        return fine
     if graph.switches:
-        text = (
-            f"{ratio:.3g} < 4: graphs that each pass (46) may diverge when they switch; raise"
-            f" coordination.p to {2.0 * np.sqrt(q * degree):.3g}"
+        return replace(
+            fine,
+            level="warning",
+            key="coordination.p",
+            limit="≥ 4: graphs that each pass (46) may diverge when they switch",
+            remedy=f"raise coordination.p to {np.sqrt(_POSITIVE * q * degree):.3g}",
         )
-        return Finding("warning", title, text, key="coordination.p")
-    if ratio >= 2:
-        return Finding("ok", title, f"{ratio:g} ≥ 2: any delay; switching graphs needs 4")
-    margin_s = delay_margin_s(graph, p, q)
-    stands = f"up to {margin_s:.3g} s of delay" if isfinite(margin_s) else "any constant delay"
-    if isnan(margin_s):
-        stands = "delay has a limit"
-    text = f"{ratio:.3g} < 2: {stands} on this graph; 2 for any delay, 4 for switching"
-    level: Level = "ok" if margin_s >= 1.0 else "warning"
-    return Finding(level, title, text, key="coordination.p" if level != "ok" else "")
+    if ratio >= _SMALL_GAIN:
+        return replace(fine, limit="≥ 2: any delay; string stable; switching graphs needs 4")
+    fine = replace(fine, limit="< 2: this graph as it is, by (46); amplifies from robot to robot")
+    if delay_margin_s(graph, p, q) >= _AMPLE_S:
+        return fine
+    least = np.sqrt(_SMALL_GAIN * q * degree)
+    remedy = f'raise coordination.p to {least:.3g}, or graph.weights = "normalised"'
+    limit, key = "≥ 2 for any delay, ≥ 4 for switching", "coordination.p"
+    return replace(fine, level="warning", limit=limit, key=key, remedy=remedy)
 
 
 def _positive(graph: Graph, p: float, q: float) -> bool:
-    return p * p >= 4.0 * q * graph.max_in_degree
+    return p * p >= _POSITIVE * q * graph.max_in_degree
 
 
 def _right_side(graph: Graph) -> float:
@@ -137,17 +179,20 @@ def _sharing(scenario: Scenario, ahead: Forecast) -> Finding:
         return Finding("ok", title, f"not looked at for more than {LARGE_FLEET} robots")
     speeds, places = radii(graph, gains.p, gains.q, period_s, gains.age_limit_s)
     said = f"spectral radius from share to share {speeds:.4g} of v̂, {places:.4g} of s and μ"
+    limit = "< 1"
     if max(speeds, places) >= 1.0 - 1e-9:
-        text = f"{said}, not below 1: the path variables don't agree; share more often, or raise p"
+        remedy = "share more often, or raise p"
         # From equal starts nothing may grow for a while: numbers are all that swings there.
         lost = ahead.spread[-1] > LOST_M and ahead.spread[-1] > ahead.spread[0]
-        return Finding("error" if lost else "warning", title, text, key=key)
+        level: Level = "error" if lost else "warning"
+        return Finding(level, title, said, key=key, limit=limit, remedy=remedy)
     if period_s > gains.age_limit_s:
-        text = (
-            f"{said}; s_j is carried on for coordination.age_limit_s = {gains.age_limit_s:g} s only"
+        remedy = (
+            f"s_j is carried on for coordination.age_limit_s = {gains.age_limit_s:g} s only,"
+            " so followers fall behind: share more often"
         )
-        return Finding("warning", title, f"{text}: followers fall behind", key=key)
-    return Finding("ok", title, said)
+        return Finding("warning", title, said, key=key, limit=limit, remedy=remedy)
+    return Finding("ok", title, said, limit=limit)
 
 
 def _leader(scenario: Scenario) -> list[Finding]:
@@ -191,7 +236,8 @@ def _leader(scenario: Scenario) -> list[Finding]:
 
 def _agreement(scenario: Scenario, ahead: Forecast) -> Finding:
     """When the path variables will have agreed, by the coordination alone."""
-    return _settling(scenario, ahead, ahead.spread, "max s_i − min s_i", "m", SETTLE_BAND)
+    title = f"max s_i − min s_i of {len(scenario.robot)} robots"
+    return _settling(scenario, ahead, ahead.spread, title, "m", SETTLE_BAND)
 
 
 def _speed_estimates(scenario: Scenario, ahead: Forecast) -> Finding:
@@ -205,25 +251,28 @@ def _settling(
 ) -> Finding:
     """Whether an error of the coordination is small throughout the end of the run."""
     end_s = scenario.ends_at_s
+    limit = f"≤ {settled:.2g} {unit} in the last {min(FINAL_S, FINAL_PART * end_s):.3g} s"
     apart = np.flatnonzero(error > settled)
     peak = f"at most {float(error.max()):.3g} {unit}"
     if not len(apart):
-        return Finding("ok", title, peak)
+        return Finding("ok", title, peak, limit=limit)
     last = min(int(apart[-1]) + 1, len(error) - 1)
     after = f"within {settled:.2g} {unit} after {ahead.t_s[last]:.3g} s"
     final_s = end_s - min(FINAL_S, FINAL_PART * end_s)
     if ahead.t_s[last] <= final_s and error[-1] <= settled:
-        return Finding("ok", title, f"{peak}, {after}")
+        return Finding("ok", title, f"{peak}, {after}", limit=limit)
     if error[-1] > settled:
         after = f"still {float(error[-1]):.3g} {unit} after {ahead.t_s[-1]:.3g} s"
-    text = f"{peak}, {after}: late in a run of {end_s:g} s; "
+    value = f"{peak}, {after}"
     if np.any(ahead.v_hat[0] != scenario.leader.speed_m_s):
-        text += (
+        remedy = (
             f"coordination.v_hat_0 = {scenario.leader.speed_m_s:g},"
             f"{' equal s_0,' if unit == 'm' else ''} or more leader links make it quicker"
         )
-        return Finding("warning", title, text, key="coordination.v_hat_0")
-    return Finding("warning", title, f"{text}a longer duration_s shows it", key="duration_s")
+        key = "coordination.v_hat_0"
+        return Finding("warning", title, value, key=key, limit=limit, remedy=remedy)
+    remedy = "a longer duration_s shows it"
+    return Finding("warning", title, value, key="duration_s", limit=limit, remedy=remedy)
 
 
 def _backwards(scenario: Scenario, ahead: Forecast) -> list[Finding]:

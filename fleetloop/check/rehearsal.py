@@ -52,11 +52,40 @@ class _Notebook:
         return np.frombuffer(b"".join(self.blocks.get(robot, [])), layout)
 
 
+@dataclass(frozen=True, slots=True)
+class Rehearsal:
+    """What a run in this process came to."""
+
+    rows: Mapping[str, np.ndarray]
+    """Of each robot's controller, one a tick, by signal."""
+    stopped: Mapping[str, str]
+    """Robots that stopped themselves, and why."""
+    failed: str = ""
+    """Why the run ended."""
+
+
 def rehearse(scenario: Scenario) -> list[Finding]:
     """Run the beginning of a scenario; return its findings."""
     if scenario.host.dry_run:
         return [Finding("ok", _TITLE, "none: host.dry_run")]
     until_s = _affordable_s(scenario)
+    seen = rehearsal(scenario, until_s)
+    if seen.failed:
+        return [Finding("error", _TITLE, f"the run would end: {seen.failed}")]
+    whole = until_s >= scenario.ends_at_s - 1e-9
+    said = f"all {until_s:g} s" if whole else f"first {until_s:.3g} s"
+    found = [
+        Finding("error", _TITLE, f"{said}: stops itself at {reason}", (robot,))
+        for robot, reason in seen.stopped.items()
+    ]
+    if not found:
+        period_s = schedule(scenario).period_s
+        found = _errors(scenario.names, seen.rows, period_s, said, whole=whole)
+    return found or [Finding("ok", _TITLE, f"{said}: no robot stops")]
+
+
+def rehearsal(scenario: Scenario, until_s: float) -> Rehearsal:
+    """Run a scenario in this process up to a time; it ends when all robots have stopped."""
     part = _part(scenario, until_s)
     notebook = _Notebook()
     network = NetworkLink("in-process", "", "", "")
@@ -76,16 +105,9 @@ def rehearse(scenario: Scenario) -> list[Finding]:
         )
         run.run(stop)
     except FleetloopError as error:
-        return [Finding("error", _TITLE, f"the run would end: {error}")]
-    whole = until_s >= scenario.ends_at_s - 1e-9
-    said = f"all {until_s:g} s" if whole else f"first {until_s:.3g} s"
-    found = [
-        Finding("error", _TITLE, f"{said}: stops itself at {reason}", (robot,))
-        for robot, reason in run.stopped_robots.items()
-    ]
-    if not found:
-        found = _errors(part, notebook, said, whole=whole)
-    return found or [Finding("ok", _TITLE, f"{said}: no robot stops")]
+        return Rehearsal({}, {}, str(error))
+    rows = {robot.name: notebook.rows(robot.name, signals_of(part, robot)) for robot in part.robot}
+    return Rehearsal(rows, run.stopped_robots)
 
 
 def _affordable_s(scenario: Scenario) -> float:
@@ -107,15 +129,19 @@ def _part(scenario: Scenario, until_s: float) -> Scenario:
     return scenario.model_copy(update={"clock": clock, "bus": bus, "until_s": until_s})
 
 
-def _errors(scenario: Scenario, notebook: _Notebook, said: str, *, whole: bool) -> list[Finding]:
+def _errors(
+    names: Sequence[str],
+    rows: Mapping[str, np.ndarray],
+    period_s: float,
+    said: str,
+    *,
+    whole: bool,
+) -> list[Finding]:
     """Robots that are off their paths, or apart, at the end of the rehearsal."""
-    rows = {
-        robot.name: notebook.rows(robot.name, signals_of(scenario, robot))
-        for robot in scenario.robot
-    }
-    period_s = schedule(scenario).period_s
     found = []
-    last = {robot: part[_final(part, period_s) :] for robot, part in rows.items() if len(part)}
+    last = {
+        robot: rows[robot][_final(rows[robot], period_s) :] for robot in names if len(rows[robot])
+    }
     for robot, part in last.items():
         error, before = _off(part), _off(rows[robot][:1])
         settled = error <= SETTLE_BAND if whole else error <= max(before, LOST_M)

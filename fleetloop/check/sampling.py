@@ -49,6 +49,8 @@ HELD_PERIODS = 20
 _POSES = "clock.localisation_period_s"
 _FRAMES = 4
 """On a wire before both torques are there: two encoder frames, two torques."""
+_SPEED_LOOP = "(34) sampled: K < 2 sin(π / (2 (2 d + 1)))"
+_CHANNEL = "spectral radius, linearised on line and arc"
 _CYCLES = 3.0
 """Errors that take longer than a third of the run to decay are said."""
 
@@ -127,7 +129,7 @@ def _speed_loop(scenario: Scenario, robot: Robot, control: Choice) -> Iterator[F
     most = bisect(lambda k: speed_loop_radius(k, delay) < 1.0, 0.0, 4.0, 24)
     title = f"sampled speed loop {name or 'k'} h / min(m̄)"
     late = f" with torques {1e3 * late_s:.2g} ms late" if delay else ""
-    said = f"{gain:.3g}, stable below {most:.3g}{late}"
+    said, limit = f"{gain:.3g}", f"< {most:.3g}{late}"
     suits = 0.25 * min(most, 1.0) * inertia / h
     key, remedy = "control.law", f"a speed gain of {suits:.3g} suits this rate, not {of_law:.3g}"
     if name:
@@ -137,11 +139,15 @@ def _speed_loop(scenario: Scenario, robot: Robot, control: Choice) -> Iterator[F
     if all(speed_loop_radius(gain, part * delay) >= 1.0 for part in (0.5, 1.0, 1.5)):
         level: Level = "warning" if limits(scenario, robot) else "error"
         swings = "diverges" if level == "error" else "torques swing between their limits"
-        yield Finding(level, title, f"{said}: {swings}; {remedy}", key=key)
+        said += f": {swings}"
+        yield Finding(level, title, said, key=key, limit=limit, remedy=remedy, basis=_SPEED_LOOP)
     elif gain > 0.5 * most:
-        yield Finding("warning", title, f"{said}, good below half of it; {remedy}", key=key)
+        limit += ", good below half of it"
+        yield Finding(
+            "warning", title, said, key=key, limit=limit, remedy=remedy, basis=_SPEED_LOOP
+        )
     else:
-        yield Finding("ok", title, said)
+        yield Finding("ok", title, said, limit=limit, basis=_SPEED_LOOP)
 
 
 def _channel_of(scenario: Scenario, control: Choice, loop: Loop, arcs: Arcs) -> list[Finding]:
@@ -152,7 +158,7 @@ def _channel_of(scenario: Scenario, control: Choice, loop: Loop, arcs: Arcs) -> 
         return list(_channel(scenario, control, loop, arcs))
     except (Exception, SystemExit) as error:  # the law's own code
         text = f"{ANALYSES['loop_elements']}: law {control.name}, loop_elements: {raised(error)}"
-        return [Finding("warning", "not analysed", text, key="control.law")]
+        return [Finding("warning", "not analysed", text, key="control.law", basis="the law")]
 
 
 def _channel(scenario: Scenario, control: Choice, loop: Loop, arcs: Arcs) -> Iterator[Finding]:
@@ -165,33 +171,39 @@ def _channel(scenario: Scenario, control: Choice, loop: Loop, arcs: Arcs) -> Ite
     at_start = [channel_radius(loop, *arc) for arc in arcs]
     worst = int(np.argmax(at_start))
     radius, arc = at_start[worst], arcs[worst]
+    said = f"{radius:.6g}"
     if len(parts) > 1:
         learnt = replace(loop, learnt=True)
         later = max(channel_radius(learnt, *arc) for arc in arcs)
+        said += f" for Θ̂ = 0, {later:.6g} for the true Θ,"
         if radius < 1.0 <= later:
             radius, loop = later, learnt
     if radius >= 1.0 + 1e-9:
         remedies = {} if loop.pose_every > HELD_PERIODS else _remedies(loop, arc)
         key = f"control.{next(iter(remedies), next(iter(_gains(loop)), 'law'))}"
         key = _POSES if loop.pose_every > HELD_PERIODS else key
-        yield Finding("warning", title, _unstable(loop, parts[0], radius, remedies), key=key)
+        said += f" per period of {loop.period_s:g} s{_lags(loop, parts[0])}: the errors swing"
+        remedy = _lower(loop, parts[0], remedies)
+        yield Finding("warning", title, said, key=key, limit="< 1", remedy=remedy, basis=_CHANNEL)
         return
     slowest_s = pole_time_s(radius, loop.period_s)
-    said = f"{radius:.6g} per period, slowest error decays in {slowest_s:.3g} s"
+    said += f" per period, slowest error decays in {slowest_s:.3g} s"
     margin_s = inf
     if loop.pose_every <= HELD_PERIODS:
         margin_s = delay_margin_s(loop, *arc)
         said += f"; tolerates torques {1e3 * margin_s:.3g} ms late"
     if _CYCLES * slowest_s > scenario.duration_s:
-        text = f"{said}: too slow for {scenario.duration_s:g} s"
         slow = _slowest_gain(loop, arc)
-        text += f"; raise control.{slow}" if slow else ""
-        yield Finding("warning", title, text, key=f"control.{slow or 'law'}")
+        limit = f"< 1, decay within {scenario.duration_s / _CYCLES:.3g} s"
+        remedy = f"raise control.{slow}" if slow else "a faster law, or a longer duration_s"
+        key = f"control.{slow or 'law'}"
+        yield Finding("warning", title, said, key=key, limit=limit, remedy=remedy, basis=_CHANNEL)
     elif margin_s < loop.period_s:
         key = f"control.{speed_gain_key(control) or 'law'}"
-        yield Finding("warning", title, f"{said}: less than a period", key=key)
+        limit, remedy = "< 1, with a period of delay", "lower it, or a higher rate"
+        yield Finding("warning", title, said, key=key, limit=limit, remedy=remedy, basis=_CHANNEL)
     else:
-        yield Finding("ok", title, said)
+        yield Finding("ok", title, said, limit="< 1", basis=_CHANNEL)
 
 
 def _gains(loop: Loop) -> tuple[str, ...]:
@@ -218,12 +230,16 @@ def _slowest_gain(loop: Loop, arc: Arc) -> str:
     return best if best and radii[best] < channel_radius(loop, *arc) else ""
 
 
-def _unstable(loop: Loop, part: LoopElement, radius: float, remedies: dict[str, float]) -> str:
+def _lags(loop: Loop, part: LoopElement) -> str:
     lags = []
     if part.time_constants_s:
         lags.append(f"{part.states} of {', '.join(f'{lag:g}' for lag in part.time_constants_s)} s")
     if loop.pose_every > 1:
         lags.append(f"poses held {loop.pose_every * loop.period_s:g} s")
+    return f" with {', '.join(lags)}" if lags else ""
+
+
+def _lower(loop: Loop, part: LoopElement, remedies: dict[str, float]) -> str:
     each = [
         f"{name} = {0.5 * value:.3g} (it is {getattr(loop.gains, name):g})"
         for name, value in remedies.items()
@@ -231,12 +247,8 @@ def _unstable(loop: Loop, part: LoopElement, radius: float, remedies: dict[str, 
     what = f"control.{' or '.join(each)} suits" if each else "lower the gains together"
     if loop.pose_every > HELD_PERIODS:
         what = 'localisation.source = "fused", or more fixes'
-    lagging = f" with {', '.join(lags)}" if lags else ""
     shorter = f" with shorter {part.states}" if part.time_constants_s else ""
-    return (
-        f"{radius:.4g} per period of {loop.period_s:g} s{lagging}: not below 1, the errors swing"
-        f" and don't vanish; {what}, or a higher rate{shorter}"
-    )
+    return f"{what}, or a higher rate{shorter}"
 
 
 def _held_pose(scenario: Scenario, course: Course) -> Iterator[Finding]:
@@ -252,8 +264,10 @@ def _held_pose(scenario: Scenario, course: Course) -> Iterator[Finding]:
     title = "poses held between fixes"
     said = f"held {held_s:g} s, {late_s:g} s late, at {speed:.3g} m/s: the reference moves on"
     said += f" {moved:.2g} m"
+    finding = Finding(
+        "ok", title, said, (course.robot.name,), limit=f"≤ {HELD_M:g} m", basis="v̄_d ṡ × age"
+    )
     if moved > HELD_M:
-        text = f'{said}; localisation.source = "fused" carries poses on by odometry, or more fixes'
-        yield Finding("warning", title, text, (course.robot.name,), _POSES)
-    else:
-        yield Finding("ok", title, said, (course.robot.name,))
+        remedy = 'localisation.source = "fused" carries poses on by odometry, or more fixes'
+        finding = replace(finding, level="warning", key=_POSES, remedy=remedy)
+    yield finding

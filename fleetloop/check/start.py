@@ -113,7 +113,7 @@ def _start(
 
 
 def _first_torque(scenario: Scenario, robot: Robot, seen: _Start, *, adapts: bool) -> Finding:
-    title = "first torques"
+    title, basis = "first torques", "(34) at t = 0, k_4 k_1 |x_e(0)| / r"
     x_e, y_e, _ = _errors(scenario, robot)
     off = f"{hypot(x_e, y_e):.3g} m off the path"
     said = f"{off}: asks for {seen.asked_wheel_N_m:.3g} N·m {seen.asked_at_s:.3g} s after the start"
@@ -125,29 +125,47 @@ def _first_torque(scenario: Scenario, robot: Robot, seen: _Start, *, adapts: boo
     ]
     if seen.failed:
         text = f"{off}: {seen.failed}, {seen.diverged_at_s:.3g} s after the start"
-        return Finding("error", title, text, (robot.name,), "control.law")
+        return Finding("error", title, text, (robot.name,), "control.law", basis=basis)
     if seen.diverged_at_s is not None and not adapts:  # or it is said of the adaptation
         text = f"{off}: the motion diverges {seen.diverged_at_s:.3g} s after the start"
-        return Finding("warning", title, text, (robot.name,), "control.law")
+        return Finding("warning", title, text, (robot.name,), "control.law", basis=basis)
     harm = saturation(scenario.control_of(robot))
-    if bounds and harm:
-        limit = min(bounds, key=lambda one: one.torque_wheel_N_m)
-        if seen.asked_wheel_N_m > limit.torque_wheel_N_m:
-            text = f"{said}, gets {limit.torque_wheel_N_m:.3g} N·m, {limit.words}: {harm}"
-            return Finding("warning", title, text, (robot.name,), "control.law")
-    return Finding("ok", title, said, (robot.name,))
+    if not bounds:
+        return Finding("ok", title, f"{said}; no drive's limit", (robot.name,), basis=basis)
+    least = min(bounds, key=lambda one: one.torque_wheel_N_m)
+    limit = f"≤ {least.torque_wheel_N_m:.3g} N·m at the wheel, {least.words}"
+    if seen.asked_wheel_N_m > least.torque_wheel_N_m:
+        if harm:
+            return Finding(
+                "warning",
+                title,
+                said,
+                (robot.name,),
+                "control.law",
+                limit=limit,
+                remedy=harm,
+                basis=basis,
+            )
+        said, limit = f"{said}; the drive cuts it to {least.torque_wheel_N_m:.3g} N·m", ""
+    return Finding("ok", title, said, (robot.name,), limit=limit, basis=basis)
 
 
 def _adaptation(robot: Robot, seen: _Start, limit: AdaptationLimit) -> Finding:
     title = f"{limit.condition} at the start"
-    if seen.diverged_at_s is not None:
-        text = f"diverges {seen.diverged_at_s:.3g} s after the start: {limit.remedy}"
-        return Finding("warning", title, text, (robot.name,), "control.law")
     said = f"{seen.ratio:.3g} {limit.unit} at most, {seen.ratio_at_s:.3g} s after the start"
-    if seen.ratio >= 1.0:
-        text = f"{said}: not stable there; {limit.remedy}"
-        return Finding("warning", title, text, (robot.name,), "control.law")
-    return Finding("ok", title, said, (robot.name,))
+    if seen.diverged_at_s is not None:
+        said = f"diverges {seen.diverged_at_s:.3g} s after the start"
+    fine = seen.diverged_at_s is None and seen.ratio < 1.0
+    return Finding(
+        "ok" if fine else "warning",
+        title,
+        said,
+        (robot.name,),
+        "" if fine else "control.law",
+        limit=f"< 1 {limit.unit}",
+        remedy="" if fine else limit.remedy,
+        basis="(35) as sampled",
+    )
 
 
 def _errors(scenario: Scenario, robot: Robot) -> tuple[float, float, float]:

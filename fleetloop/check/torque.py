@@ -18,7 +18,7 @@ Where need exceeds it, only a part f < 1 of the speed is kept up; the robot fall
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, log1p, pi, sqrt
 
 import numpy as np
@@ -166,9 +166,10 @@ def _torque(scenario: Scenario, course: Course, need: Need, bounds: list[Limit])
     most = np.abs(need.torque_wheel_N_m)
     place = np.unravel_index(int(most.argmax()), most.shape)
     peak, speed = float(most[place]), float(course.v[place[0]])
-    said = f"up to {peak:.3g} N·m at {speed:.3g} m/s"
+    basis = "(4) inverse, friction through the gear"
     if not bounds:
-        return Finding("ok", title, f"{said}; nothing limits it", (robot.name,))
+        said = f"up to {peak:.3g} N·m at {speed:.3g} m/s; nothing limits it"
+        return Finding("ok", title, said, (robot.name,), basis=basis)
     left = np.array(
         [b.torque_wheel_N_m - b.slope_wheel_N_m_s * np.abs(need.nu_wheel_rad_s) for b in bounds]
     )
@@ -177,20 +178,29 @@ def _torque(scenario: Scenario, course: Course, need: Need, bounds: list[Limit])
     limit, (_, instant, wheel) = bounds[tightest[0]], tightest
     asked, given = float(most[instant, wheel]), max(float(left[tightest]), 0.0)
     asked_m_s = float(course.v[instant])
-    said = f"needs {asked:.3g} N·m at {asked_m_s:.3g} m/s"
+    said = f"{asked:.3g} N·m at {asked_m_s:.3g} m/s"
     behind = _behind(scenario, course, need, bounds)
     level: Level = "ok"
-    words = f"{said} of {given:.3g} N·m, {limit.words}"
+    remedy = ""
     if ratios[tightest] < MARGIN:
-        level, words = "warning", f"{words}; keep twice the need: change {limit.key}"
+        level, remedy = "warning", f"keep twice the need: change {limit.key}"
     if ratios[tightest] < 1.0:
-        words = f"{said}, gets {given:.3g} N·m, {limit.words}: change {limit.key}, or go slower"
+        remedy = f"change {limit.key}, or go slower"
         if limit.speed_m_s < asked_m_s:
-            words += f" (it allows {limit.speed_m_s:.3g} m/s of {asked_m_s:.3g})"
+            remedy += f" (it allows {limit.speed_m_s:.3g} m/s of {asked_m_s:.3g})"
         if behind[-1] > BEHIND_M:
             level = "error"
-            words += f"; falls {float(behind[-1]):.2g} m behind"
-    return Finding(level, title, words, (robot.name,), limit.key if level != "ok" else "")
+            said += f", falls {float(behind[-1]):.2g} m behind"
+    return Finding(
+        level,
+        title,
+        said,
+        (robot.name,),
+        limit.key if level != "ok" else "",
+        limit=f"≤ {given:.3g} N·m, {limit.words}",
+        remedy=remedy,
+        basis=basis,
+    )
 
 
 def _behind(scenario: Scenario, course: Course, need: Need, bounds: list[Limit]) -> Series:
@@ -263,12 +273,19 @@ def _heat(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:
         f" begins, after {after_s:.2g} s, and would to {motor.ambient_C + rise_K:.0f} °C; it leaves"
         f" {gear * constant * left_A:.3g} N·m in the long run"
     )
-    title, robots = "motor temperature", (course.robot.name,)
+    fine = Finding(
+        "ok",
+        "motor temperature",
+        text,
+        (course.robot.name,),
+        limit=f"not within {scenario.ends_at_s:g} s",
+        basis="R i² R_th, first order",
+    )
     if after_s > scenario.ends_at_s:
-        yield Finding("ok", title, f"{text}, not in these {scenario.ends_at_s:g} s", robots)
+        yield fine
     else:
         remedy = "a larger mounting.gear_ratio or cooler motors, or a shorter run"
-        yield Finding("warning", title, f"{text}: {remedy}", robots, "mounting.gear_ratio")
+        yield replace(fine, level="warning", key="mounting.gear_ratio", remedy=remedy)
 
 
 def _warm_up_s(rise_K: float, allowed_K: float, time_s: float) -> tuple[float, float]:
@@ -294,8 +311,10 @@ def _slew(scenario: Scenario, course: Course, need: Need) -> Iterator[Finding]:
         yield Finding(
             "warning",
             "host.torque_slew_limit_wheel_N_m_s",
-            f"{slew:g} N·m/s take {takes_s:.2g} s to the needed torque; the speed loop's time"
-            f" constant m̄/{name} is {lag_s:.2g} s: the limit is felt as lag, and may swing",
+            f"{slew:g} N·m/s take {takes_s:.2g} s to the needed torque: felt as lag, may swing",
             (course.robot.name,),
             "host.torque_slew_limit_wheel_N_m_s",
+            limit=f"≤ {lag_s:.2g} s, the speed loop's m̄/{name}",
+            remedy="raise it",
+            basis="(34)",
         )

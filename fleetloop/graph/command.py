@@ -13,7 +13,7 @@ from configs.overrides import Overrides
 from configs.resolve import schedule
 from configs.scenario import Scenario
 from fleetloop.check.finding import Finding
-from fleetloop.check.graph import delay_class, graph_conditions, synchronisation
+from fleetloop.check.graph import gain_class, graph_conditions, synchronisation
 from fleetloop.terminal import ResultConsole, note, say, say_json
 
 PICTURES = (".svg", ".png", ".pdf")
@@ -36,7 +36,7 @@ def show_graph(source: str, overrides: Overrides, *, out: Path | None, as_json: 
     findings = [
         *graph_conditions(graph),
         synchronisation(graph, gains.p, gains.q),
-        delay_class(graph, gains.p, gains.q),
+        gain_class(graph, gains.p, gains.q),
     ]
     if out is not None:
         _write(scenario, out)

@@ -16,7 +16,7 @@ from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, si
 from configs.roles import short_name
 from configs.scenario import Scenario
 from fleetloop.check.examine import examine
-from fleetloop.check.finding import likewise, titled, worst
+from fleetloop.check.finding import in_words, titled
 from fleetloop.in_process import InProcessRun
 from fleetloop.launch import placement, wall_time
 from fleetloop.launch.accounts import stats_of
@@ -138,14 +138,18 @@ def _look_ahead(source: str, scenario: Scenario, options: RunOptions) -> None:
     """Say what `fleetloop check` has against a scenario, but for its rehearsal: here is the run.
 
     Raises:
-        ScenarioError: it has an error against it.
+        ScenarioError: a necessary condition fails; named.
     """
     examined = examine(source, scenario, options.overrides)
     found = [finding for finding in examined if finding.level != "ok"]
-    for finding in likewise(found):
-        note(f"{finding.level}: {titled(finding)}: {finding.text}")
-    if worst(found) == "error" and not options.force:
-        raise ScenarioError(f"{source}: would not work as it is; --force runs it all the same")
+    for line in in_words(found):
+        note(line)
+    failed = list(dict.fromkeys(titled(one) for one in found if one.level == "error"))
+    if failed and not options.force:
+        raise ScenarioError(
+            f"{source}: would not work as it is, by {'; '.join(failed)};"
+            " --force runs it all the same"
+        )
 
 
 def _check_credentials(scenario: Scenario, deployment: Deployment) -> None:

@@ -7,7 +7,7 @@ import pytest
 from configs.loading import load, shipped
 from fleetloop.check.command import check_scenario
 from fleetloop.check.examine import examine
-from fleetloop.check.finding import Finding, alike, likewise, worst
+from fleetloop.check.finding import Finding, alike, in_words, worst
 
 REALISTIC = "drive.preset='realistic'"
 
@@ -35,8 +35,7 @@ def test_findings_that_differ_in_numbers_share_a_line_that_names_the_others() ->
     one = Finding("warning", "torque", "0.4 of 0.5", ("r1",))
     two = Finding("warning", "torque", "0.45 of 0.5", ("r2",))
     assert alike([one, two]) == [one, two]
-    (line,) = likewise([one, two])
-    assert line.text == "0.4 of 0.5; likewise r2"
+    assert in_words([one, two]) == ["warning: r1: torque: 0.4 of 0.5; likewise r2"]
 
 
 def test_gains_for_1_khz_are_refused_at_100_hz_with_gains_that_suit() -> None:

@@ -8,7 +8,7 @@ from configs.loading import load
 from fleetloop.check.coordination import forecast
 from fleetloop.check.finding import Finding
 from fleetloop.check.graph import (
-    delay_class,
+    gain_class,
     graph_conditions,
     graph_findings,
     synchronisation,
@@ -45,15 +45,15 @@ def test_weights_scale_both_eigenvalues_and_in_degrees() -> None:
     ring = circulant(3, 1)
     half = Graph.of(ring.robots, ring.edges, (), dict.fromkeys(ring.edges, 0.5))
     assert "1 > 0.25" in synchronisation(half, p=1.0, q=1.0).text
-    assert "8 ≥ 4" in delay_class(half, p=2.0, q=1.0).text
+    assert "8 ≥ 4" in gain_class(half, p=2.0, q=1.0).text
     finding = synchronisation(circulant(20, 3).normalised(), p=2.0, q=1.0)
     assert (finding.level, finding.text) == ("ok", "4 > 1.487")
 
 
 def test_in_degree_decides_how_much_delay_is_stood() -> None:
-    assert "any switching" in delay_class(circulant(4, 1), p=2.0, q=1.0).text
-    assert "any delay" in delay_class(circulant(4, 2), p=2.0, q=1.0).text
-    assert "< 2" in delay_class(circulant(5, 3), p=2.0, q=1.0).text
+    assert "any switching" in gain_class(circulant(4, 1), p=2.0, q=1.0).text
+    assert "any delay" in gain_class(circulant(4, 2), p=2.0, q=1.0).text
+    assert "1.33 < 2" in gain_class(circulant(5, 3), p=2.0, q=1.0).text
 
 
 def test_46_says_nothing_of_switching_and_the_check_says_so() -> None:
@@ -62,10 +62,10 @@ def test_46_says_nothing_of_switching_and_the_check_says_so() -> None:
     each_time = synchronisation(scenario.topology, gains.p, gains.q)
     assert (each_time.level, each_time.text) == ("ok", "0.25 > 0")
     assert "at each time" in each_time.title
-    switching = delay_class(scenario.topology, gains.p, gains.q)
+    switching = gain_class(scenario.topology, gains.p, gains.q)
     assert (switching.level, switching.key) == ("warning", "coordination.p")
     assert switching.text.endswith("raise coordination.p to 2")
-    assert delay_class(scenario.topology, 2.0, gains.q).level == "ok"
+    assert gain_class(scenario.topology, 2.0, gains.q).level == "ok"
     union = [finding.text for finding in graph_conditions(scenario.topology)]
     assert all("the union of all times" in text for text in union)
 
@@ -83,9 +83,10 @@ def text_of(title: str, *overrides: str) -> Finding:
     return next(finding for finding in found if finding.title.startswith(title))
 
 
-def test_a_dense_graph_has_a_delay_limit_and_it_is_a_number() -> None:
-    finding = delay_class(complete(5), p=2.0, q=1.0)
-    assert "up to 2.36 s of delay" in finding.text
+def test_a_dense_graph_is_warned_of_with_the_gain_that_stands_any_delay() -> None:
+    finding = gain_class(complete(21), p=2.0, q=1.0)
+    assert (finding.level, finding.value, finding.key) == ("warning", "0.2", "coordination.p")
+    assert "raise coordination.p to 6.32" in finding.remedy
 
 
 BACKWARDS = pytest.mark.parametrize(

@@ -73,8 +73,8 @@ def test_a_gear_that_leaves_a_third_of_the_need_is_an_error_with_the_numbers() -
         "drive.current_limit_A",
         ("r1",),
     )
-    assert "needs 0.3 N·m" in finding.text
-    assert "gets 0.1 N·m" in finding.text
+    assert finding.value.startswith("0.3 N·m at 0.6 m/s")
+    assert finding.limit.startswith("≤ 0.1 N·m, gear 0.25")
 
 
 def test_a_gear_of_ten_is_no_error() -> None:

@@ -21,7 +21,7 @@ def test_adjacency_degrees_links_roots_and_both_sides_are_printed(capsys) -> Non
     row = next(line for line in text.splitlines() if line.split()[:1] == ["r2"])
     assert row.split() == ["r2", "0.5", "·", "·", "1", "1.5", "·"]
     assert "r1 · · · · · 2 yes" in " ".join(text.split())
-    assert "(46) p²/q > max Im(ζ)²/Re(ζ): 4 > " in text
+    assert "p²/q > max Im(ζ)²/Re(ζ): 4 > " in text
     assert "r1 reaches all others" in text
 
 
