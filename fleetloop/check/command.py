@@ -70,6 +70,7 @@ def _table(scenario: Scenario, findings: Sequence[Finding]) -> Table:
         "rests on",
         "to change",
         title=f"{scenario.name}: robots {len(graph.robots)}, edges {len(graph.edges)}",
+        title_justify="left",
         header_style="dim",
         box=None,
         padding=(0, 1),

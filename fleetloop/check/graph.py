@@ -13,6 +13,7 @@ from math import inf
 
 import numpy as np
 
+from configs.edges import presence
 from configs.graph import Graph
 from configs.scenario import Scenario
 from fleetloop.check.coordination import Forecast, Matrix, delay_margin_s, radii
@@ -94,7 +95,7 @@ def _switching(scenario: Scenario) -> list[Finding]:
     reached = f"the leader doesn't reach {', '.join(unreached)}" if unreached else "reaches all"
     period_s = scenario.clock.control_period_s
     ticks = round(scenario.ends_at_s / period_s)
-    gone_s = max(edge.presence(ticks)[1] for edge in graph.in_edges) * period_s
+    gone_s = max(presence(edge.windows, ticks)[1] for edge in graph.in_edges) * period_s
     value = f"at the start {reached}, roots {', '.join(roots) or 'none'}"
     value += f"; an edge is gone for up to {gone_s:.3g} s"
     return [Finding("ok", "switching", value, basis="jointly rooted over a window")]
