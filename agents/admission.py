@@ -68,7 +68,8 @@ class Admission:
         sender = f"{LOCALISATION}, of {robot}" if robot else LOCALISATION
         if fix.tick < 0 <= self.tick:
             return self._late(sender)
-        wrong = self._pose_date(fix, sender)
+        delay_ticks = self._schedule.place_delay_ticks if robot else self._delay_ticks
+        wrong = self._pose_date(fix, sender, delay_ticks)
         if wrong is None and not within_world(fix.x_m, fix.y_m, fix.theta_rad):
             wrong = "reach", f"({fix.x_m:.6g} m, {fix.y_m:.6g} m, {fix.theta_rad:.6g} rad)"
         if wrong is not None:
@@ -109,7 +110,7 @@ class Admission:
             return self._distance(t_ns) or self._order(t_ns, self._newest_ns.get(robot))
         return self._due(tick) or self._order(t_ns, self._newest_ns.get(robot))
 
-    def _pose_date(self, fix: PoseFix, sender: str) -> tuple[str, str] | None:
+    def _pose_date(self, fix: PoseFix, sender: str, delay_ticks: int) -> tuple[str, str] | None:
         tick, t_ns = fix.tick, fix.t_ns
         if tick < 0:
             return None
@@ -119,7 +120,7 @@ class Admission:
             return self._distance(t_ns)
         if not self._schedule.localises(tick):
             return "tick", f"no pose is taken at tick {tick}"
-        wrong = self._due(tick, self._delay_ticks)
+        wrong = self._due(tick, delay_ticks)
         return wrong or self._order(t_ns, self._newest_ns.get(sender))
 
     def _due(self, tick: int, delay_ticks: int = 0) -> tuple[str, str] | None:

@@ -23,8 +23,6 @@ from configs.edges import LEADER
 from configs.leader_speed import speed_at
 from configs.netem import LOCALISATION
 
-EARLY = -1
-"""Tick of what is said before the start."""
 HERE = ""
 """This robot among those that have poses."""
 
@@ -87,8 +85,7 @@ class EmulatedNetwork:
 
     def missing_to_start(self) -> list[str]:
         """Robots whose start pose has not arrived, though effects depend on their distance."""
-        start = self._poses.get(EARLY, {})
-        return [f"the pose of {robot}" for robot in self._located if robot not in start]
+        return [f"the pose of {robot}" for robot in self._located if robot not in self._places]
 
     def missing(self, tick: int) -> list[str]:
         """Robots whose pose of this tick has not arrived, though effects depend on it."""
@@ -96,17 +93,29 @@ class EmulatedNetwork:
         return [f"pose of {robot}" for robot in self._located if robot not in poses]
 
     def receive_place(self, robot: str, fix: PoseFix) -> None:
-        """Store the pose of an in-neighbour, or of this robot (`HERE`), until it is due."""
-        if self._located:
-            self._poses.setdefault(max(fix.tick, EARLY), {})[robot] = fix
+        """Store the pose of an in-neighbour, or of this robot (`HERE`), until it is due.
+
+        Start poses are due at once: the first path states are sent before the first tick.
+        """
+        if not self._located:
+            return
+        if fix.tick < 0:
+            self._places[robot] = fix
+            self._measure()
+        else:
+            self._poses.setdefault(fix.tick, {})[robot] = fix
 
     def measure(self, tick: int) -> None:
         """Measure the distances to in-neighbours by the newest poses up to this tick."""
         due = sorted(at for at in self._poses if at <= tick)
         for at in due:
             self._places |= self._poses.pop(at)
+        if due:
+            self._measure()
+
+    def _measure(self) -> None:
         here = self._places.get(HERE)
-        if not due or here is None:
+        if here is None:
             return
         for robot in self._located:
             if (there := self._places.get(robot)) is not None:

@@ -74,7 +74,8 @@ class Neighbours:
         self._period_s = period_s
         self._own_past: deque[float] | None = None  # s_i of this and former periods, newest last
         if limits.compensation == "both":
-            self._own_past = deque(maxlen=round(limits.age_limit_s / period_s) + 1)
+            oldest_s = min(limits.age_limit_s, limits.silence_limit_s)
+            self._own_past = deque(maxlen=round(oldest_s / period_s) + 1)
 
     def receive(self, name: str, t_ns: int, s: float, v_hat: float) -> None:
         """Store the path state of `name` at time `t_ns`.

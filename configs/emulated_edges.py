@@ -53,17 +53,22 @@ def _names(text: str, edge: EmulatedEdge) -> bool:
 
 def emulation_problems(network: Network, graph: Graph) -> Iterator[Problem]:
     """Entries of [[network.edge]] that name no edge of the graph, and names with two meanings."""
-    if LOCALISATION in graph.robots and network.edge:
-        remedy = "[[network.edge]] has the localisation system by this name; rename the robot"
+    if LOCALISATION in graph.robots and (network.edge or network.default != Effects()):
+        remedy = "[network] has the localisation system by this name; rename the robot"
         yield Problem("robot.name", LOCALISATION, remedy)
     edges = edges_of(graph)
     for n, entry in enumerate(network.edge):
         for text in entry.edges:
             if problem := _problem_of(text, edges, graph.robots):
                 yield Problem(f"network.edge.{n}.edges", text, problem)
-            elif entry.distance is not None and text.partition(" ")[0] in SOURCES:
+            elif entry.distance is not None and _source_of(text) in SOURCES:
                 remedy = "only between robots: the source of this edge has no place"
                 yield Problem(f"network.edge.{n}.distance", text, remedy)
+
+
+def _source_of(text: str) -> str | None:
+    pattern = parse_edge(text)
+    return None if pattern is None else pattern[0]
 
 
 def _problem_of(text: str, edges: Sequence[EmulatedEdge], robots: Sequence[str]) -> str | None:
@@ -71,10 +76,15 @@ def _problem_of(text: str, edges: Sequence[EmulatedEdge], robots: Sequence[str])
     if pattern is None:
         return 'must read "r1 -> r2", with * for every robot, or leader or localisation as source'
     source, hearer = pattern
-    for name, known in ((source, (*robots, EVERY_ROBOT, *SOURCES)), (hearer, (*robots, "*"))):
+    for name, known in (
+        (source, (*robots, EVERY_ROBOT, *SOURCES)),
+        (hearer, (*robots, EVERY_ROBOT)),
+    ):
         if name not in known:
             return f"{name}: must be one of {', '.join(known)}"
     if any(_names(text, edge) for edge in edges):
         return None
-    heard = [edge.source for edge in edges if edge.hearer == hearer] or [str(e) for e in edges]
+    if hearer == EVERY_ROBOT:
+        return f"no such edge in the graph: it has {', '.join(map(str, edges))}"
+    heard = [edge.source for edge in edges if edge.hearer == hearer]
     return f"no such edge in the graph; {hearer} hears {', '.join(heard)}"

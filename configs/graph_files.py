@@ -18,7 +18,7 @@ import pydot
 
 from configs.edges import LEADER, LEAST_WEIGHT, MOST_WEIGHT, Edge, edge_text
 from configs.errors import ScenarioError
-from configs.files import expanded
+from configs.files import text_of
 from configs.graph import Graph
 
 GRAPHML, DOT = ".graphml", ".dot"
@@ -62,7 +62,7 @@ def read_graph(path: Path, robots: Sequence[str]) -> EdgeList:
     kind = DOT if path.suffix == ".gv" else path.suffix
     if kind not in MOST_KIB:
         raise ScenarioError(f"{path}: must be a file .graphml, .dot or .gv")
-    text = _text(path, MOST_KIB[kind])
+    text = text_of(path, "graph.file", MOST_KIB[kind] << 10)
     digraph = _graphml(path, text) if kind == GRAPHML else _dot(path, text)
     weights: dict[Edge, float] = {}
     for speaker, hearer, data in digraph.edges(data=True):
@@ -107,21 +107,6 @@ def _weight(path: Path, edge: Edge, data: dict[str, Any]) -> float:
         remedy = f"must be a number from {LEAST_WEIGHT:g} to {MOST_WEIGHT:g}"
         raise ScenarioError(f"{path}: edge {edge_text(edge)}: weight = {given!r}: {remedy}")
     return weight
-
-
-def _text(path: Path, most_kib: int) -> str:
-    path = expanded(path, "graph.file")
-    try:
-        with path.open("rb") as file:
-            read = file.read((most_kib << 10) + 1)
-    except OSError as error:
-        raise ScenarioError(f"{path}: can't be read: {error.strerror or error}") from error
-    if len(read) > most_kib << 10:
-        raise ScenarioError(f"{path}: larger than {most_kib} KiB, the most of a file {path.suffix}")
-    try:
-        return read.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise ScenarioError(f"{path}: no text in UTF-8") from error
 
 
 def _graphml(path: Path, text: str) -> "nx.MultiDiGraph":

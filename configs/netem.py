@@ -14,7 +14,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Le, Len
 
+from configs.errors import ScenarioError
+from configs.files import text_of
 from configs.parameters import (
+    MOST,
     Parameters,
     Positive,
     Seconds,
@@ -32,6 +35,9 @@ LOCALISATION = "localisation"
 """The localisation system's name as the source of an edge."""
 EVERY_ROBOT = "*"
 MOST_DELAY_S = 60.0
+LEAST_MEAN_S = 1e-9
+"""Of a lognormal delay: scenario time has nanoseconds."""
+LEAST_BANDWIDTH_BIT_S = 1.0
 MOST_TRACE = 100_000
 MOST_TRACE_BYTES = 1 << 22
 
@@ -75,7 +81,7 @@ class LognormalDelay(Parameters):
     """Lognormally distributed, as delays of queues are: few, but long ones. Draws end at 60 s."""
 
     kind: Literal["lognormal"]
-    mean_s: Annotated[float, Gt(0), Le(MOST_DELAY_S)] = field(
+    mean_s: Annotated[float, Ge(LEAST_MEAN_S), Le(MOST_DELAY_S)] = field(
         metadata={"description": "of the delay, not of its logarithm"}
     )
     std_s: Delay_s
@@ -93,20 +99,22 @@ class _TraceFile:
                 return value
             return _delays_of(Path(origin_of(info)[0], value))
 
-        return core_schema.with_info_before_validator_function(read, handler(source))
+        array = handler(source)
+        return core_schema.with_info_before_validator_function(
+            read,
+            array,
+            json_schema_input_schema=core_schema.union_schema([array, core_schema.str_schema()]),
+        )
 
 
 def _delays_of(path: Path) -> tuple[float, ...]:
     """The delays of a text file [s], one on a line; `lost` or `nan` is a message that is lost."""
     try:
-        if path.stat().st_size > MOST_TRACE_BYTES:
-            raise in_words(f"{path}: longer than {MOST_TRACE_BYTES} bytes")
-        lines = path.read_text("utf-8").split("\n")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "no text in UTF-8"
-        raise in_words(f"{path}: can't be read: {reason}") from error
+        text = text_of(path, "the trace", MOST_TRACE_BYTES)
+    except ScenarioError as error:
+        raise in_words(str(error)) from error
     delays = []
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(text.splitlines(), 1):
         text = line.partition("#")[0].strip()
         if not text:
             continue
@@ -118,6 +126,8 @@ def _delays_of(path: Path) -> tuple[float, ...]:
             remedy = f"must be a delay of 0 to {MOST_DELAY_S:g} s, or lost"
             raise in_words(f"{path}, line {number}: {text[:40]!r} {remedy}")
         delays.append(delay_s)
+    if not 1 <= len(delays) <= MOST_TRACE:
+        raise in_words(f"{path}: has {len(delays)} delays: must be from 1 to {MOST_TRACE}")
     return tuple(delays)
 
 
@@ -138,6 +148,13 @@ class TraceDelay(Parameters):
             " one delay on a line (lost: a message that is), beside the scenario"
         }
     )
+
+    def __post_init__(self) -> None:
+        """Hold the array to delays and the one mark of a loss."""
+        for n, delay_s in enumerate(self.delays_s):
+            if LOST_S < delay_s < 0.0:
+                remedy = f"must be a delay of 0 to {MOST_DELAY_S:g} s, or {LOST_S:g}: lost"
+                raise ValueError(f"delays_s.{n} = {delay_s:g}: {remedy}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -211,7 +228,9 @@ class Effects(Parameters):
     duplication: Probability | None = parameter(
         None, "probability of a second copy, with a delay of its own"
     )
-    bandwidth_bit_s: Positive | None = parameter(None, "messages leave one after the other")
+    bandwidth_bit_s: Annotated[float, Ge(LEAST_BANDWIDTH_BIT_S), Le(MOST)] | None = parameter(
+        None, "messages leave one after the other"
+    )
     message_bytes: Annotated[int, Ge(1), Le(65536)] | None = parameter(
         None, "length of a message with all headers, for the bandwidth; 128 if not given"
     )

@@ -2,9 +2,10 @@
 
     sent → cut? → too far? → lost? → waits for the bandwidth → delay → cut? → due, once or twice
 
-All in scenario time. Draws happen in the order of sending and each effect has a random stream of
-its own, named by seed, edge and effect: edges and directions are independent, and a change of one
-effect changes no draw of another.
+All in scenario time. Every message takes part in every draw, in the order of sending, whatever its
+fate, and each effect has a random stream of its own, named by seed, edge and effect: edges and
+directions are independent, and a change of one effect changes no draw of another. Second copies
+have their delays from a stream of their own.
 """
 
 from collections import deque
@@ -59,6 +60,7 @@ class Channel(Generic[Message]):
 
     __slots__ = (
         "_age_limit_ns",
+        "_copy_delay",
         "_delay",
         "_distance_loss",
         "_due",
@@ -83,6 +85,8 @@ class Channel(Generic[Message]):
         self._distance_loss = distance_draw(effects.distance, Random(f"{seed} distance"))
         self._duplication = effects.duplication or 0.0
         self._duplication_draw = Random(f"{seed} duplication").random
+        self._copy_delay = delay_draw(effects.delay, Random(f"{seed} copy delay"))
+        self._copy_delay()  # of a trace a message takes a line, its copy the next one
         self._in_order = effects.reordering is False
         bits = 8 * (effects.message_bytes or MESSAGE_BYTES)
         rate = effects.bandwidth_bit_s
@@ -104,8 +108,11 @@ class Channel(Generic[Message]):
         """Take a message that its source sends now, from this far; times must not decrease."""
         counts = self.counts
         counts.sent += 1
-        lost = self._loss() | self._distance_loss(distance_m)  # drawn of every message, cut or not
+        lost = self._loss() | self._distance_loss(distance_m)
         delay_ns = self._delay()
+        copied, copy_delay_ns = False, None
+        if self._duplication:
+            copied, copy_delay_ns = self._duplication_draw() < self._duplication, self._copy_delay()
         if lost or delay_ns is None or self._is_cut(now_ns):
             counts.lost += 1
             return
@@ -114,13 +121,12 @@ class Channel(Generic[Message]):
             counts.lost += 1
             return
         self._await(now_ns, left_ns + delay_ns, message)
-        if self._duplication and self._duplication_draw() < self._duplication:
+        if copied:
             counts.duplicated += 1
-            again_ns = self._delay()
-            if again_ns is None:
+            if copy_delay_ns is None:
                 counts.lost += 1
             else:
-                self._await(now_ns, left_ns + again_ns, message)
+                self._await(now_ns, left_ns + copy_delay_ns, message)
 
     def receive(self, now_ns: int) -> list[Delivery[Message]]:
         """The messages that are due, in the order in which they arrive."""

@@ -137,6 +137,17 @@ def test_poses_are_dated_like_path_states_and_of_this_world() -> None:
     assert admission_at(tick, REALTIME).admits_pose(good)
 
 
+def test_poses_of_others_are_due_a_tick_later_even_if_ones_own_are_due_at_once() -> None:
+    at_once = agent_brief(
+        load("two_robots", ("localisation.delay_s=0.0",)), "r2", network=NOWHERE, bus=()
+    )
+    tick = SCHEDULE.localise_every * 3
+    pose = PoseFix(tick, tick * PERIOD_NS, 1.0, 2.0, 3.0)
+    assert not admission_at(tick, at_once).admits_pose(pose)
+    assert admission_at(tick, at_once).admits_pose(pose, "r1")
+    assert not admission_at(tick + 1, at_once).admits_pose(pose, "r1")
+
+
 def test_a_leader_that_is_faster_than_the_scenario_is_not_followed() -> None:
     admission = admission_at(0)
     assert admission.admits_leader_speed(LeaderSpeed((SpeedChange(0, 0.6),)))

@@ -69,7 +69,6 @@ def test_a_message_is_sent_from_as_far_as_the_last_poses_of_both_are_apart() -> 
     edges.receive_place(HERE, pose(-1, 0.0))
     edges.receive_place("r1", pose(-1, 3.0))
     assert edges.missing_to_start() == []
-    edges.measure(-1)
     edges.send_path_state("r1", state(0))
     assert edges.missing(5) == ["pose of r1"]
     edges.receive_place("r1", pose(5, 3.0, 4.1))
@@ -81,6 +80,15 @@ def test_a_message_is_sent_from_as_far_as_the_last_poses_of_both_are_apart() -> 
     edges.measure(15)  # this robot's own is as before
     edges.send_path_state("r1", state(20))
     assert [s.tick for _, s in edges.path_states(40 * MS)] == [0, 20]
+    assert edges.counts()["r1"]["lost"] == 1
+
+
+def test_the_first_message_is_sent_from_as_far_as_the_start_poses_are_apart() -> None:
+    edges = network("{default={distance={range_m=5.0}}}")
+    edges.receive_place("r1", pose(-1, 5.1))
+    edges.receive_place(HERE, pose(-1, 0.0))
+    edges.send_path_state("r1", state(0))
+    assert edges.path_states(0) == []
     assert edges.counts()["r1"]["lost"] == 1
 
 

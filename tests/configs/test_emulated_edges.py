@@ -1,12 +1,13 @@
 """Section [network]: the effects that each edge has, and entries that can't have any."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 from configs.emulated_edges import EmulatedEdge, effects_of
 from configs.errors import ScenarioError
-from configs.loading import load, loads, to_toml
+from configs.loading import json_schema, load, loads, to_toml
 from configs.netem import BernoulliLoss, ConstantDelay, TraceDelay
 from configs.resolve import channels
 from configs.scenario import Scenario
@@ -60,6 +61,7 @@ def test_a_robot_has_channels_from_what_it_hears_where_there_are_effects() -> No
     [
         ("r2 -> r1", "no such edge in the graph; r1 hears leader, localisation"),
         ("leader -> r2", "no such edge in the graph; r2 hears r1, localisation"),
+        ("r4 -> *", "no such edge in the graph: it has r1 -> r2, r2 -> r3, r3 -> r4, leader -> r1"),
         ("r1 - r2", 'must read "r1 -> r2"'),
         ("r1 -> r9", "r9: must be one of r1, r2, r3, r4, *"),
         ("localisation -> leader", "leader: must be one of r1, r2, r3, r4, *"),
@@ -87,7 +89,9 @@ def test_a_trace_is_read_from_a_file_beside_the_scenario_and_written_out(tmp_pat
         ("0.1\nsoon\n", "radio.txt, line 2: 'soon' must be a delay of 0 to 60 s, or lost"),
         ("-0.1\n", "radio.txt, line 1: '-0.1' must be a delay of 0 to 60 s, or lost"),
         ("inf\n", "radio.txt, line 1: 'inf' must be a delay of 0 to 60 s, or lost"),
-        ("# nothing\n", "must have 1 entries or more"),
+        ("# nothing\n", "radio.txt: has 0 delays: must be from 1 to 100000"),
+        ("0\n" * 100_001, "radio.txt: has 100001 delays: must be from 1 to 100000"),
+        ("0" * (1 << 22) + "\n", "radio.txt: larger than 4096 KiB"),
         ("\udcff", "no text in UTF-8"),
         (None, "can't be read: No such file or directory"),
     ],
@@ -104,6 +108,55 @@ def test_a_trace_that_can_not_be_used_is_refused_with_its_line(
     assert said in str(refused.value)
 
 
+@pytest.mark.timeout(10)
+@pytest.mark.parametrize("endless", ["/dev/zero", "pipe"])
+def test_a_pipe_or_device_is_no_trace(endless: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    trace = f'delay = {{ kind = "trace", delays_s = "{endless}" }}'
+    with pytest.raises(ScenarioError, match="must be a regular file, not a pipe or a device"):
+        paper(f"[network.default]\n{trace}\n", str(tmp_path))
+
+
+def test_a_trace_may_begin_with_a_mark_of_byte_order(tmp_path: Path) -> None:
+    (tmp_path / "radio.txt").write_text("0.01\r\n", "utf-8-sig")
+    network = '[network.default]\ndelay = { kind = "trace", delays_s = "radio.txt" }\n'
+    assert paper(network, str(tmp_path)).network.default.delay == TraceDelay(
+        kind="trace", delays_s=(0.01,)
+    )
+
+
+def test_of_negative_delays_only_the_mark_of_a_loss_is_one() -> None:
+    with pytest.raises(ScenarioError) as refused:
+        paper('[network.default]\ndelay = { kind = "trace", delays_s = [0.1, -0.5] }\n')
+    assert "delays_s.1 = -0.5: must be a delay of 0 to 60 s, or -1: lost" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("effect", "remedy"),
+    [
+        ("bandwidth_bit_s = 1e-310", "must be 1 or more"),
+        ('delay = { kind = "lognormal", mean_s = 1e-300, std_s = 60.0 }', "must be 1e-09 or more"),
+    ],
+)
+def test_numbers_that_no_arithmetic_bears_are_refused(effect: str, remedy: str) -> None:
+    with pytest.raises(ScenarioError) as refused:
+        paper(f"[network.default]\n{effect}\n")
+    assert remedy in str(refused.value)
+
+
+def test_the_schema_knows_arrays_and_files_of_a_trace() -> None:
+    delays = json_schema()["$defs"]["TraceDelay"]["properties"]["delays_s"]
+    assert {choice["type"] for choice in delays["anyOf"]} == {"array", "string"}
+
+
+def test_no_robot_has_the_localisation_systems_name_where_there_are_effects() -> None:
+    text = (Path(__file__).parents[2] / "configs" / "two_robots.toml").read_text("utf-8")
+    text = text.replace("r1", "localisation")
+    assert loads("here", text).names[0] == "localisation"
+    with pytest.raises(ScenarioError, match="rename the robot"):
+        loads("here", f"{text}\n[network.default]\n{HALF}\n")
+
+
 def test_bounds_out_of_order_are_named_at_their_table() -> None:
     with pytest.raises(ScenarioError) as refused:
         paper("[network.default]\npartitions = [{ from_s = 3.0, to_s = 2.0 }]\n")
@@ -111,8 +164,9 @@ def test_bounds_out_of_order_are_named_at_their_table() -> None:
     assert "to_s must be above from_s = 3" in str(refused.value)
 
 
-def test_what_has_no_place_has_no_distance() -> None:
+@pytest.mark.parametrize("edge", ["leader -> *", "leader->r1", " localisation -> r1"])
+def test_what_has_no_place_has_no_distance(edge: str) -> None:
     with pytest.raises(ScenarioError) as refused:
-        paper('[[network.edge]]\nedges = ["leader -> *"]\ndistance = { range_m = 2.0 }\n')
+        paper(f'[[network.edge]]\nedges = ["{edge}"]\ndistance = {{ range_m = 2.0 }}\n')
     assert "network.edge.0.distance" in str(refused.value)
     assert "only between robots" in str(refused.value)

@@ -29,7 +29,7 @@ KINDS = ["blf", "log"]
     "overrides",
     [
         (),
-        ("--set", CYCLE, "--set", LOSSY),
+        ("--set", CYCLE, "--set", LOSSY, "--set", "localisation.delay_s=0.0"),
         ("--set", WIRE, "--set", "clock.control_period_s=0.001"),
     ],
     ids=["two_robots", "lossy_cycle", "wire"],

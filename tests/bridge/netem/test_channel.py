@@ -6,9 +6,15 @@ from hypothesis import strategies as st
 
 from bridge.netem.channel import Channel
 from configs.netem import (
+    LEAST_BANDWIDTH_BIT_S,
+    LEAST_MEAN_S,
+    LOST_S,
     BernoulliLoss,
     ConstantDelay,
+    DistanceLoss,
     Effects,
+    LognormalDelay,
+    NormalDelay,
     Partition,
     TraceDelay,
     UniformDelay,
@@ -97,6 +103,42 @@ def test_one_effect_more_changes_no_draw_of_another() -> None:
     assert 0.5 < len(with_loss) / len(without) < 0.9
 
 
+@pytest.mark.parametrize(
+    "less",
+    [
+        {"loss": BernoulliLoss(kind="bernoulli", probability=0.3)},
+        {"partitions": (Partition(from_s=0.1, to_s=0.2),)},
+        {"bandwidth_bit_s": 1e6, "message_bytes": 1, "queue_messages": 1},
+    ],
+    ids=lambda value: next(iter(value)),
+)
+def test_a_lost_message_changes_no_draw_of_others_and_of_their_copies(
+    less: dict[str, object],
+) -> None:
+    usual = {"delay": UniformDelay(kind="uniform", max_s=0.02), "duplication": 0.5}
+    sends = [at for at in range(0, 400, 4) for _ in range(3)]
+    found = arrivals(channel(**usual | less), sends, 500)
+    known = arrivals(channel(**usual), sends, 500)
+    assert len(found) < len(known)
+    if "bandwidth_bit_s" not in less:  # 8 µs each
+        assert set(found) <= set(known)
+    else:
+        times = {number: sorted(at for at, n in known if n == number) for _, number in known}
+        here = {number: sorted(at for at, n in found if n == number) for _, number in found}
+        assert all(
+            len(here[n]) == len(times[n])
+            and all(0 <= a - b <= 1 for a, b in zip(here[n], times[n], strict=True))
+            for n in here
+        )
+
+
+def test_copies_change_no_delay_of_the_messages_themselves() -> None:
+    delay = UniformDelay(kind="uniform", max_s=0.02)
+    sends = list(range(0, 400, 4))
+    without = set(arrivals(channel(delay=delay), sends, 500))
+    assert without < set(arrivals(channel(delay=delay, duplication=0.5), sends, 500))
+
+
 @given(
     sends=st.lists(st.integers(0, 60), max_size=40).map(sorted),
     delays=st.lists(st.integers(-1, 30), min_size=1, max_size=9),
@@ -114,7 +156,9 @@ def test_every_message_is_delivered_or_lost_and_none_before_it_is_sent(
     cut_ms: int,
 ) -> None:
     edge = channel(
-        delay=TraceDelay(kind="trace", delays_s=tuple(ms * 1e-3 for ms in delays)),
+        delay=TraceDelay(
+            kind="trace", delays_s=tuple(ms * 1e-3 if ms >= 0 else LOST_S for ms in delays)
+        ),
         duplication=duplication,
         reordering=not ordered,
         bandwidth_bit_s=rate,
@@ -130,6 +174,30 @@ def test_every_message_is_delivered_or_lost_and_none_before_it_is_sent(
     assert all(at >= sends[number] for at, number in found)
     if ordered:
         assert counts.reordered == 0
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"bandwidth_bit_s": LEAST_BANDWIDTH_BIT_S, "message_bytes": 65536},
+        {"bandwidth_bit_s": 1e12, "message_bytes": 1},
+        {"delay": LognormalDelay(kind="lognormal", mean_s=LEAST_MEAN_S, std_s=60.0)},
+        {"delay": LognormalDelay(kind="lognormal", mean_s=60.0, std_s=60.0)},
+        {"delay": NormalDelay(kind="normal", mean_s=60.0, std_s=60.0)},
+        {"partitions": (Partition(from_s=0.0, to_s=1e9),)},
+        {"distance": DistanceLoss(range_m=5e-324, exponent=100.0)},
+        {"distance": DistanceLoss(range_m=1e12, exponent=5e-324)},
+    ],
+    ids=str,
+)
+def test_effects_at_their_bounds_carry_messages(effects: dict[str, object]) -> None:
+    edge = channel(duplication=1.0, **effects)
+    for n in range(100):
+        edge.send(n * MS, n, distance_m=float(n))
+    edge.receive(60_100 * MS)
+    counts = edge.counts
+    assert counts.sent == 100
+    assert counts.delivered + counts.lost <= counts.sent + counts.duplicated
 
 
 @pytest.mark.parametrize("seed", ["1 r1 -> r2", "2 r1 -> r2"])
