@@ -39,6 +39,13 @@ def test_a_run_tells_whether_its_machine_stalled(
     assert why_again(tmp_path) == why
 
 
+def test_a_controller_that_stalled_is_an_excuse_and_one_that_was_stopped_is_none() -> None:
+    stopped = {"r1": "tick 900 (t = 4.500 s): left drive dropped out: WATCHDOG_TIMER_EXPIRED"}
+    assert stalled(QUIET | {"stopped_robots": stopped}) == ""
+    stopped["r1"] += "; this controller, or its machine, stalled for 0.79 s"
+    assert stalled(QUIET | {"stopped_robots": stopped}) == "a controller stalled"
+
+
 TESTS = """
 import json
 import pytest

@@ -3,8 +3,8 @@
     @pytest.mark.wall_clock     left out with -m "not wall_clock"
 
 Whether the machine stalled, the runs of the test say themselves, in the summaries that they left:
-`machine`, what the launcher saw of it, and `waits_s`, how long processes were kept from a
-processor. Where no run lived to say so, the load of the machine decides. A test that fails on a
+`machine`, what the launcher saw of it, the notices of controllers, and `waits_s`, how long processes
+were kept from a processor. Where no run lived to say so, the load of the machine decides. A test that fails on a
 machine that did not stall has failed.
 """
 
@@ -38,6 +38,9 @@ def stalled(summary: Summary) -> str:
         return f"the machine stalled for {machine['longest_stall_s']:.2f} s"
     if machine.get("plant_stalls"):
         return f"the plant stalled {len(machine['plant_stalls'])} times"
+    said = [*summary.get("stopped_robots", {}).values(), *summary.get("notices", {}).values()]
+    if any("or its machine, stalled" in str(text) for text in said):
+        return "a controller stalled"
     if machine.get("longest_late_s", 0.0) > LATE_S:
         return f"the launcher woke up {machine['longest_late_s']:.3f} s late"
     wall_s = max(summary["wall_s"] + summary["startup_s"] + summary["teardown_s"], 1e-3)
