@@ -3,9 +3,9 @@
     @pytest.mark.wall_clock     left out with -m "not wall_clock"
 
 Whether the machine stalled, the runs of the test say themselves, in the summaries that they left:
-`machine`, what the launcher saw of it, the notices of controllers, and `waits_s`, how long processes
-were kept from a processor. Where no run lived to say so, the load of the machine decides. A test that fails on a
-machine that did not stall has failed.
+`machine`, what the launcher saw of it, the notices of controllers, and `waits_s`, how long
+processes were kept from a processor. Where no run lived to say so, the load of the machine decides.
+A test that fails on a machine that did not stall has failed.
 """
 
 import json
