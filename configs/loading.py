@@ -39,8 +39,12 @@ def load(source: str | Path, overrides: Sequence[str | Override] = ()) -> Scenar
         ScenarioError: no such scenario, or all that is wrong with it, a line each.
     """
     name, text = _read(str(source))
-    folder = "" if str(source) in shipped() else str(Path(source).parent)
-    return loads(name, text, overrides, folder=folder)
+    return loads(name, text, overrides, folder=folder_of(source))
+
+
+def folder_of(source: str | Path) -> str:
+    """Where modules of one's own are looked for first; of a shipped scenario the current folder."""
+    return "" if str(source) in shipped() else str(Path(source).parent)
 
 
 def loads(

@@ -34,6 +34,7 @@ LAWS = {
     "adaptive_dsc_robust": "agents.laws.adaptive_dsc_robust:AdaptiveDscRobust",
     "fixed_dsc": "agents.laws.fixed_dsc:FixedDsc",
     "backstepping_analytic": "agents.laws.backstepping_analytic:BacksteppingAnalytic",
+    "backstepping_numeric": "agents.laws.backstepping_numeric:BacksteppingNumeric",
 }
 """The laws that are shipped: class by name."""
 

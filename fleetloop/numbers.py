@@ -1,7 +1,7 @@
 """Values of options: bounds, and messages in this program's wording."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import typer
@@ -54,3 +54,11 @@ def speed(value: float) -> float:
         remedy = f"must be 0 (as fast as the machine allows), or from {SLOWEST:g} to {FASTEST:g}."
         raise typer.BadParameter(f"{value:g}: {remedy}")
     return value
+
+
+def seeds(texts: Sequence[str]) -> tuple[int, ...]:
+    """Seeds from their texts, each once; their bounds are the scenario's."""
+    wrong = next((text for text in texts if not text.isdecimal()), None)
+    if wrong is not None:
+        raise typer.BadParameter(f"{wrong}: a seed is a whole number, 0 or more.")
+    return tuple(dict.fromkeys(map(int, texts)))

@@ -106,7 +106,7 @@ def run_scenario(source: str, options: RunOptions) -> int:
         try:
             run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
             if options.in_process:
-                stats = _in_process(scenario, folder, on_progress, on_notice, stop)
+                stats = run_in_process(scenario, folder, on_progress, on_notice, stop)
             else:
                 run = ProcessRun(
                     scenario,
@@ -165,13 +165,18 @@ def _deployment(scenario: Scenario, options: RunOptions) -> Deployment:
     return load_deployment(options.deployment, scenario)
 
 
-def _in_process(
+def run_in_process(
     scenario: Scenario,
     folder: Path,
     on_progress: Callable[[Progress], None],
     on_notice: Callable[[str, str], None],
     stop: Stop,
 ) -> RunStats:
+    """Run all roles in this process and write the record into the run's folder.
+
+    Raises:
+        InfrastructureError: the record can't be written, or the run could not start.
+    """
     network = NetworkLink("in-process", "", "", "")
     began = SYSTEM_CLOCK.monotonic_s()
     record = folder / run_folder.RECORD

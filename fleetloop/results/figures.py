@@ -41,7 +41,7 @@ from fleetloop.results.summary import leader_speed
 
 _COLUMNS, _PANEL_IN, _TITLE_IN, _STRETCHES = 3, 1.1, 0.5, 300
 """Of the figure of the laws' signals."""
-_STYLE: Any = {
+STYLE: Any = {
     "font.size": 9,
     "axes.grid": True,
     "grid.alpha": 0.3,
@@ -66,7 +66,7 @@ def all_figures(record: Record, scenario: Scenario) -> list[Captioned]:
 
     Each robot is drawn up to its own end; an edge's difference while both its ends are there.
     """
-    with mpl.rc_context(_STYLE), np.errstate(all="ignore"):
+    with mpl.rc_context(STYLE), np.errstate(all="ignore"):
         chosen = list(_FIGURES)
         if any(map(law_table, record.signals.values())):
             chosen.append(_LAW)

@@ -55,7 +55,7 @@ def write_report(run: Path, record: Record | None = None) -> Path:
     if scenario.names != record.robots:
         raise ScenarioError(f"{path}: rows of {record.robots}, but a scenario of {scenario.names}")
     summary = _summary(path.parent, record, scenario)
-    figures = [(item, _png(item)) for item in all_figures(record, scenario)]
+    figures = [(item, png(item)) for item in all_figures(record, scenario)]
     folder = path.parent / FIGURES
     try:
         folder.mkdir(exist_ok=True)
@@ -76,7 +76,8 @@ def _summary(folder: Path, record: Record, scenario: Scenario) -> Summary:
     return summary
 
 
-def _png(item: Captioned) -> bytes:
+def png(item: Captioned) -> bytes:
+    """A figure as a PNG file."""
     buffer = BytesIO()
     # No software name or date in the file: equal runs make equal figures.
     item.figure.savefig(buffer, format="png", metadata={"Software": None})
@@ -99,13 +100,13 @@ def _page(
         verdict_class=summary["verdict"].replace(" ", "-"),
         reason=escape(summary["reason"]),
         troubles=_list(trouble_lines(summary)),
-        robots=_table(robot_header(), robot_rows(summary)),
+        robots=table_tag(robot_header(), robot_rows(summary)),
         spread=escape(f"{final_line(summary)}. {spread_line(summary)}"),
-        expectations=_table(
+        expectations=table_tag(
             ("", "expectation"), ((mark(item), claim(item)) for item in summary["expectations"])
         ),
-        figures="\n".join(_figure(item, data) for item, data in figures),
-        facts=_table(("", ""), _facts(summary)),
+        figures="\n".join(figure_tag(item, data) for item, data in figures),
+        facts=table_tag(("", ""), _facts(summary)),
         scenario=escape(record.scenario_toml),
     )
 
@@ -132,7 +133,8 @@ def _facts(summary: Summary) -> Iterable[tuple[str, str]]:
     yield "versions", ", ".join(versions)
 
 
-def _figure(item: Captioned, data: bytes) -> str:
+def figure_tag(item: Captioned, data: bytes) -> str:
+    """A figure within a page."""
     text = escape(item.caption)
     source = f"data:image/png;base64,{base64.b64encode(data).decode()}"
     return f'<figure><img alt="{text}" src="{source}"><figcaption>{text}</figcaption></figure>'
@@ -143,7 +145,8 @@ def _list(lines: Iterable[str]) -> str:
     return f'<h2>What went wrong</h2><ul class="troubles">{items}</ul>' if items else ""
 
 
-def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def table_tag(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table within a page; one of two columns is text."""
     css = ' class="text"' if len(header) == 2 else ""
     head = "".join(f"<th{css}>{escape(cell)}</th>" for cell in header)
     lines = ("".join(f"<td{css}>{escape(cell)}</td>" for cell in row) for row in rows)

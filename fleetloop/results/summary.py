@@ -120,14 +120,15 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
 
 def to_json(summary: Summary) -> str:
     """summary.json's text; a number that isn't finite, as after a law that diverged, is null."""
-    return json.dumps(_finite(summary), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(finite(summary), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
+    """Tables and lists with None for every number that isn't finite."""
     if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 

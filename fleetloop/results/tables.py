@@ -37,7 +37,7 @@ def print_results(summary: Summary, folder: Path) -> None:
 
     if summary["robots"]:
         title = f"{summary['scenario']}: path following, {summary['mode']}"
-        table = Table(title=title, box=_rules(), padding=(0, 1, 0, 0), pad_edge=False)
+        table = Table(title=title, box=table_box(), padding=(0, 1, 0, 0), pad_edge=False)
         first, *others = robot_header(break_lines=True)
         table.add_column(first, no_wrap=True)
         for header in others:
@@ -78,7 +78,7 @@ def _profile(profile: dict[str, dict[str, float]]) -> Table:
     """Processor time per tick, processes by parts."""
     parts = [part for part in PARTS if any(part in shares for shares in profile.values())]
     title = "processor time per tick [µs]; bus with its system calls, Zenoh with its threads"
-    table = Table(title=title, box=_rules(), pad_edge=False)
+    table = Table(title=title, box=table_box(), pad_edge=False)
     table.add_column("process", no_wrap=True)
     for name in (*parts, "all"):
         table.add_column(name, justify="right")
@@ -119,9 +119,9 @@ def spread_line(summary: Summary) -> str:
         return ""
     first = min(summary["robots"].values(), key=lambda values: values["ticks"])
     return (
-        f"spread of s{_early(summary, first, ' up to')}: peak {_number(spread['peak'], '.4f')} m,"
-        f" settled {_time(spread['settle_s'])},"
-        f" final {_number(spread['final'], '.2e')} m"
+        f"spread of s{_early(summary, first, ' up to')}: peak {number(spread['peak'], '.4f')} m,"
+        f" settled {settled_at(spread['settle_s'])},"
+        f" final {number(spread['final'], '.2e')} m"
     )
 
 
@@ -231,7 +231,7 @@ def claim(expect: dict[str, Any]) -> str:
     shown = "nothing"
     if found is not None:
         shown = ", ".join(
-            f"{k} {_number(found[k], '.3g')}" for k in ("max_abs", "min", "max") if k in expect
+            f"{k} {number(found[k], '.3g')}" for k in ("max_abs", "min", "max") if k in expect
         )
     if expect["held"] is None:
         shown += f"; seen to {expect['seen_to_s']:.6g} s only"
@@ -243,19 +243,21 @@ def claim(expect: dict[str, Any]) -> str:
 
 
 def _cells(values: dict[str, Any]) -> list[str]:
-    settles = [_time(values["settle_s"][name]) for name in ERRORS]
-    finals = [_number(values["final_max"][name], ".5f") for name in ERRORS]
-    return [*settles, *finals, _number(values["peak_torque_wheel_N_m"], ".2f")]
+    settles = [settled_at(values["settle_s"][name]) for name in ERRORS]
+    finals = [number(values["final_max"][name], ".5f") for name in ERRORS]
+    return [*settles, *finals, number(values["peak_torque_wheel_N_m"], ".2f")]
 
 
-def _number(value: float | None, spec: str) -> str:
+def number(value: float | None, spec: str) -> str:
     """A number, or that it is none: of what a law that diverged says nothing is known."""
     return "no number" if value is None or not isfinite(value) else format(value, spec)
 
 
-def _time(value: float | None) -> str:
+def settled_at(value: float | None) -> str:
+    """A settle time; None is never."""
     return "never" if value is None else f"{value:.2f} s"
 
 
-def _rules() -> box.Box:
+def table_box() -> box.Box:
+    """The rules of a table, as far as standard output has the characters."""
     return _RULE if ResultConsole().options.ascii_only else box.SIMPLE_HEAD

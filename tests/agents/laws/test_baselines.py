@@ -1,5 +1,6 @@
-"""The baselines: fixed parameters, and backstepping with analytic derivatives."""
+"""The baselines: fixed parameters, and backstepping with analytic and numerical derivatives."""
 
+from itertools import pairwise
 from math import cos, sin
 
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import strategies as st
 
 from agents.laws.adaptive_dsc import AdaptiveDsc
 from agents.laws.backstepping_analytic import BacksteppingAnalytic
+from agents.laws.backstepping_numeric import BacksteppingNumeric
 from agents.laws.fixed_dsc import PAPER_THETA, FixedDsc
 from agents.laws.interface import PathVariable, RobotMotion, Wheels
 from agents.laws.path_errors import path_errors
@@ -103,3 +105,49 @@ def test_with_true_parameters_errors_vanish_with_no_lag_of_filters() -> None:
     _, error = run(backstepping(), 15.0)
     _, filtered = run(fixed(1.0), 15.0)
     assert error < 0.3 * filtered
+
+
+def numeric() -> BacksteppingNumeric:
+    return BacksteppingNumeric(BacksteppingNumeric.Gains(), WHEELS, H, PATH)
+
+
+@given(near, near, st.floats(0, 20))
+def test_differences_are_the_analytic_derivatives_near_the_path(
+    off_x: float, off_y: float, s: float
+) -> None:
+    """Along a motion of constant speeds, to first order in the period."""
+    law, exact, s_dot, v, omega = numeric(), backstepping(), 0.6, 0.5, 0.3
+    memory, out = None, None
+    for k in range(3):
+        t, reference = k * H, PATH(s + s_dot * k * H)
+        mean, theta = 0.5 * omega * t, omega * t
+        x, y = PATH(s).x + off_x + v * t * cos(mean), PATH(s).y + off_y + v * t * sin(mean)
+        motion = RobotMotion(x, y, theta, v, omega)
+        out = law.step(memory, motion, reference, PathVariable(s + s_dot * t, s_dot, 0.0))
+        memory = out.state
+    errors = path_errors(*motion[:3], *reference[:3])
+    place = PathVariable(s + s_dot * 2 * H, s_dot, 0.0)
+    v_bar, v_rate, *_ = exact.virtual(errors, v, omega, reference, place)
+    assert out.signals[3] == pytest.approx(v_bar, rel=1e-12)
+    assert out.signals[5] == pytest.approx(v_rate, abs=0.02)
+
+
+def test_a_millimetre_on_the_pose_is_newton_metres_for_differences_not_for_filters() -> None:
+    """A pose that jumps by 1 mm once, on the path and at its speed."""
+
+    def jump(law) -> float:
+        """Largest change of torque from a tick to the next [N·m]."""
+        memory, torques = None, []
+        for k in range(20):
+            s = 0.6 * k * H
+            here = PATH(s)
+            y = here.y + (0.001 if k >= 10 else 0.0)
+            speeds = 0.6 * here.v_bar, 0.6 * here.omega_bar
+            motion = RobotMotion(here.x, y, here.theta, *speeds)
+            out = law.step(memory, motion, here, PathVariable(s, 0.6, 0.0))
+            torques.append(out.tau_right)
+            memory = out.state
+        return max(abs(after - before) for before, after in pairwise(torques[5:]))
+
+    assert jump(numeric()) > 10.0 * jump(fixed(1.0)) > 0.0
+    assert jump(numeric()) > 10.0

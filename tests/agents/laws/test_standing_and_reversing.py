@@ -5,6 +5,7 @@ import pytest
 from agents.laws.adaptive_dsc import AdaptiveDsc
 from agents.laws.adaptive_dsc_robust import AdaptiveDscRobust
 from agents.laws.backstepping_analytic import BacksteppingAnalytic
+from agents.laws.backstepping_numeric import BacksteppingNumeric
 from agents.laws.fixed_dsc import FixedDsc
 from agents.laws.interface import PathVariable, RobotMotion, Wheels
 from agents.paths import robot_path
@@ -22,7 +23,7 @@ BODY = RigidBody(PLANT.body, PLANT.disturbance)
 PATH = robot_path(reference_path(PAPER.path), World(kind="world", y_m=2.0))
 H = 0.001
 SHIPPED = pytest.mark.parametrize(
-    "law", [AdaptiveDsc, AdaptiveDscRobust, FixedDsc, BacksteppingAnalytic]
+    "law", [AdaptiveDsc, AdaptiveDscRobust, FixedDsc, BacksteppingAnalytic, BacksteppingNumeric]
 )
 
 

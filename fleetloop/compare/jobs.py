@@ -1,0 +1,114 @@
+"""The jobs of a comparison, as the process that does one gets them, and what each brings.
+
+A scenario travels as text: a process loads it, and its laws, as `fleetloop run` does.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from bridge.network.messages import Progress
+from bridge.process.lifecycle import Stop
+from configs.loading import loads, to_toml
+from configs.scenario import Scenario
+from fleetloop.compare.measures import Course, Measures, courses, measures
+from fleetloop.compare.step_cost import Sample, StepCost, samples, step_costs
+from fleetloop.launch.run import run_in_process
+from fleetloop.record.reader import Record
+from fleetloop.results import run_folder
+from fleetloop.results.summary import Summary, summarise, to_json
+
+Tell = Callable[[object], None]
+"""Says that a job goes on: a `Progress`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A scenario on its way to another process."""
+
+    toml: str
+    folder: str
+
+    @classmethod
+    def of(cls, scenario: Scenario, folder: str) -> "Told":
+        """Of a scenario whose own laws and shapes are in this folder."""
+        return cls(to_toml(scenario), folder)
+
+    def scenario(self) -> Scenario:
+        """The scenario again."""
+        return loads(run_folder.SCENARIO, self.toml, folder=self.folder)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a run came to."""
+
+    summary: Summary
+    measures: Measures | None = None
+    """None: no robot had a tick."""
+    courses: Mapping[str, Course] | None = None
+    samples: tuple[Sample, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One law, one seed: a run in its process, with its folder."""
+
+    told: Told
+    folder: Path
+    keep_record: bool
+
+    def work(self, tell: Tell, stop: Stop) -> Outcome:
+        """Run, measure, write scenario.toml and summary.json.
+
+        Raises:
+            ScenarioError, InfrastructureError: the run could not start, or ended early.
+        """
+        scenario = self.told.scenario()
+        self.folder.mkdir(parents=True)
+        run_folder.write(self.folder / run_folder.SCENARIO, to_toml(scenario))
+
+        def on_progress(progress: Progress) -> None:
+            tell(progress)
+
+        if not self.keep_record:
+            scenario = scenario.model_copy(update={"bus": replace(scenario.bus, record=())})
+        stats = run_in_process(scenario, self.folder, on_progress, lambda *_: None, stop)
+        path = self.folder / run_folder.RECORD
+        record = Record.open(path)
+        summary = summarise(record, scenario, stats)
+        run_folder.write(self.folder / run_folder.SUMMARY, to_json(summary))
+        if not self.keep_record:
+            path.unlink()
+        if not summary["robots"]:
+            return Outcome(summary)
+        return Outcome(
+            summary,
+            measures(record, scenario, summary),
+            courses(record, scenario),
+            tuple(samples(record)),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class CostOfSteps:
+    """The laws in turn, in one process."""
+
+    told: Mapping[str, Told]
+    samples: tuple[Sample, ...]
+
+    def work(self, tell: Tell, stop: Stop) -> dict[str, StepCost]:  # noqa: ARG002 - it is short
+        """Cost by label."""
+        scenarios = {label: told.scenario() for label, told in self.told.items()}
+        return step_costs(scenarios, self.samples)
+
+
+Job = Trial | CostOfSteps
+
+
+@dataclass(frozen=True, slots=True)
+class Brief:
+    """A job, and the descriptor on which its process tells of it."""
+
+    job: Job
+    tell_fd: int
