@@ -9,6 +9,7 @@
     STOPPED    no obstacle for `rearm_after`, and rearm allowed   REARMING   torque 0; idle
     REARMING   both drives in closed loop without error           DRIVING    arming frames, torque 0
     REARMING   an obstacle, or `rearm_limit`                      STOPPED    torque 0, idle
+    DRIVING…   the tick at which the robot leaves                 LEFT       torque 0, idle
     any        the closing tick, or told to stop                  DONE       torque 0, idle (estop)
 
 A fault is a drive that drops out or falls silent, two senders of a drive's telemetry, a bus that
@@ -20,8 +21,13 @@ errors that a host may clear by itself; an error before tick 0 that a person mus
 cleared again. After rearming the first set-point is 0, the limiter starts from 0 and the law from
 its first tick.
 
+A robot that joins late stands until then: in phase DRIVING, torque 0, its law not called. It
+listens, and so that nothing jumps for the others it takes its path variable from what it hears
+(`agents.joining`). After it has left nobody hears it.
+
 A stopped robot goes on sharing its path variable, so that its neighbours aren't cut off. A dry run
 goes through the same phases without a frame. Its only inputs are frames, messages, tick numbers.
+One file: a control period is read in one place.
 """
 
 from collections.abc import Sequence
@@ -33,6 +39,7 @@ from agents.coordination import CoordinationState, Coordinator
 from agents.emulated_network import HERE, EmulatedNetwork
 from agents.guard import UNCHANGED, Guard, Phase, TorqueOutcome
 from agents.in_edges import InEdges
+from agents.joining import joining
 from agents.laws.build import build
 from agents.laws.failure import DIVERGED, failure
 from agents.laws.interface import PathVariable, Reference, RobotMotion
@@ -82,6 +89,8 @@ class Agent:
         self._edges = InEdges(brief.hears, brief.leader_link, self._neighbours)
         start = brief.coordination
         self._coordination = CoordinationState(start.v_hat_0, start.mu_0, brief.s_0)
+        self._start = self._coordination
+        self._joins, self._leaves = brief.membership.joins_tick, brief.membership.leaves_tick
         self.feedback_since = self._drives.feedback_since
         """Whether both encoder frames were received after a bus time [ns]."""
         self._diverged = False  # the next path variable is beyond reach
@@ -225,7 +234,9 @@ class Agent:
             return self._guard.shut_down()
         if not self._guard.begun:
             self._guard.begin(tick)
-        return self._control(tick, motion)
+        if self._joins <= tick < self._leaves:
+            return self._control(tick, motion)
+        return self._stand_by(tick, motion)
 
     def _receive_due(self, robot: str, state: PathState) -> None:
         """Hand a path state on, through its emulated edge if it has one."""
@@ -298,10 +309,7 @@ class Agent:
         v_hat, mu, s = coordination = self._coordination
         s_dot = mu + v_hat
         sums = self._neighbours.sums(t_ns, s)
-        if self._network is not None:
-            v_r = self._network.leader_speed(tick, self._leader, v_hat)
-        else:
-            v_r = speed_at(self._leader.changes, t_ns) if self._leader is not None else 0.0
+        v_r = self._leader_speed(tick, v_hat)
         after = self._coordinator.advance(coordination, sums, self._edges.h, v_r)
         along = _new(PathVariable, (s, s_dot, (after[0] + after[1] - s_dot) / self._h))
         guard = self._guard
@@ -329,6 +337,38 @@ class Agent:
             signals = (*self._neighbours.ages_s(t_ns), *signals)
         sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
         self._rows.add(tick, (*used, *signals, *sent))
+        return frames
+
+    def _leader_speed(self, tick: int, without: float) -> float:
+        """v_r as it is heard; `without`: nothing heard over an emulated edge."""
+        if self._network is not None:
+            return self._network.leader_speed(tick, self._leader, without)
+        if self._leader is None:
+            return 0.0
+        return speed_at(self._leader.changes, tick * self._schedule.period_ns)
+
+    def _stand_by(self, tick: int, motion: RobotMotion) -> Sequence[Frame]:
+        """One tick before the robot joins the formation, or after it has left."""
+        t_ns = tick * self._schedule.period_ns
+        v_r = self._leader_speed(tick, self._coordination.v_hat)
+        if tick >= self._leaves:
+            frames = self._guard.leave(tick)
+        else:
+            frames = self._guard.command(tick, 0.0, 0.0)
+            after = joining(
+                self._neighbours,
+                t_ns + self._schedule.period_ns,
+                self._edges.h,
+                v_r,
+                self._start,
+            )
+            self._accept_path_variable(t_ns * 1e-9 + self._h, after)
+            if tick + 1 == self._joins:
+                self._guard.note_joining(self._joins, self._coordination.s)
+        ages = self._neighbours.ages_s(t_ns) if self._records_ages else ()
+        sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
+        row = (t_ns * 1e-9, *motion, nan, nan, nan, nan, 0, nan, nan, nan)
+        self._rows.add(tick, (*row, *ages, *self._no_signals, *sent))
         return frames
 
     def _accept_path_variable(self, t_s: float, after: CoordinationState) -> None:

@@ -29,6 +29,7 @@ class Phase(Enum):
     DRIVING = auto()
     STOPPED = auto()
     REARMING = auto()
+    LEFT = auto()
     DONE = auto()
 
 
@@ -125,6 +126,10 @@ class Guard:
         elif self.phase is Phase.REARMING:
             self._stop(tick, "could not arm again: a frame of it was not sent")
 
+    def note_joining(self, tick: int, s: float) -> None:
+        """Note that the robot joins the formation at a tick."""
+        self._announce(f"{self._when(tick)}: joins the formation at s = {s:.4g} m")
+
     # --- before tick 0 ---------------------------------------------------------------------------
 
     def arm(self, tick: int) -> Sequence[Frame]:
@@ -192,6 +197,14 @@ class Guard:
                 self.outcome = TorqueOutcome.LIMITED
             return drives.torque(*limited)
         return drives.torque(right_wheel_N_m, left_wheel_N_m)
+
+    def leave(self, tick: int) -> Sequence[Frame]:
+        """The frames of a robot that has left the formation: torque 0 and idle for both wheels."""
+        self.outcome = TorqueOutcome.WITHHELD
+        if self.phase is Phase.LEFT:
+            return self.drives.rest(self._bus_time_ns(tick))
+        self._change(tick, Phase.LEFT, "left the formation")
+        return self.drives.disarm()
 
     def shut_down(self) -> Sequence[Frame]:
         """Disarm for good; latched at the drives if the scenario wants that."""

@@ -126,6 +126,18 @@ class Neighbours:
             sum_v += weight * neighbour.v_hat
         return _new(Sums, (count, degree, sum_s, sum_v))
 
+    def carried_on(self, at_ns: int) -> tuple[float, float, float]:
+        """Σ a_ij, Σ a_ij s_j, Σ a_ij v̂_j with s_j carried on to an instant, as to extrapolate."""
+        degree = sum_s = sum_v = 0.0
+        for neighbour in self._in_order:
+            age = (at_ns - neighbour.t_ns) * 1e-9
+            if neighbour.heard and age <= self._silence_limit_s:
+                weight = neighbour.weight
+                degree += weight
+                sum_s += weight * (neighbour.s + neighbour.v_hat * min(age, self._age_limit_s))
+                sum_v += weight * neighbour.v_hat
+        return degree, sum_s, sum_v
+
     def ages_s(self, now_ns: int) -> list[float]:
         """Age of the newest path state of each neighbour [s], in the order of names.
 

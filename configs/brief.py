@@ -20,6 +20,7 @@ from configs.curves import FormationOffset, ReferencePath
 from configs.edges import InEdge
 from configs.host import Host
 from configs.leader_speed import SpeedChange
+from configs.membership import Membership
 from configs.netem import Effects
 from configs.parameters import Parameters
 from configs.plugins import Choice
@@ -168,6 +169,7 @@ class AgentBrief:
     offset: FormationOffset
     hears: tuple[InEdge, ...]  # of its in-neighbours, sorted: a_ij
     leader_link: InEdge | None  # h_i; None: it doesn't hear the leader
+    membership: Membership  # when it is part of the formation
     localisation: str  # "fused" | "external" | "odometry"
     schedule: Schedule
     drives: DriveLink

@@ -25,6 +25,7 @@ def cross_problems(scenario: Scenario) -> list[Problem]:
     problems = [
         *_names(scenario),
         *_leader(scenario),
+        *_members(scenario),
         *_laws(scenario),
         *_periods(scenario),
         *drive_problems(scenario),
@@ -81,6 +82,26 @@ def _leader(scenario: Scenario) -> Iterator[Problem]:
                 f" {one.ramp_s:g} to {other.t_s - one.t_s:g} or less"
             )
             yield Problem(f"leader.steps.{n}.t_s", other.t_s, remedy)
+
+
+def _members(scenario: Scenario) -> Iterator[Problem]:
+    """Times at which robots join and leave."""
+    period_s = scenario.clock.control_period_s
+    end_s = max(scenario.duration_s, scenario.ends_at_s)
+    for robot in scenario.robot:
+        where, joins_s, leaves_s = f"robot.{robot.name}", robot.joins_at_s, robot.leaves_at_s
+        yield from multiple_problem(f"{where}.joins_at_s", joins_s, period_s, least=0)
+        if leaves_s is not None:
+            yield from multiple_problem(f"{where}.leaves_at_s", leaves_s, period_s)
+            if leaves_s <= joins_s:
+                remedy = f"must be above joins_at_s = {joins_s:g}"
+                yield Problem(f"{where}.leaves_at_s", leaves_s, remedy)
+        if joins_s >= end_s:
+            remedy = f"the run ends before: must be below duration_s = {end_s:g}"
+            yield Problem(f"{where}.joins_at_s", joins_s, remedy)
+        if joins_s > 0.0 and (robot.v_m_s or robot.omega_rad_s):
+            remedy = "stands until it joins: must be 0, as omega_rad_s"
+            yield Problem(f"{where}.v_m_s", robot.v_m_s, remedy)
 
 
 def _laws(scenario: Scenario) -> Iterator[Problem]:
@@ -215,6 +236,12 @@ def _window(where: str, expect: Expect, scenario: Scenario) -> Iterator[Problem]
     elif ceil(expect.from_s / period_s - 1e-6) > floor(last_s / period_s + 1e-6):
         remedy = f"no tick from there to {last_s:g} s: they are {period_s:g} s apart"
         yield Problem(f"{where}.from_s", expect.from_s, remedy)
+    first, last = expect.from_s / period_s, last_s / period_s
+    absent = [r for r in expect.robots or () if r in scenario.names]
+    absent = [r for r in absent if not scenario.members[r].overlaps(first, last)]
+    if absent and expect.signal != SPREAD:
+        remedy = f"{', '.join(absent)} joins later or has left: nothing of it counts then"
+        yield Problem(f"{where}.robots", list(expect.robots or ()), remedy)
     if expect.to_s is not None and expect.to_s > end_s:
         remedy = f"the run ends before: at most duration_s = {end_s:g}, or leave it out: to the end"
         yield Problem(f"{where}.to_s", expect.to_s, remedy)

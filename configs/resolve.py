@@ -88,6 +88,7 @@ def agent_brief(
         offset=formation_offset(robot.offset),
         hears=graph.hears[name],
         leader_link=graph.links.get(name),
+        membership=scenario.members[name],
         localisation=scenario.localisation.source,
         schedule=ticks,
         drives=_drive_link(scenario, robot, drive),

@@ -13,10 +13,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from configs.choices import chosen_anew, shared_part
 from configs.drives import Drive
-from configs.edges import LEADER, Edge, parse_edge, presence
+from configs.edges import FOREVER, LEADER, Edge, parse_edge, presence
 from configs.graph import Graph, generated, of_matrix, random_rooted
 from configs.graph_section import GraphSection
 from configs.host import Host
+from configs.membership import Membership, attended
 from configs.netem import Effects
 from configs.parameters import Name, Seconds, Seed, changed
 from configs.paths import Cosine, PathShape
@@ -86,7 +87,7 @@ class Scenario(BaseModel):
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with these sections instead of its own; what was made of the old ones goes."""
         copied = super().model_copy(update=update, deep=deep)
-        for made in ("topology", "reach"):
+        for made in ("members", "topology", "reach"):
             copied.__dict__.pop(made, None)
         return copied
 
@@ -135,13 +136,28 @@ class Scenario(BaseModel):
         )
 
     @cached_property
+    def members(self) -> dict[str, Membership]:
+        """When each robot is part of the formation."""
+        period_s = self.clock.control_period_s
+        return {
+            robot.name: Membership(
+                joins_tick=round(robot.joins_at_s / period_s),
+                leaves_tick=FOREVER
+                if robot.leaves_at_s is None
+                else round(robot.leaves_at_s / period_s),
+            )
+            for robot in self.robot
+        }
+
+    @cached_property
     def topology(self) -> Graph:
         """The directed graph with its weights, its generator and its switching carried out."""
         graph, names = self.graph, self.names
         weights = self._weights()
         longest_s = max(self.duration_s, self.ends_at_s)
-        windows = switched(
-            self.first_edges, graph.switch, names, self.clock.control_period_s, longest_s
+        windows = attended(
+            switched(self.first_edges, graph.switch, names, self.clock.control_period_s, longest_s),
+            self.members,
         )
         made = Graph.of(
             names,

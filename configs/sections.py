@@ -157,6 +157,10 @@ class Robot(Parameters):
     control: Changes = parameter(Changes({}), "law and gains that differ from [control]")
     mounting: MountingChanges = parameter(MountingChanges(), "what differs from [mounting]")
     disturbance: Disturbance | None = None
+    joins_at_s: SecondsOrZero = parameter(
+        0.0, "until then it stands, armed, and isn't heard; its s begins at its neighbours' mean"
+    )
+    leaves_at_s: Seconds | None = parameter(None, "from then on it is idle, and isn't heard")
     bus: Name | None = parameter(None, "robots may share one; of its own if not given")
     right_node: Node | None = parameter(None, "[drive] right_node, + 2 per robot on its bus")
     left_node: Node | None = parameter(None, "[drive] left_node, + 2 per robot on its bus")

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from agents.coordination import matrix_exponential
 from configs.graph import Graph
 from configs.scenario import Scenario
+from fleetloop.results.expectations import spread_of
 from fleetloop.results.summary import leader_speed
 
 Matrix = NDArray[np.float64]
@@ -96,17 +97,18 @@ class Forecast:
     s_dot: Matrix
     v_hat: Matrix
     v_r: Matrix
+    there: NDArray[np.bool_]  # members of the formation
 
     @property
     def spread(self) -> Matrix:
-        """max_i s_i − min_i s_i at every instant."""
-        difference: Matrix = self.s.max(axis=1) - self.s.min(axis=1)
-        return difference
+        """max_i s_i − min_i s_i over the members at every instant."""
+        return spread_of(self.s, self.there)
 
     @property
     def speed_error(self) -> Matrix:
-        """max_i |v̂_i − v_r| at every instant."""
-        error: Matrix = np.abs(self.v_hat - self.v_r[:, None]).max(axis=1)
+        """max_i |v̂_i − v_r| over the members at every instant."""
+        apart: Matrix = np.where(self.there, np.abs(self.v_hat - self.v_r[:, None]), 0.0)
+        error: Matrix = apart.max(axis=1)
         return error
 
 
@@ -124,11 +126,13 @@ def forecast(scenario: Scenario) -> Forecast:
     times: Matrix = np.arange(steps, dtype=np.float64) * step_s
     speeds = leader_speed(scenario)(np.round(times * 1e9))
     states = np.empty((steps, count, 3))
+    ticks = np.rint(times / clock.control_period_s)
+    joins, leaves = np.array([(m.joins_tick, m.leaves_tick) for m in scenario.members.values()]).T
     told = state
     for n in range(steps):
         states[n] = state
         shares = n % per_share == 0
-        coupling.advance(round(times[n] / clock.control_period_s), shares=shares)
+        coupling.advance(int(ticks[n]), shares=shares)
         if shares:
             told, age_s = state, 0.0
         carried_on_s = min(age_s, gains.age_limit_s)
@@ -137,8 +141,22 @@ def forecast(scenario: Scenario) -> Forecast:
         table = coupling.tables(ageing=age_s < gains.age_limit_s)
         state = np.einsum("nij,nj->ni", table, inputs)
         age_s += step_s
+        if (waiting := ticks[n] < joins).any():
+            told_s = told[:, 2] + told[:, 0] * min(age_s, gains.age_limit_s)
+            mean = coupling.joining(told[:, 0], told_s, speeds[n])
+            state = np.where((waiting & coupling.hears)[:, None], mean, state)
+            state = np.where((waiting & ~coupling.hears)[:, None], states[0], state)
+        state[ticks[n] >= leaves, :2] = 0.0
     v_hat, mu, s = (states[:, :, n] for n in range(3))
-    return Forecast(times, s, v_hat + mu, v_hat, speeds)
+    return Forecast(times, s, v_hat + mu, v_hat, speeds, members_at(scenario, times))
+
+
+def members_at(scenario: Scenario, t_s: Matrix) -> NDArray[np.bool_]:
+    """(instants, robots): who is a member of the formation."""
+    ticks = np.rint(t_s / scenario.clock.control_period_s)[:, None]
+    joins, leaves = np.array([(m.joins_tick, m.leaves_tick) for m in scenario.members.values()]).T
+    there: NDArray[np.bool_] = (ticks >= joins) & (ticks < leaves)
+    return there
 
 
 class _Coupling:
@@ -167,6 +185,18 @@ class _Coupling:
             self.heard = self._there
         if self.heard is not before:
             self._tables = {}
+
+    @property
+    def hears(self) -> NDArray[np.bool_]:
+        """Robots that hear a neighbour."""
+        hears: NDArray[np.bool_] = self.heard.sum(axis=1) > 0.0
+        return hears
+
+    def joining(self, v_hat: Matrix, s: Matrix, v_r: float) -> Matrix:
+        """(N, 3): (v̂, μ, s) of robots that join, of those that hear (`agents.joining`)."""
+        degree = np.where(self.hears, self.heard.sum(axis=1), 1.0)
+        speed = (self.heard @ v_hat + self._h * v_r) / (degree + self._h)
+        return np.column_stack([speed, np.zeros_like(speed), self.heard @ s / degree])
 
     def tables(self, *, ageing: bool) -> Matrix:
         """As `_one_step`, of what is heard."""

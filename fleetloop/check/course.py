@@ -51,16 +51,18 @@ class Course:
 
 
 def courses(scenario: Scenario, ahead: Forecast) -> list[Course]:
-    """All robots' courses; their paths are regular."""
+    """The courses of all robots while they are members; their paths are regular."""
     every = max(1, len(ahead.t_s) * len(scenario.robot) // PLACES)
     found = []
     for n, robot in enumerate(scenario.robot):
         path = path_of(scenario, robot)
-        references = [path(float(s)) for s in ahead.s[::every, n]]
+        there = np.flatnonzero(ahead.there[::every, n]) * every
+        if not len(there):  # it joins after the forecast
+            there = np.array([len(ahead.t_s) - 1])
+        references = [path(float(s)) for s in ahead.s[there, n]]
         v_bar = np.array([reference.v_bar for reference in references])
         omega_bar = np.array([reference.omega_bar for reference in references])
-        s_dot = ahead.s_dot[::every, n]
-        t_s = ahead.t_s[::every]
+        s_dot, t_s = ahead.s_dot[there, n], ahead.t_s[there]
         place_m = np.array([(reference.x, reference.y) for reference in references])
         v, omega = v_bar * s_dot, omega_bar * s_dot
         found.append(Course(robot, t_s, v, omega, v_bar, omega_bar, place_m))

@@ -14,6 +14,7 @@ import numpy as np
 
 from agents.coordination import CoordinationState, Coordinator
 from agents.in_edges import InEdges
+from agents.joining import joining
 from agents.laws.interface import RobotPath
 from agents.neighbours import Neighbours
 from bridge.netem.channel import Channel
@@ -21,7 +22,7 @@ from configs.edges import LEADER, Edge
 from configs.emulated_edges import EmulatedEdge, edges_of, effects_of
 from configs.netem import LOCALISATION, Effects
 from configs.scenario import Scenario
-from fleetloop.check.coordination import HORIZON_S, STEP_S, Forecast, Matrix
+from fleetloop.check.coordination import HORIZON_S, STEP_S, Forecast, Matrix, members_at
 from fleetloop.results.summary import leader_speed
 
 WORK = 300_000
@@ -72,7 +73,14 @@ def emulated_forecast(scenario: Scenario, path_of: Callable[[str], RobotPath]) -
         ages[n] = fleet.advance(now_ns, float(speeds[n]), shares=n % per_share == 0)
     v_hat, mu, s = (states[:, :, n] for n in range(3))
     return EmulatedForecast(
-        t_s=times, s=s, s_dot=v_hat + mu, v_hat=v_hat, v_r=speeds, edges=fleet.edges, age_s=ages
+        t_s=times,
+        s=s,
+        s_dot=v_hat + mu,
+        v_hat=v_hat,
+        v_r=speeds,
+        there=members_at(scenario, times),
+        edges=fleet.edges,
+        age_s=ages,
     )
 
 
@@ -95,6 +103,8 @@ class _Fleet:
             robot.name: CoordinationState(gains.v_hat_0, gains.mu_0, robot.s_0)
             for robot in scenario.robot
         }
+        self._starts = dict(self._states)
+        self._members, self._step_ns = scenario.members, round(step_s * 1e9)
         effects = {edge: effects_of(scenario.network, edge) for edge in edges_of(graph)}
         self._channels: Mapping[EmulatedEdge, Channel[tuple[float, float]]] = {
             edge: Channel(of_edge, f"{scenario.seed} {edge.source} -> {edge.hearer}", 0)
@@ -127,8 +137,16 @@ class _Fleet:
         for robot, state in self._states.items():
             sums = self._hearing[robot].sums(now_ns, state.s)
             heard_v_r = self._leader_speed(robot, now_ns, v_r, state.v_hat)
-            h = self._edges_to[robot].h
-            self._states[robot] = self._coordinators[robot].advance(state, sums, h, heard_v_r)
+            h, member = self._edges_to[robot].h, self._members[robot]
+            if tick >= member.leaves_tick:
+                after = CoordinationState(0.0, 0.0, state.s)
+            elif tick < member.joins_tick:
+                next_ns = now_ns + self._step_ns
+                start = self._starts[robot]
+                after = joining(self._hearing[robot], next_ns, h, heard_v_r, start)
+            else:
+                after = self._coordinators[robot].advance(state, sums, h, heard_v_r)
+            self._states[robot] = after
         return ages
 
     def _exists(self, edge: EmulatedEdge, tick: int) -> bool:

@@ -13,6 +13,7 @@ from fleetloop.check.finding import Finding, alike, resting_on, worst
 from fleetloop.check.geometry import geometry_findings
 from fleetloop.check.graph import graph_findings
 from fleetloop.check.law import law_findings
+from fleetloop.check.membership import membership_findings
 from fleetloop.check.network import network_findings
 from fleetloop.check.sampling import sampling_findings
 from fleetloop.check.start import start_findings
@@ -40,6 +41,7 @@ def examine(source: str, scenario: Scenario, overrides: Overrides = ()) -> list[
     return alike(
         [
             *graph_findings(scenario, ahead),
+            *membership_findings(scenario),
             *network_findings(scenario, ahead),
             *shapes,
             *sampling_findings(scenario, along),

@@ -20,6 +20,7 @@ from fleetloop.check.coordination import Forecast
 from fleetloop.check.course import STANDS_STILL, Course, Series, path_of
 from fleetloop.check.finding import Finding
 
+AWAY_M = 1e9
 PLACES, LEAST_PLACES = 4_000, 40
 """Path points for the spacing at equal s, all robots together, about, and of each at least."""
 
@@ -63,7 +64,7 @@ def _spacing(scenario: Scenario, courses: Sequence[Course], ahead: Forecast) -> 
     bodies = [scenario.body_of(course.robot) for course in courses]
     radii = np.array([body.half_track_m + body.wheel_radius_m for body in bodies])
     equal_m, _ = closest(_places(scenario, ahead), radii)
-    on_the_way_m, pair = closest(np.stack([course.place_m for course in courses]), radii)
+    on_the_way_m, pair = closest(_together(courses), radii)
     one, other = (courses[n].robot.name for n in pair)
     value = f"{equal_m:.3g} m at equal s; {on_the_way_m:.3g} m on the way, {one} and {other}"
     limit = f"≥ {float(radii[pair[0]] + radii[pair[1]]):.3g} m, half tracks and wheels"
@@ -74,6 +75,16 @@ def _spacing(scenario: Scenario, courses: Sequence[Course], ahead: Forecast) -> 
     if equal_m >= radii[pair[0]] + radii[pair[1]]:
         remedy = "starts s_0 closer to each other, or coordination.v_hat_0 = leader.speed_m_s"
     return replace(fine, level="warning", key=f"robot.{other}", remedy=remedy)
+
+
+def _together(courses: Sequence[Course]) -> Series:
+    """(robots, instants, 2): where they are; far from all others while they aren't members."""
+    instants = np.unique(np.concatenate([course.t_s for course in courses]))
+    places_m = np.empty((len(courses), len(instants), 2))
+    for n, course in enumerate(courses):
+        places_m[n] = (n + 1) * AWAY_M
+        places_m[n, np.searchsorted(instants, course.t_s)] = course.place_m
+    return places_m
 
 
 def closest(places_m: Series, radii_m: Series) -> tuple[float, tuple[int, int]]:

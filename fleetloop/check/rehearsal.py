@@ -80,7 +80,10 @@ def rehearse(scenario: Scenario) -> list[Finding]:
     ]
     if not found:
         period_s = schedule(scenario).period_s
-        found = _errors(scenario.names, seen.rows, period_s, said, whole=whole)
+        rows = {r: part[scenario.members[r].ticks] for r, part in seen.rows.items()}
+        end = round(until_s / period_s)
+        stayed = [r for r, member in scenario.members.items() if member.leaves_tick >= end]
+        found = _errors(stayed, rows, period_s, said, whole=whole)
     return found or [Finding("ok", _TITLE, f"{said}: no robot stops")]
 
 
@@ -137,7 +140,7 @@ def _errors(
     *,
     whole: bool,
 ) -> list[Finding]:
-    """Robots that are off their paths, or apart, at the end of the rehearsal."""
+    """Those of `names` that are off their paths, or apart, at the end of the rehearsal."""
     found = []
     last = {
         robot: rows[robot][_final(rows[robot], period_s) :] for robot in names if len(rows[robot])
@@ -151,7 +154,7 @@ def _errors(
         found.append(
             Finding("error" if whole and error > LOST_M else "warning", _TITLE, text, (robot,))
         )
-    if whole and (apart := _apart(last)) > SETTLE_BAND:
+    if whole and last and (apart := _apart(last)) > SETTLE_BAND:
         text = f"{said}: path variables {apart:.2g} m apart at the end"
         found.append(Finding("warning", _TITLE, text))
     return found

@@ -1,4 +1,4 @@
-"""Findings about the first second, by integrating law and body alone from the start.
+"""Findings about the first second, by integrating law and body alone from the start, or joining.
 
     first torque    of the law at the start, k_4 k_1 |x_e(0)| / r of (34): what no drive has, is cut
     adaptation      the largest ratio of the law's own `AdaptationLimit`: not stable from 1 on
@@ -15,7 +15,6 @@ import numpy as np
 from agents.laws.build import build
 from agents.laws.failure import failure, raised
 from agents.laws.interface import AdaptationLimit, PathVariable, RobotMotion
-from agents.laws.path_errors import path_errors
 from configs.brief import Wheels
 from configs.errors import ScenarioError
 from configs.scenario import Scenario
@@ -39,6 +38,7 @@ _STEP_S = 0.005
 class _Start:
     """Observations of one robot's first second."""
 
+    off_m: float = 0.0
     asked_wheel_N_m: float = 0.0
     asked_at_s: float = 0.0
     ratio: float = 0.0  # of the adaptation limit
@@ -74,7 +74,7 @@ def _start(
     path = path_of(scenario, robot)
     law = build(control, Wheels(section.wheel_radius_m, section.half_track_m), h, path)
     most = min((bound.torque_wheel_N_m for bound in limits(scenario, robot)), default=inf)
-    instants = h * np.arange(ticks)
+    instants = robot.joins_at_s + h * np.arange(ticks)
     places = np.interp(instants, ahead.t_s, ahead.s[:, number]).tolist()
     speeds = np.interp(instants, ahead.t_s, ahead.s_dot[:, number]).tolist()
     pose = robot.pose
@@ -85,7 +85,10 @@ def _start(
     for tick, along in enumerate(zip(places, speeds, rates, strict=True)):
         motion = RobotMotion(state.x, state.y, state.theta, state.v, state.omega)
         try:
-            out = law.step(memory, motion, path(along[0]), PathVariable(*along))
+            reference = path(along[0])
+            if tick == 0:
+                seen.off_m = hypot(pose.x_m - reference.x, pose.y_m - reference.y)
+            out = law.step(memory, motion, reference, PathVariable(*along))
         except (Exception, SystemExit) as error:
             how, why = failure(error, control.name)
             seen.diverged_at_s, seen.failed = tick * h, f"{how}: {why}"
@@ -114,8 +117,7 @@ def _start(
 
 def _first_torque(scenario: Scenario, robot: Robot, seen: _Start, *, adapts: bool) -> Finding:
     title, basis = "first torques", "(34) at t = 0, k_4 k_1 |x_e(0)| / r"
-    x_e, y_e, _ = _errors(scenario, robot)
-    off = f"{hypot(x_e, y_e):.3g} m off the path"
+    off = f"{seen.off_m:.3g} m off the path"
     said = f"{off}: asks for {seen.asked_wheel_N_m:.3g} N·m {seen.asked_at_s:.3g} s after the start"
     # Of its own limit the law knows, and of the host's it is told (`Law.hold`).
     bounds = [
@@ -165,12 +167,4 @@ def _adaptation(robot: Robot, seen: _Start, limit: AdaptationLimit) -> Finding:
         limit=f"< 1 {limit.unit}",
         remedy="" if fine else limit.remedy,
         basis="(35) as sampled",
-    )
-
-
-def _errors(scenario: Scenario, robot: Robot) -> tuple[float, float, float]:
-    """(8) at the start."""
-    reference, pose = path_of(scenario, robot)(robot.s_0), robot.pose
-    return path_errors(
-        pose.x_m, pose.y_m, pose.theta_rad, reference.x, reference.y, reference.theta
     )

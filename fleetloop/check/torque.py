@@ -153,7 +153,8 @@ def _inertial(body: RigidBody, course: Course) -> Series:
         return np.zeros((len(course.t_s), 2))
     v, omega = course.v, course.omega
     rate_v, rate_omega = (np.gradient(x, course.t_s) for x in (v, omega))
-    rate_v[course.t_s < START_S] = rate_omega[course.t_s < START_S] = 0.0
+    starting = course.t_s - course.t_s[0] < START_S
+    rate_v[starting] = rate_omega[starting] = 0.0
     torques = np.column_stack(body.wheel_torques(v, omega, rate_v, rate_omega))
     speeds: Series = np.column_stack(body.wheel_speeds(v, omega))
     inertial: Series = torques - speeds * np.array(body.damping_wheel_N_m_s)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from configs.membership import ALWAYS, Membership
 from configs.scenario import Scenario
 from fleetloop.check.body import robot_body
 from fleetloop.check.loop import true_theta
@@ -39,7 +40,9 @@ class Course:
 
 def measures(record: Record, scenario: Scenario, summary: Summary) -> Measures:
     """Numbers of a run; at least one robot has a tick in its record."""
-    robots = _moving(record)
+    moving = _moving(record).items()
+    there = {robot: rows[scenario.members[robot].ticks] for robot, rows in moving}
+    robots = {robot: rows for robot, rows in there.items() if len(rows)}
     last = {robot: rows[_final(rows)] for robot, rows in robots.items()}
     worst = summary["worst"] or next(iter(summary["robots"].values()))
     along = summary["s_spread"] or {}
@@ -64,13 +67,14 @@ def measures(record: Record, scenario: Scenario, summary: Summary) -> Measures:
 
 def courses(record: Record, scenario: Scenario) -> dict[str, Course]:
     """Worst magnitudes over time: errors, spread, torque, and error of Θ̂ where it is recorded."""
-    robots = _moving(record)
+    moving = _moving(record)
+    robots = {robot: _as_member(rows, scenario.members[robot]) for robot, rows in moving.items()}
     t = max((rows["t_s"] for rows in robots.values()), key=len)
     with np.errstate(all="ignore"):
         found = {name: _worst([rows[name] for rows in robots.values()]) for name in ERRORS}
         found[TORQUE] = _worst(_torques(robots))
         if len(robots) > 1:
-            found[SPREAD] = spread(robots)
+            found[SPREAD] = spread(moving, scenario.members)
         if theta := _theta_errors(robots, scenario):
             found[THETA_ERROR] = _worst(theta)
         return {name: Course(*envelope(t[: len(v)], v)) for name, v in found.items()}
@@ -78,6 +82,18 @@ def courses(record: Record, scenario: Scenario) -> dict[str, Course]:
 
 def _moving(record: Record) -> dict[str, np.ndarray]:
     return {robot: rows for robot, rows in record.controller.items() if len(rows)}
+
+
+def _as_member(rows: np.ndarray, member: Membership) -> np.ndarray:
+    """The rows with 0 for what a robot doesn't have while it isn't part of the formation."""
+    if member == ALWAYS:
+        return rows
+    there = np.zeros(len(rows), dtype=bool)
+    there[member.ticks] = True
+    found = rows.copy()
+    for name in set(rows.dtype.names or ()).difference(("tick", "t_s")):
+        found[name] = np.where(there, rows[name], 0)
+    return found
 
 
 def _final(rows: np.ndarray) -> slice:

@@ -10,12 +10,13 @@ not checked  else, if an expectation was not reached, a robot was cut short, or 
 held         else
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from configs.membership import ALWAYS, Membership
 from configs.scenario import Scenario
 from configs.sections import Expect
 from configs.signals import PLANT_SIGNALS, SPREAD
@@ -27,23 +28,40 @@ Judged = dict[str, Any]
 """An expectation with `held` (None: not reached), `found` and, if not reached, `seen_to_s`."""
 
 
-def spread(controllers: dict[str, np.ndarray]) -> np.ndarray:
-    """max_i s_i − min_i s_i at every tick at which all of them have a row."""
+def spread(controllers: Mapping[str, np.ndarray], members: Mapping[str, Membership]) -> np.ndarray:
+    """max_i s_i − min_i s_i over the members at every tick at which all robots have a row."""
     ticks = min(len(rows) for rows in controllers.values())
-    s = np.stack([rows["s"][:ticks] for rows in controllers.values()])
-    difference: np.ndarray = s.max(axis=0) - s.min(axis=0)
+    there = np.zeros((ticks, len(controllers)), dtype=bool)
+    for column, robot in enumerate(controllers):
+        there[members[robot].ticks, column] = True
+    return spread_of(np.stack([rows["s"][:ticks] for rows in controllers.values()], 1), there)
+
+
+def spread_of(s: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """Max − min of each row over those that are there, 0 without any."""
+    most = np.where(there, s, -np.inf).max(axis=1)
+    least = np.where(there, s, np.inf).min(axis=1)
+    difference: np.ndarray = np.where(there.any(axis=1), most - least, 0.0)
     return difference
 
 
 def judge(expect: Expect, record: Record, scenario: Scenario) -> Judged:
-    """Compare an expectation with the record."""
+    """Compare an expectation with the record; a robot counts while it is a member."""
+    period_s = scenario.clock.control_period_s
     end_s = scenario.ends_at_s if expect.to_s is None else expect.to_s
-    series = _series(expect, record)
-    parts = [v[(t >= expect.from_s) & (t <= end_s)] for t, v in series]
-    values = np.concatenate(parts)
-    seen_to_s = min(float(t[-1]) if len(t) else 0.0 for t, _ in series)
-    # The last tick of a window may be up to a period before its end.
-    whole = all(map(len, parts)) and seen_to_s > end_s - 1.01 * scenario.clock.control_period_s
+    parts, seen_s, whole = [], [], True
+    for member, t, series in _series(expect, record, scenario):
+        to_s = min(end_s, member.leaves_tick * period_s)
+        if not member.overlaps(expect.from_s / period_s, end_s / period_s):
+            continue
+        chosen = np.zeros(len(t), dtype=bool)
+        chosen[member.ticks] = True
+        part = series[chosen & (t >= expect.from_s) & (t <= end_s)]
+        seen_s.append(float(t[-1]) if len(t) else 0.0)
+        # The last tick of a window may be up to a period before its end.
+        whole &= len(part) > 0 and seen_s[-1] > to_s - 1.01 * period_s
+        parts.append(part)
+    values = np.concatenate(parts) if parts else np.empty(0)
     judged: Judged = {k: v for k, v in asdict(expect).items() if v is not None}
     judged |= {"held": None, "found": None}
     if len(values):
@@ -51,7 +69,11 @@ def judge(expect: Expect, record: Record, scenario: Scenario) -> Judged:
         found |= {"min": float(values.min()), "max": float(values.max())}
         held = _within(expect, values, found)
         judged |= {"held": held if whole or not held else None, "found": found}
-    return judged if judged["held"] is not None else judged | {"seen_to_s": round(seen_to_s, 9)}
+    return (
+        judged
+        if judged["held"] is not None
+        else judged | {"seen_to_s": round(min(seen_s, default=0.0), 9)}
+    )
 
 
 def verdict(expected: Sequence[Judged], *, stopped: bool, cut_short: bool) -> str:
@@ -85,15 +107,21 @@ def out_of_reach(scenario: Scenario) -> list[str]:
     return lines
 
 
-def _series(expect: Expect, record: Record) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Times and values, one pair per robot; of a spread one for all."""
+def _series(
+    expect: Expect, record: Record, scenario: Scenario
+) -> list[tuple[Membership, np.ndarray, np.ndarray]]:
+    """When it counts, times and values, one row per robot; of a spread one for all."""
     robots = expect.robots or record.robots
     if expect.signal == SPREAD:
-        values = spread({robot: record.controller[robot] for robot in robots})
-        return [(record.controller[robots[0]]["t_s"][: len(values)], values)]
+        rows = {robot: record.controller[robot] for robot in robots}
+        values = spread(rows, scenario.members)
+        return [(ALWAYS, rows[robots[0]]["t_s"][: len(values)], values)]
     source = record.plant if expect.signal in _OF_PLANT else record.controller
     having = [robot for robot in robots if expect.signal in (source[robot].dtype.names or ())]
-    return [(source[robot]["t_s"], source[robot][expect.signal]) for robot in having]
+    return [
+        (scenario.members[robot], source[robot]["t_s"], source[robot][expect.signal])
+        for robot in having
+    ]
 
 
 def _within(expect: Expect, values: np.ndarray, found: dict[str, float]) -> bool:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from configs.leader_speed import speed_at
+from configs.membership import Membership
 from configs.resolve import leader_brief
 from configs.roles import LAUNCHER, RECORDER
 from configs.scenario import Scenario
@@ -74,7 +75,11 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
             reason = why_not_checked(expected, cut_short)
     longest = max(controllers.values(), key=len, default=None)
     v_r = np.empty(0) if longest is None else leader_speed(scenario)(_nanoseconds(longest["t_s"]))
-    robots = {robot: _robot(rows, v_r) for robot, rows in controllers.items()}
+    robots = {
+        robot: _robot(rows, v_r, member, scenario.clock.control_period_s)
+        for robot, rows in controllers.items()
+        if len(rows[(member := scenario.members[robot]).ticks])
+    }
     simulated_s = round(ticks * scenario.clock.control_period_s, 9)
     return {
         "verdict": verdict,
@@ -90,7 +95,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         "teardown_s": round(stats.teardown_s, 3),
         "robots": robots,
         "worst": _worst(list(robots.values())),
-        "s_spread": _spread_of(record.controller),
+        "s_spread": _spread_of(record.controller, scenario.members),
         "expectations": expected,
         "cut_short": cut_short,
         "record_lost": record.shortage(),
@@ -167,16 +172,23 @@ def _nanoseconds(t_s: np.ndarray) -> np.ndarray:
     return rounded
 
 
-def _robot(rows: np.ndarray, v_r: np.ndarray) -> dict[str, Any]:
+def _robot(
+    rows: np.ndarray, v_r: np.ndarray, member: Membership, period_s: float
+) -> dict[str, Any]:
+    """Of one robot while it is a member of the formation."""
+    ticks = min(len(rows), member.leaves_tick)
+    rows, v_r = rows[member.ticks], v_r[: len(rows)][member.ticks]
     t, last = rows["t_s"], _final(rows["t_s"])
     torque = max(_peak(rows["tau_right_wheel_N_m"]), _peak(rows["tau_left_wheel_N_m"]))
     return {
-        "ticks": len(rows),
+        "ticks": ticks,
+        "joined_s": _seconds(member.joins_tick * period_s),
+        "left_s": _seconds(ticks * period_s) if ticks == member.leaves_tick else None,
         "settle_s": {name: settle_s(t, rows[name]) for name in ERRORS},
         "final_max": {name: _peak(rows[name][last]) for name in ERRORS},
         "final_from_s": _seconds(t[last][0]),
         "peak_torque_wheel_N_m": torque,
-        "settle_s_dot_s": settle_s(t, rows["s_dot"] - v_r[: len(rows)]),
+        "settle_s_dot_s": settle_s(t, rows["s_dot"] - v_r),
     }
 
 
@@ -195,8 +207,10 @@ def _worst(robots: list[dict[str, Any]]) -> dict[str, Any] | None:
     }
 
 
-def _spread_of(controllers: dict[str, np.ndarray]) -> dict[str, float | None] | None:
-    values = spread(controllers)
+def _spread_of(
+    controllers: Mapping[str, np.ndarray], members: Mapping[str, Membership]
+) -> dict[str, float | None] | None:
+    values = spread(controllers, members)
     if not len(values):
         return None
     t = next(iter(controllers.values()))["t_s"][: len(values)]

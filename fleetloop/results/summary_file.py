@@ -30,6 +30,8 @@ class _Worst(BaseModel):
 class _Robot(_Worst):
     ticks: int
     settle_s_dot_s: float | None
+    joined_s: float = 0.0
+    left_s: float | None = None
 
 
 class _Spread(BaseModel):

@@ -113,11 +113,13 @@ def final_line(summary: Summary) -> str:
 
 
 def spread_line(summary: Summary) -> str:
-    """The spread of the path variables in one line; it ends with the first robot that ends."""
+    """The spread of the path variables in one line; it ends where a member's rows end."""
     spread = summary["s_spread"]
     if spread is None or not summary["robots"]:
         return ""
-    first = min(summary["robots"].values(), key=lambda values: values["ticks"])
+    robots = summary["robots"].values()
+    stayed = [robot for robot in robots if robot.get("left_s") is None] or robots
+    first = min(stayed, key=lambda robot: robot["ticks"])
     return (
         f"spread of s{_early(summary, first, ' up to')}: peak {number(spread['peak'], '.4f')} m,"
         f" settled {settled_at(spread['settle_s'])},"

@@ -78,6 +78,30 @@ def test_edges_come_and_go_at_the_same_ticks_over_processes(tmp_path: Path) -> N
     assert not np.isnan(rows["age_of_r1_s"][rows["neighbours"] == 1.0]).any()
 
 
+def test_a_robot_joins_and_leaves_at_the_same_ticks_over_processes(tmp_path: Path) -> None:
+    args = ("two_robots", "--duration", "0.8", "--allow-unchecked")
+    args += ("--set", "robot.r2.joins_at_s=0.2", "--set", "robot.r2.leaves_at_s=0.5")
+    args += ("--set", "robot.r2.v_m_s=0.0", "--set", "coordination.v_hat_0=0.6")
+    assert completed(tmp_path / "a", *args)[0] == 0
+    assert completed(tmp_path / "b", *args, "--in-process")[0] == 0
+    records = [(tmp_path / name / "record.mcap").read_bytes() for name in "ab"]
+    assert records[0] == records[1]
+    record = read_record(tmp_path / "a", partial=False)
+    rows, h_s = record.controller["r2"], 0.002
+    there = (rows["t_s"] > 0.2 - 0.5 * h_s) & (rows["t_s"] < 0.5 - 0.5 * h_s)
+    assert np.array_equal(np.isfinite(rows["s"]), there)
+    assert np.array_equal(rows["tau_right_wheel_N_m"] != 0.0, there)
+    # Both agree from the first tick on: it goes with the other, whatever its body does.
+    assert rows["s"][there] == pytest.approx(record.controller["r1"]["s"][there], abs=1e-6)
+    before = record.plant["r2"][rows["t_s"] < 0.2]
+    assert np.ptp(before["x_m"]) == np.ptp(before["y_m"]) == 0.0
+    said = json.loads((tmp_path / "a" / "summary.json").read_text())["notices"]["r2"]
+    assert [line.partition("): ")[2][:20] for line in said] == [
+        "joins the formation ",
+        "LEFT: left the forma",
+    ]
+
+
 def test_a_robot_that_diverges_is_named_and_the_other_goes_on_in_either_mode(
     tmp_path: Path, capsys
 ) -> None:

@@ -81,6 +81,30 @@ def test_what_a_value_is_of_is_said(uneven_run: Path, finished_run: Path) -> Non
     assert final_line(whole) == "final: greatest magnitude in the last 4 s"
 
 
+def test_a_robot_counts_while_it_is_a_member(finished_run: Path) -> None:
+    members = "robot.r1.leaves_at_s=2.4", "robot.r2.joins_at_s=0.8", "robot.r2.v_m_s=0.0"
+    record = Record.open(finished_run / "record.mcap")
+    broken, fine = {"max_abs": 1e-12}, {"max_abs": 1e3}
+    expect = (
+        Expect(signal="x_e_m", from_s=3.0, **fine),
+        Expect(signal="s_spread", from_s=2.5, max=0.0),
+        Expect(signal="s_spread", from_s=0.0, max=0.0),
+        Expect(signal="x_e_m", from_s=0.0, to_s=0.5, robots=("r1",), **broken),
+    )
+    scenario = load("two_robots", members).model_copy(update={"expect": expect})
+    summary = summarise(record, scenario, RunStats("lockstep"))
+    assert [item["held"] for item in summary["expectations"]] == [True, True, False, False]
+    robots = summary["robots"]
+    assert (robots["r1"]["left_s"], robots["r2"]["joined_s"]) == (2.4, 0.8)
+    assert robots["r1"]["final_from_s"] == 0.0
+    assert robots["r2"]["final_from_s"] == 0.8
+    s = [record.controller[robot]["s"] for robot in ("r1", "r2")]
+    both = slice(round(0.8 / 0.002), round(2.4 / 0.002))
+    assert summary["s_spread"]["peak"] == np.abs(s[0] - s[1])[both].max()
+    assert [row[0] for row in robot_rows(summary)] == ["r1 to 2.4 s", "r2", "worst"]
+    assert spread_line(summary).startswith("spread of s: peak ")
+
+
 def test_a_stop_is_told_once(finished_run: Path) -> None:
     summary = uneven(finished_run)
     summary["stopped_robots"] = {"r1": "tick 3 (t = 0.006 s): no encoder frames any more"}
