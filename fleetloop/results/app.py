@@ -1,0 +1,85 @@
+"""The verbs `report`, `export`, `diff`: arguments only, the work is in other modules."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fleetloop import numbers
+from fleetloop.options import PartialOption, RunArg, listed
+
+
+def report(run: RunArg, partial: PartialOption = False) -> None:
+    """Rebuild report.html and the figures of a run from its record."""
+    from fleetloop.results.report import write_report
+    from fleetloop.results.run_folder import read_record
+    from fleetloop.results.tables import print_report
+
+    print_report(write_report(run, read_record(run, partial=partial)))
+
+
+def export(
+    run: RunArg,
+    target: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE.csv|FILE.npz", help="File to write; its extension selects the format."
+        ),
+    ],
+    signals: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME",
+            help="Only these signals, in this order, after t_s and robot; 'all' for every recorded"
+            " one. Default: truth, path variable, errors, torques.",
+        ),
+    ] = None,
+    robots: Annotated[
+        str | None, typer.Option(metavar="R1,R2", help="Only these robots. Default: all.")
+    ] = None,
+    from_s: Annotated[
+        float | None,
+        typer.Option(
+            "--from",
+            callback=numbers.finite,
+            metavar="SECONDS",
+            help="First scenario time, in seconds.",
+        ),
+    ] = None,
+    to_s: Annotated[
+        float | None,
+        typer.Option(
+            "--to",
+            callback=numbers.finite,
+            metavar="SECONDS",
+            help="Last scenario time, included, in seconds.",
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite FILE if it exists.")] = False,
+    partial: PartialOption = False,
+) -> None:
+    """Export one row per tick and robot, each robot up to its own end."""
+    from fleetloop.results.export import Selection
+    from fleetloop.results.export import export as export_run
+    from fleetloop.terminal import say
+
+    chosen = Selection(
+        signals=listed("--signals", signals),
+        robots=listed("--robots", robots),
+        from_s=from_s,
+        to_s=to_s,
+    )
+    rows = export_run(run, target, chosen, force=force, partial=partial)
+    say(f"wrote {target}: {rows} rows")
+
+
+def diff(
+    a: Annotated[Path, typer.Argument(metavar="A", help="A run's folder, or its record.mcap.")],
+    b: Annotated[Path, typer.Argument(metavar="B", help="The other run.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    partial: PartialOption = False,
+) -> None:
+    """Compare two runs bit for bit; name the first tick, robot and field that differ."""
+    from fleetloop.results.diff import print_comparison
+
+    raise typer.Exit(print_comparison(a, b, as_json=as_json, partial=partial))
