@@ -281,11 +281,10 @@ class Agent:
             for fix in fixes:
                 self._network.send_pose(fix)
             return motion
-        fix = fixes[-1]
-        ago = max(tick - fix.tick, 0)
+        ago = max(tick - fixes[-1].tick, 0)
         if ago > POSE_HISTORY_TICKS:
             return motion
-        return self._apply_fix(tick, fix, ago, motion)
+        return self._apply_fix(tick, fixes[-1], ago, motion)
 
     def _apply_fix(self, tick: int, fix: PoseFix, ago: int, carried: RobotMotion) -> RobotMotion:
         """Apply a fix of some ticks ago; `carried` is the motion without it."""
@@ -334,7 +333,7 @@ class Agent:
         x_d, y_d, theta_d, _, _ = reference
         used = (t_ns * 1e-9, *motion, s, s_dot, mu, v_hat, sums.neighbours, x_d, y_d, theta_d)
         if self._records_ages:
-            signals = (*self._neighbours.ages_s(t_ns), *signals)
+            signals = (*self._ages_s(t_ns), *signals)
         sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
         self._rows.add(tick, (*used, *signals, *sent))
         return frames
@@ -365,11 +364,16 @@ class Agent:
             self._accept_path_variable(t_ns * 1e-9 + self._h, after)
             if tick + 1 == self._joins:
                 self._guard.note_joining(self._joins, self._coordination.s)
-        ages = self._neighbours.ages_s(t_ns) if self._records_ages else ()
+        ages = self._ages_s(t_ns) if self._records_ages else ()
         sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
         row = (t_ns * 1e-9, *motion, nan, nan, nan, nan, 0, nan, nan, nan)
         self._rows.add(tick, (*row, *ages, *self._no_signals, *sent))
         return frames
+
+    def _ages_s(self, t_ns: int) -> list[float]:
+        """Ages of the data of every source [s], in the order of the record; NaN: none yet."""
+        ages = self._neighbours.ages_s(t_ns)
+        return ages if self._network is None else ages + self._network.ages_s(t_ns)
 
     def _accept_path_variable(self, t_s: float, after: CoordinationState) -> None:
         """Accept the next path variable; one beyond reach is rejected, and the robot stops."""

@@ -32,6 +32,7 @@ class EmulatedNetwork:
 
     __slots__ = (
         "_distances_m",
+        "_fix_ns",
         "_fixes",
         "_leader",
         "_located",
@@ -60,6 +61,7 @@ class EmulatedNetwork:
         self._schedule = brief.schedule
         self._silence_ns = round(brief.coordination.silence_limit_s * 1e9)
         self._v_r, self._v_r_ns = nan, 0
+        self._fix_ns: int | None = None  # of the newest pose that arrived
         self._located = brief.located
         self._poses: dict[int, dict[str, PoseFix]] = {}  # by tick, until due
         self._places: dict[str, PoseFix] = {}  # the newest of each robot
@@ -135,7 +137,10 @@ class EmulatedNetwork:
         if self._fixes is None:
             return None
         fixes = [delivery.message for delivery in self._fixes.receive(now_ns)]
-        return max(fixes, key=lambda fix: fix.tick, default=None)
+        newest = max(fixes, key=lambda fix: fix.tick, default=None)
+        if newest is not None and (self._fix_ns is None or newest.t_ns > self._fix_ns):
+            self._fix_ns = newest.t_ns
+        return newest
 
     def leader_speed(self, tick: int, leader: LeaderSpeed | None, without: float) -> float:
         """v_r at a tick as the robot hears it [m/s]; `without`: nothing heard, or not for long."""
@@ -150,6 +155,18 @@ class EmulatedNetwork:
                 self._v_r, self._v_r_ns = v_r, sent_ns
         heard = self._v_r == self._v_r and now_ns - self._v_r_ns <= self._silence_ns
         return self._v_r if heard else without
+
+    def ages_s(self, now_ns: int) -> list[float]:
+        """Ages of the newest speed of the leader and the newest pose that arrived [s].
+
+        Of those of the two that go through a channel; NaN: none has arrived.
+        """
+        ages = []
+        if self._leader is not None:
+            ages.append((now_ns - self._v_r_ns) * 1e-9 if self._v_r == self._v_r else nan)
+        if self._fixes is not None:
+            ages.append((now_ns - self._fix_ns) * 1e-9 if self._fix_ns is not None else nan)
+        return ages
 
     def counts(self) -> dict[str, Mapping[str, int]]:
         """Messages by source."""

@@ -42,6 +42,17 @@ def effects_of(network: Network, edge: EmulatedEdge) -> Effects:
     return effects
 
 
+def effects_to(network: Network, graph: Graph, hearer: str) -> dict[str, Effects]:
+    """The effects of the edges to a robot by their sources, of those that have any."""
+    heard = [edge.speaker for edge in graph.hears[hearer]]
+    leader = [LEADER] if hearer in graph.leader else []
+    all_of = {
+        source: effects_of(network, EmulatedEdge(source, hearer))
+        for source in (*heard, *leader, LOCALISATION)
+    }
+    return {source: effects for source, effects in all_of.items() if effects != Effects()}
+
+
 def _names(text: str, edge: EmulatedEdge) -> bool:
     pattern = parse_edge(text)
     if pattern is None:

@@ -22,10 +22,8 @@ from configs.brief import (
 from configs.connections import OURS, NetworkLink, Settings
 from configs.curves import formation_offset, reference_path
 from configs.drives import Drive
-from configs.edges import LEADER
-from configs.emulated_edges import EmulatedEdge, effects_of
+from configs.emulated_edges import effects_to
 from configs.leader_speed import SpeedChange
-from configs.netem import LOCALISATION, Effects
 from configs.parameters import extended
 from configs.scenario import Scenario
 from configs.signals import Signal, controller_signals
@@ -102,13 +100,10 @@ def agent_brief(
 
 def channels(scenario: Scenario, name: str) -> tuple[ChannelModel, ...]:
     """The emulated edges to a robot, without those that have no effects."""
-    graph = scenario.topology
-    heard = tuple(edge.speaker for edge in graph.hears[name])
-    leader = (LEADER,) if name in graph.leader else ()
+    effects_by_source = effects_to(scenario.network, scenario.topology, name)
     return tuple(
         extended(ChannelModel, effects, source=source, seed=f"{scenario.seed} {source} -> {name}")
-        for source in (*heard, *leader, LOCALISATION)
-        if (effects := effects_of(scenario.network, EmulatedEdge(source, name))) != Effects()
+        for source, effects in effects_by_source.items()
     )
 
 

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from configs.choices import chosen_anew, shared_part
 from configs.drives import Drive
 from configs.edges import FOREVER, LEADER, Edge, parse_edge, presence
+from configs.emulated_edges import SOURCES, effects_to
 from configs.graph import Graph, generated, of_matrix, random_rooted
 from configs.graph_section import GraphSection
 from configs.host import Host
@@ -102,11 +103,19 @@ class Scenario(BaseModel):
         return shared_part(Drive, self.drive_choice.parameters)
 
     def aged(self, name: str) -> tuple[str, ...]:
-        """In-neighbours of a robot whose ages are recorded: all, where ages vary."""
+        """Sources of a robot whose ages are recorded.
+
+        All its in-neighbours, where ages vary; the leader and the localisation system, where their
+        edges are emulated.
+        """
         emulated = self.network.default != Effects() or bool(self.network.edge)
         if not emulated and not self.topology.switches and self.clock.mode == "lockstep":
             return ()
-        return tuple(edge.speaker for edge in self.topology.hears[name])
+        with_effects = effects_to(self.network, self.topology, name)
+        return (
+            *(edge.speaker for edge in self.topology.hears[name]),
+            *(source for source in SOURCES if source in with_effects),
+        )
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -94,11 +94,11 @@ SENT_SIGNALS: tuple[Signal, ...] = (
 AGE_PREFIX = "age_of_"
 
 
-def age_signals(hears: Sequence[str]) -> tuple[Signal, ...]:
-    """Ages of what a robot uses of its in-neighbours, in the order of their names."""
+def age_signals(sources: Sequence[str]) -> tuple[Signal, ...]:
+    """Ages of what a robot uses, by its sources."""
     return tuple(
-        Signal(f"{AGE_PREFIX}{robot}_s", "s", f"age of the newest path state of {robot}")
-        for robot in hears
+        Signal(f"{AGE_PREFIX}{source}_s", "s", f"age of what was sent last of all from {source}")
+        for source in sources
     )
 
 
@@ -121,15 +121,15 @@ def gives_path_errors(law: Sequence[Signal]) -> bool:
     return any(signal.name in _PATH_ERROR_NAMES for signal in law)
 
 
-def controller_signals(law: Sequence[Signal], hears: Sequence[str] = ()) -> tuple[Signal, ...]:
+def controller_signals(law: Sequence[Signal], aged: Sequence[str] = ()) -> tuple[Signal, ...]:
     """The row of a controller: what it used, its law's signals, what it sent.
 
     Args:
         law: the table of the law.
-        hears: in-neighbours whose ages are recorded, in the order of their names.
+        aged: sources whose ages are recorded, in the order of the record.
     """
     own = law if gives_path_errors(law) else (*PATH_ERRORS, *law)
-    return (*USED_SIGNALS, *age_signals(hears), *own, *SENT_SIGNALS)
+    return (*USED_SIGNALS, *age_signals(aged), *own, *SENT_SIGNALS)
 
 
 def law_table(controller: Sequence[Signal]) -> tuple[Signal, ...]:

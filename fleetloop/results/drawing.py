@@ -95,7 +95,9 @@ def axes_of(height_in: float = HEIGHT_IN) -> tuple[Figure, Axes]:
 
 
 def legend(axes: Axes, entries: int) -> None:
-    """A legend to the right of a panel, in columns if it is long."""
+    """A legend to the right of a panel, in columns if it is long; none of no lines."""
+    if not axes.get_legend_handles_labels()[0]:
+        return
     axes.legend(
         loc="center left",
         bbox_to_anchor=(1.0, 0.5),

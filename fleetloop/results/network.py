@@ -11,7 +11,7 @@ from configs.signals import AGE_PREFIX
 def network(
     controllers: Mapping[str, np.ndarray], messages: Mapping[str, Mapping[str, Mapping[str, int]]]
 ) -> dict[str, dict[str, Any]] | None:
-    """Per edge "source -> hearer"; None if nothing was counted or recorded of any.
+    """Per edge "source -> hearer", in the order of names; None if of none is anything known.
 
     Args:
         controllers: rows of the robots.
@@ -24,11 +24,11 @@ def network(
     for hearer, rows in controllers.items():
         for source, ages in ages_of(rows).items():
             edges.setdefault(f"{source} -> {hearer}", {})["age_s"] = _statistics(ages)
-    return edges or None
+    return dict(sorted(edges.items())) or None
 
 
 def ages_of(rows: np.ndarray) -> dict[str, np.ndarray]:
-    """Ages of the path states that a robot used [s], by in-neighbour, over the ticks."""
+    """Ages of what a robot used [s], by its sources, over the ticks."""
     return {
         name.removeprefix(AGE_PREFIX).removesuffix("_s"): rows[name]
         for name in rows.dtype.names or ()

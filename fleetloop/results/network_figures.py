@@ -6,6 +6,7 @@ from matplotlib.colors import Normalize, to_hex
 from matplotlib.figure import Figure
 
 from configs.edges import Edge
+from configs.netem import LOCALISATION
 from configs.scenario import Scenario
 from fleetloop.record.reader import Record
 from fleetloop.results.drawing import DPI, WIDTH_IN, envelope, style_of
@@ -20,7 +21,7 @@ _ROW_IN = 0.22
 
 
 def edge_ages(record: Record) -> dict[Edge, np.ndarray]:
-    """Ages of the path states of every edge whose ages are recorded [s], over the ticks."""
+    """Ages of what came over every edge whose ages are recorded [s], over the ticks."""
     return {
         (speaker, hearer): ages
         for hearer, rows in record.controller.items()
@@ -36,13 +37,14 @@ def ages(record: Record, _: Scenario) -> Figure:
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, strip_in))
     s = {robot: rows["s"] for robot, rows in record.controller.items()}
     t = max((rows["t_s"] for rows in record.controller.values()), key=len)
-    for n, (speaker, hearer) in enumerate(edges):
+    between_robots = [edge for edge in edges if edge[0] in s]
+    for n, (speaker, hearer) in enumerate(between_robots):
         both = min(len(s[hearer]), len(s[speaker]))
         colour, dash = style_of(n)
         x, y = envelope(t[:both], s[hearer][:both] - s[speaker][:both])
         upper.plot(x, y, color=colour, linestyle=dash, label=f"{hearer} − {speaker}")
     upper.set(ylabel="s$_i$ − s$_j$ [m]", title="Path parameter errors, and the age of the data")
-    if len(edges) <= _MOST_IN_LEGEND:
+    if 0 < len(between_robots) <= _MOST_IN_LEGEND:
         upper.legend(fontsize=7)
     strips = np.array([oldest(ages, len(t)) for ages in edges.values()])
     image = lower.imshow(
@@ -81,6 +83,7 @@ def edge_states(record: Record, scenario: Scenario) -> Figure:
     means = {
         edge: float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
         for edge, values in edge_ages(record).items()
+        if edge[0] != LOCALISATION
     }
     known = [mean for mean in means.values() if np.isfinite(mean)]
     scale = Normalize(0.0, max(known, default=1.0))

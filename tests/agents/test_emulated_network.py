@@ -1,5 +1,7 @@
 """The emulated edges to one robot: what comes through them, when, and from how far."""
 
+from math import isnan
+
 import pytest
 from support.robot_bench import NOWHERE
 
@@ -44,7 +46,9 @@ def test_of_poses_that_are_due_the_newest_counts() -> None:
     edges.send_pose(pose(10, 2.0))
     assert edges.newest_pose(25 * MS) is None
     assert edges.newest_pose(30 * MS) == pose(10, 2.0)
+    assert edges.ages_s(30 * MS) == pytest.approx([0.01])
     assert edges.newest_pose(50 * MS) == pose(0, 1.0)
+    assert edges.ages_s(50 * MS) == pytest.approx([0.03])  # still of the newer one
 
 
 def test_the_leaders_speed_is_heard_late_and_held_until_it_is_silent_for_too_long() -> None:
@@ -55,7 +59,12 @@ def test_the_leaders_speed_is_heard_late_and_held_until_it_is_silent_for_too_lon
         "coordination.silence_limit_s=0.5",
     )
     steps = LeaderSpeed((SpeedChange(0, 0.6, 0), SpeedChange(500 * MS, 0.2, 0)))
-    heard = {tick * 2: edges.leader_speed(tick, steps, -1.0) for tick in range(1000)}
+    heard, ages = {}, {}
+    for tick in range(1000):
+        heard[tick * 2] = edges.leader_speed(tick, steps, -1.0)
+        (ages[tick * 2],) = edges.ages_s(tick * 2 * MS)
+    assert isnan(ages[98])
+    assert (ages[100], ages[118], ages[120]) == pytest.approx((0.1, 0.118, 0.1))
     assert (heard[98], heard[100]) == (-1.0, 0.6)
     assert (heard[598], heard[600]) == (0.6, 0.2)
     last_sent_ms = 880  # what is due in the cut is lost, too

@@ -56,6 +56,14 @@ def test_a_robot_has_channels_from_what_it_hears_where_there_are_effects() -> No
     assert len(set(seeds)) == len(seeds) == 4
 
 
+def test_ages_are_recorded_of_neighbours_and_of_other_sources_whose_edges_have_effects() -> None:
+    scenario = paper(EDGES)
+    assert [scenario.aged(robot) for robot in ("r1", "r3")] == [("leader",), ("r2",)]
+    places = paper(f'[[network.edge]]\nedges = ["localisation -> r3"]\n{HALF}\n')
+    assert [places.aged(robot) for robot in ("r2", "r3")] == [("r1",), ("r2", "localisation")]
+    assert load("paper").aged("r3") == ()
+
+
 @pytest.mark.parametrize(
     ("edge", "remedy"),
     [

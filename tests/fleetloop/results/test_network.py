@@ -23,6 +23,12 @@ def test_an_edge_has_its_counts_and_the_age_of_its_data() -> None:
     }
 
 
+def test_edges_are_in_the_order_of_names_whichever_controller_reports_first() -> None:
+    counts = {"sent": 1}
+    edges = network({}, {"r2": {"r1": counts, "leader": counts}, "r1": {"r2": counts}})
+    assert list(edges or ()) == ["leader -> r2", "r1 -> r2", "r2 -> r1"]
+
+
 def test_an_edge_that_carried_nothing_has_no_age() -> None:
     controllers = {"r2": rows(age_of_r1_s=[np.nan, np.nan])}
     assert network(controllers, {}) == {"r1 -> r2": {"age_s": None}}
