@@ -118,9 +118,6 @@ class _Fleet:
         self.edges: tuple[Edge, ...] = tuple(self._channels)
         self._newest_ns: dict[EmulatedEdge, int | None] = dict.fromkeys(self._channels)
         self._v_r: dict[str, float] = {}
-        for edge in graph.edges:  # said before the start
-            state = self._states[edge[0]]
-            self._hearing[edge[1]].receive(edge[0], -1, state.s, state.v_hat)
 
     def states(self) -> list[CoordinationState]:
         return [self._states[robot] for robot in self._graph.robots]

@@ -186,7 +186,7 @@ def _ages(scenario: Scenario, ahead: Forecast, ages_s: dict[Edge, float]) -> Fin
     most_s = ages_s[edge]
     if isinstance(ahead, EmulatedForecast):
         ages = ahead.age_s[:, : len(ages_s)]
-        most_s = float(np.nanmax(ages, initial=0.0))
+        most_s = max(ages[ages >= 0.0].tolist(), default=most_s)
         value += f"; up to {most_s:.3g} s in this run"
     if most_s > bound_s:
         level = "warning"
@@ -251,7 +251,7 @@ def _margin(scenario: Scenario, ahead: Forecast, ages_s: dict[Edge, float]) -> F
         value = "not looked for: the fleet is large"
         return Finding("ok", title, value, basis=basis)
     limit = f"> {most_s:.3g} s, the mean age" if isfinite(margin_s) else ""
-    if margin_s > 1.25 * most_s:
+    if margin_s == inf or margin_s > 1.25 * most_s:
         return Finding("ok", title, value, limit=limit, basis=basis)
     lost = ahead.spread[-1] > LOST_M and ahead.spread[-1] > ahead.spread[0]
     level: Level = "error" if margin_s <= most_s and lost else "warning"

@@ -117,6 +117,7 @@ def test_run_refuses_what_check_calls_an_error_unless_it_is_forced(tmp_path: Pat
     refused = fleetloop(tmp_path, "run", "two_robots", *stiff)
     assert (refused.returncode, refused.stdout) == (2, "")
     assert "error: r1, r2: sampled speed loop" in refused.stderr
+    assert "would not work as it is, by r1, r2: sampled speed loop" in refused.stderr
     assert "--force runs it" in refused.stderr
     assert list(tmp_path.iterdir()) == []
     forced = fleetloop(tmp_path, "run", "two_robots", *stiff, "--force", "--duration", "0.5")

@@ -93,3 +93,27 @@ def test_the_worst_level_is_told_to_machines(capsys: pytest.CaptureFixture[str])
         check_scenario("realtime_100hz", (change, "duration_s=30.0"), as_json=True)
         said = json.loads(capsys.readouterr().out)
         assert (said["sound"], said["worst"]) == (True, worst_level)
+        listed = {one["title"]: one for one in said["findings"]}
+        spectral = listed["p²/q > max Im(ζ)²/Re(ζ)"]
+        assert [spectral[key] for key in ("value", "limit", "basis")] == ["4", "> 0", "(46)"]
+        assert all(one["basis"] for one in said["findings"])
+        assert all(one["key"] for one in said["findings"] if one["level"] != "ok")
+
+
+def test_every_line_of_a_table_is_whole_where_nobody_folds_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    weak = "drive.preset='limited'", "drive.current_limit_A=3.0", "duration_s=10.0", "expect=[]"
+    check_scenario("two_robots", weak, as_json=False)
+    lines = capsys.readouterr().out.splitlines()
+    torques = [line for line in lines if "first torques" in line]
+    assert len(torques) == 2
+    for part in ("warning", "≤ 0.15 N·m at the wheel", "(34) at t = 0", "control.law"):
+        assert all(part in line for line in torques)
+    assert "to change" in lines[1]
+
+
+def test_titles_in_brackets_are_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    unused = "encoder.index=true", "duration_s=5.0", "expect=[]"
+    check_scenario("two_robots", unused, as_json=False)
+    assert "[encoder]" in capsys.readouterr().out

@@ -122,7 +122,7 @@ def test_an_edge_that_carries_nothing_in_time_is_no_edge() -> None:
 
 
 def test_the_forecast_over_a_network_is_the_run() -> None:
-    scenario = load("lossy_chain", ("duration_s=12.0", "expect=[]"))
+    scenario = load("lossy_chain", ("duration_s=12.0", "expect=[]", "robot.r1.s_0=0.4"))
     rows = rehearsal(scenario, 12.0).rows
     ahead = emulated_forecast(scenario, lambda _: pytest.fail("no loss by distance"))
     for n, name in enumerate(scenario.names):
