@@ -130,12 +130,16 @@ def _drive_link(scenario: Scenario, robot: sections.Robot, drive: DriveModel) ->
     )
 
 
+def pose_age_limit_s(scenario: Scenario) -> float:
+    """The age of its newest pose at which a robot stops, where poses come from outside [s]."""
+    if scenario.host.pose_age_limit_s is not None:
+        return scenario.host.pose_age_limit_s
+    delay_s = scenario.localisation.delay_s or scenario.clock.control_period_s
+    return max(POSE_AGE_LIMIT_S, delay_s + 5 * scenario.clock.localisation_period_s)
+
+
 def _host_limits(scenario: Scenario, *, ours: bool) -> HostLimits:
-    host, clock = scenario.host, scenario.clock
-    pose_age_s = host.pose_age_limit_s
-    if pose_age_s is None:
-        delay_s = scenario.localisation.delay_s or clock.control_period_s
-        pose_age_s = max(POSE_AGE_LIMIT_S, delay_s + 5 * clock.localisation_period_s)
+    host = scenario.host
     fixes = scenario.localisation.source != "odometry"
     return extended(
         HostLimits,
@@ -144,7 +148,7 @@ def _host_limits(scenario: Scenario, *, ours: bool) -> HostLimits:
         torque_slew_limit_wheel_N_m_s=_or_none(host.torque_slew_limit_wheel_N_m_s),
         encoder_mismatch_limit_wheel_rad=_or_none(host.encoder_mismatch_limit_wheel_rad),
         pose_mismatch_limit_m=_or_none(host.pose_mismatch_limit_m),
-        pose_age_limit_ns=_ns(pose_age_s) if fixes else 0,
+        pose_age_limit_ns=_ns(pose_age_limit_s(scenario)) if fixes else 0,
         rearm_after_ns=_ns(host.rearm_after_s),
         rearm_limit_ns=_ns(host.rearm_limit_s),
         # Our own bus fails when the plant is gone, and doesn't come back.

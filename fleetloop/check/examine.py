@@ -15,6 +15,7 @@ from fleetloop.check.graph import graph_findings
 from fleetloop.check.law import law_findings
 from fleetloop.check.membership import membership_findings
 from fleetloop.check.network import network_findings
+from fleetloop.check.poses import pose_findings
 from fleetloop.check.sampling import sampling_findings
 from fleetloop.check.start import start_findings
 from fleetloop.check.torque import torque_findings
@@ -45,6 +46,7 @@ def examine(source: str, scenario: Scenario, overrides: Overrides = ()) -> list[
             *network_findings(scenario, ahead),
             *shapes,
             *sampling_findings(scenario, along),
+            *pose_findings(scenario, along),
             *geometry_findings(scenario, along, ahead),
             *torque_findings(scenario, along),
             *wheel_findings(scenario, along),

@@ -264,6 +264,8 @@ def _settling(
         return Finding("ok", title, f"{peak}, {after}", limit=limit)
     if error[-1] > settled:
         after = f"still {float(error[-1]):.3g} {unit} after {ahead.t_s[-1]:.3g} s"
+        if ahead.t_s[-1] < final_s:
+            after += ", where this forecast ends"
     value = f"{peak}, {after}"
     if np.any(ahead.v_hat[0] != scenario.leader.speed_m_s):
         remedy = (

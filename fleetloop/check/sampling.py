@@ -42,8 +42,6 @@ from fleetloop.check.torque import limits
 Arc = tuple[float, float, float]
 """v̄_d, ω̄_d and ṡ of steady motion."""
 Arcs = list[Arc]
-HELD_M = 0.05
-"""A reference that moves on by more than this while a pose is held is said."""
 HELD_PERIODS = 20
 """Of a pose held for longer the hold is to blame: neither margin nor gains are looked for."""
 _POSES = "clock.localisation_period_s"
@@ -56,7 +54,7 @@ _CYCLES = 3.0
 
 
 def sampling_findings(scenario: Scenario, courses: list[Course]) -> Iterator[Finding]:
-    """Speed loop, channel and held poses of every robot; alike robots are computed once."""
+    """Speed loop and channel of every robot; alike robots are computed once."""
     known: dict[tuple[object, ...], list[Finding]] = {}
     for course in courses:
         robot, control = course.robot, scenario.control_of(course.robot)
@@ -76,7 +74,6 @@ def sampling_findings(scenario: Scenario, courses: list[Course]) -> Iterator[Fin
                 *_channel_of(scenario, control, loop, arcs),
             ]
         yield from (replace(finding, robots=(robot.name,)) for finding in known[alike])
-        yield from _held_pose(scenario, course)
 
 
 def loop_of(scenario: Scenario, robot: Robot) -> Loop:
@@ -249,25 +246,3 @@ def _lower(loop: Loop, part: LoopElement, remedies: dict[str, float]) -> str:
         what = 'localisation.source = "fused", or more fixes'
     shorter = f" with shorter {part.states}" if part.time_constants_s else ""
     return f"{what}, or a higher rate{shorter}"
-
-
-def _held_pose(scenario: Scenario, course: Course) -> Iterator[Finding]:
-    """How far the reference moves on while a pose is held."""
-    if scenario.localisation.source != "external":
-        return
-    clock = scenario.clock
-    delay_s = scenario.localisation.delay_s
-    late_s = clock.control_period_s if delay_s is None else delay_s
-    speed = float(np.abs(course.v).max())
-    held_s = clock.localisation_period_s
-    moved = speed * (held_s + late_s)
-    title = "poses held between fixes"
-    said = f"held {held_s:g} s, {late_s:g} s late, at {speed:.3g} m/s: the reference moves on"
-    said += f" {moved:.2g} m"
-    finding = Finding(
-        "ok", title, said, (course.robot.name,), limit=f"≤ {HELD_M:g} m", basis="v̄_d ṡ × age"
-    )
-    if moved > HELD_M:
-        remedy = 'localisation.source = "fused" carries poses on by odometry, or more fixes'
-        finding = replace(finding, level="warning", key=_POSES, remedy=remedy)
-    yield finding
