@@ -22,7 +22,7 @@ from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.client import StoppedError, open_polled
 from bridge.network.clock_exchange import answer_pings
-from bridge.network.launcher import follow_launcher
+from bridge.network.launcher import LauncherWatch
 from bridge.network.link import Arrival, Link, Publisher
 from bridge.network.messages import Notice, Rows
 from bridge.network.reports import AgentReport
@@ -59,15 +59,18 @@ def run(brief: AgentBrief, stop: Stop) -> str:
         link = open_polled(brief.network, brief.schedule.start_deadline_s, stop, depth=depth)
     except StoppedError:
         return stop.reason
+    watch: LauncherWatch | None = None
     with link:
         if brief.detached:
-            follow_launcher(link, brief.network.run, stop)
+            watch = LauncherWatch(link, brief.network, stop)
             answer_pings(link, brief.network.run, AGENT.process(brief.robot))
         with open_bus(brief.robot, brief.bus) as bus:
-            return _run(brief, stop, link, bus)
+            return _run(brief, stop, link, bus, watch)
 
 
-def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> str:
+def _run(
+    brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC, watch: LauncherWatch | None
+) -> str:
     name, robot = brief.network.run, brief.robot
     path = link.publisher(keys.path(name, robot))
     telemetry = link.publisher(keys.telemetry(name, robot))
@@ -91,7 +94,7 @@ def _run(brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC) -> str:
     hellos.add(path, agent.share(-1).encode())
     hellos.add(telemetry, Rows(0, 0, b"", False).encode())
     run_loop = _realtime if brief.schedule.realtime else _lockstep
-    connections = _Connections(agent, bus, link, subscriptions, path, hellos, rows, report)
+    connections = _Connections(agent, bus, link, subscriptions, path, hellos, rows, report, watch)
     return run_loop(connections, stop)
 
 
@@ -106,6 +109,7 @@ class _Connections(NamedTuple):
     hellos: Hellos
     rows: RowBuffer
     report: Publisher
+    watch: LauncherWatch | None
 
     def await_peers(self, deliver: Callable[[Arrival], None], stop: Stop) -> None:
         """Wait for the first message of every peer, then declare this controller ready."""
@@ -211,6 +215,7 @@ def _realtime(connections: _Connections, stop: Stop) -> str:
         connections.path,
         connections.hellos,
         progress,
+        watch=connections.watch,
     )
     connections.await_peers(partial(deliver, connections.agent), stop)
     settle_memory()

@@ -27,6 +27,7 @@ from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import can_id_of, to_frame, to_message
 from bridge.frame import ERR, Frame
 from bridge.network.barrier import Hellos
+from bridge.network.launcher import CUT_OFF, LauncherWatch
 from bridge.network.link import Link, Publisher, waiting
 from bridge.network.messages import Go, Progress
 from bridge.network.reports import Deadlines
@@ -77,6 +78,7 @@ class RealtimeLoop:
         hellos: Hellos,
         progress: Publisher,
         *,
+        watch: LauncherWatch | None = None,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         self._clock = clock
@@ -89,6 +91,8 @@ class RealtimeLoop:
         self._path = path
         self._hellos = hellos
         self._progress = progress
+        self._watch = watch
+        self._away = False  # as the guard was told
         self._progress_ticks = max(round(PROGRESS_PERIOD_S / agent.brief.schedule.period_s), 1)
         self._lateness = Lateness(agent.brief.schedule.period_s)
         self._health = BusHealth(agent.brief.robot, agent.brief.host.bus_error_limit_ns)
@@ -161,6 +165,9 @@ class RealtimeLoop:
             if self._sent_ns and tick > 0:
                 self.counters.misses += 1
                 agent.round_trip_s = nan
+            if self._watch is not None and self._watch.away is not self._away:
+                self._away = self._watch.away
+                agent.guard.note_fault("launcher", CUT_OFF if self._away else None)
             agent.admission.now_ns = now_ns - epoch_ns
             self._receive_messages()
             frames = agent.step(tick) if not stop.requested else agent.shut_down()

@@ -303,3 +303,4 @@ class RecorderBrief:
     runtime_folder: str  # holds the buses' sockets; goes when the launcher was killed
     ticks: int  # of the run: no rows are of later ones
     last_frame_ns: int  # bus time after which no frame ends
+    fills_gaps: bool = False  # sources may be cut off: their missing rows are not a number

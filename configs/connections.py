@@ -30,6 +30,7 @@ class NetworkLink:
     password: str = field(repr=False)
     tls: "TlsFiles | None" = None
     lease_s: float = LEASE_S  # the router waits so long for a word of it
+    rejoin_s: float = 0.0  # so long the launcher, or the way to it, may be gone
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,11 +21,19 @@ from configs.complaints import complaints, refusal
 from configs.connections import OURS, Settings
 from configs.errors import Complaint, Problem, ScenarioError
 from configs.files import expanded
-from configs.parameters import FilePath, Name, Parameters, Pattern, Positive, as_tuples, parameter
+from configs.parameters import (
+    FilePath,
+    Name,
+    Parameters,
+    Pattern,
+    Positive,
+    SecondsOrZero,
+    as_tuples,
+    parameter,
+)
 from configs.roles import AGENT, ROLES, STARTED, identity_of, processes_of
 from configs.scenario import Scenario
 from configs.tls import ROUTER, TlsFiles, files_in
-from configs.users import read_users
 from configs.wording import MISSING
 
 Endpoint = Annotated[str, Pattern(patterns.ENDPOINT)]
@@ -75,6 +83,11 @@ class NetworkSection(Parameters):
     run: Annotated[str, Pattern(patterns.RUN)] | None = parameter(
         None, "the run's name in every key; the scenario's if not given"
     )
+    rejoin_s: SecondsOrZero = parameter(
+        0.0,
+        "for so long a role on another machine may be cut off: meanwhile its robot stops, then it"
+        " goes on; if longer, the run ends",
+    )
     clock_tolerance_m: Positive = parameter(
         0.02, "a run is refused whose clocks displace a robot by more than that for one hop"
     )
@@ -118,6 +131,11 @@ class Deployment(BaseModel):
     )
     network: NetworkSection | None = None
     robot: dict[Name, RobotSection] = Field(default_factory=dict)
+
+    @property
+    def may_rejoin(self) -> bool:
+        """Whether roles may be cut off and come back."""
+        return self.network is not None and self.network.rejoin_s > 0.0
 
     def bus_of(self, robot: str) -> Settings:
         """Keyword arguments of `can.Bus` for a robot's bus, sorted."""
@@ -181,30 +199,6 @@ def check_deployment(
     if found := _problems(deployment, scenario):
         raise refusal([Complaint(name, *problem) for problem in found])
     return _beside(deployment, folder)
-
-
-def passwords(network: NetworkSection | None, identities: tuple[str, ...]) -> dict[str, str]:
-    """The passwords of these identities from the deployment's file.
-
-    With certificates of another authority they prove the identity: the password is the name again.
-
-    Raises:
-        ScenarioError: the file can't be read, is readable by others, or lacks an identity.
-    """
-    if network is None or not identities:
-        return {}
-    if network.tls is not None:
-        return {identity: identity for identity in identities}
-    path = network.users
-    if path is None:
-        raise ScenarioError(
-            "network.users = (missing): name a file with a line identity:password for each of"
-            f" {', '.join(identities)}, or give network.certificates"
-        )
-    known = read_users(path, "network.users")
-    if absent := [identity for identity in identities if not known.get(identity)]:
-        raise ScenarioError(f"network.users = {path}: no line {absent[0]}:<password>")
-    return {identity: known[identity] for identity in identities}
 
 
 def _settings(robot: str, bus: BusSection) -> Settings:

@@ -15,7 +15,7 @@ from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.client import StoppedError, open_client
 from bridge.network.clock_exchange import answer_pings
-from bridge.network.launcher import follow_launcher
+from bridge.network.launcher import LauncherWatch
 from bridge.network.link import Arrival, Link, Publisher, waiting
 from bridge.network.messages import Go, Notice, PoseFix, Progress, Rows
 from bridge.network.reports import PlantReport
@@ -60,7 +60,7 @@ def run(brief: PlantBrief, stop: Stop) -> str:
         return "ended before it began"
     with link:
         if brief.detached:
-            follow_launcher(link, brief.network.run, stop)
+            LauncherWatch(link, brief.network, stop)
             answer_pings(link, brief.network.run, PLANT.name)
         queue = brief.wire.txqueuelen if brief.wire else 0
         hub = Hub(listeners, stop.wake_fd, queue=queue, controllers=_controllers(brief))

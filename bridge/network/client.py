@@ -28,6 +28,8 @@ from configs.errors import InfrastructureError
 _PROBE_S = 1.0
 _FIRST_RETRY_S, _LAST_RETRY_S = 0.02, 0.3
 _ATTEMPT_S = 5.0
+_AGAIN = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2.0}
+"""Between two attempts of a session that has lost its router."""
 _BLOCKED_S = 5.0
 """Zenoh's default: a put that blocks longer closes its session."""
 
@@ -104,6 +106,7 @@ def _login_config(mode: str, network: NetworkLink, timeout_s: float) -> zenoh.Co
     set_key(config, WAIT_BEFORE_CLOSE, int(max(network.lease_s, _BLOCKED_S) * 1e6))
     set_key(config, "connect/endpoints", [network.endpoint])
     set_key(config, "connect/timeout_ms", 0)
+    set_key(config, "connect/retry", _AGAIN)
     set_key(config, "transport/unicast/open_timeout", max(int(timeout_s * 1000), 1))
     set_key(config, "transport/auth/usrpwd/user", network.user)
     set_key(config, "transport/auth/usrpwd/password", network.password)

@@ -102,7 +102,9 @@ class ControlPlane:
             case "live":
                 there = arrival.payload == b"1"
                 (self.alive.add if there else self.alive.discard)(process)
-                self.remote.note_token(process, self.now(), there=there)
+                away_s = self.remote.note_token(process, self.now(), there=there)
+                if away_s is not None:
+                    self.note(process, f"there again after {away_s:.1f} s")
             case "progress":
                 if (progress := self.words.progress(process, arrival.payload)) is not None:
                     self._process_progress(process, progress)

@@ -73,7 +73,7 @@ class Ending:
 
     def tell_remote_roles(self, link: Link, reason: str) -> None:
         """Tell the roles on other machines why the run ends, before the launcher's token goes."""
-        if not self._plane.remote.ended():
+        if not self._plane.remote.ended(self._plane.now()):
             report = LauncherReport(reason).encode()
             link.publisher(keys.report(self._run, LAUNCHER.name)).put(report)
             self._await_remote_roles(link, REASON_AHEAD_S)
@@ -82,7 +82,7 @@ class Ending:
         """Take the reports of roles on other machines; one that is later than this is lost."""
         plane = self._plane
         deadline = plane.now() + within_s
-        while not plane.remote.ended() and (left_s := deadline - plane.now()) > 0.0:
+        while not plane.remote.ended(plane.now()) and (left_s := deadline - plane.now()) > 0.0:
             plane.receive(link, min(left_s, WATCH_EVERY_S))
 
     def _drain(self, link: Link, recorder: Child) -> None:

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 from bridge.network import access
 from configs.brief import PlantBrief, located
 from configs.connections import NetworkLink, Outside, Settings
-from configs.deployment import Deployment, NetworkSection, passwords
+from configs.deployment import Deployment, NetworkSection
 from configs.errors import ScenarioError
 from configs.resolve import channels
 from configs.roles import AGENT, LAUNCHER, LOCALISATION, PLANT, identity_of, processes_of
 from configs.scenario import Scenario
+from configs.users import passwords
 from fleetloop.launch.clock_offsets import Hop
 
 if TYPE_CHECKING:
@@ -222,6 +223,7 @@ def network_link(scenario: Scenario, deployment: Deployment, role: str) -> Netwo
     user = identity_of(role)
     run, tls = network.run or scenario.name, network.tls_of(user)
     if tls is not None:
-        return NetworkLink(run, network.endpoint, user, _proved_name(network, user), tls)
-    (password,) = passwords(network, (user,)).values()
-    return NetworkLink(run, network.endpoint, user, password)
+        password = _proved_name(network, user)
+    else:
+        (password,) = passwords(network, (user,)).values()
+    return NetworkLink(run, network.endpoint, user, password, tls, rejoin_s=network.rejoin_s)

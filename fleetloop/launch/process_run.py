@@ -85,9 +85,13 @@ class ProcessRun:
             clock=clock,
         )
         self._now = self._machine.clock.now
-        self._remote = RemoteRoles(self._deployment.elsewhere(scenario))
+        network = self._deployment.network
+        rejoin_s = network.rejoin_s if network is not None else 0.0
+        self._remote = RemoteRoles(self._deployment.elsewhere(scenario), rejoin_s)
         self._plane = ControlPlane(self._schedule, self._remote, self._now, on_progress, on_notice)
-        self._supervision = Supervision(self._plane, self._schedule)
+        # A launcher that has lost a router of its own hears of nobody.
+        patience_s = rejoin_s if placement.is_external(self._deployment) else 0.0
+        self._supervision = Supervision(self._plane, self._schedule, patience_s)
         limit_s = self._schedule.tick_deadline_s
         self._ending = Ending(self._plane, self._run, self._machine, record, limit_s)
         self._next_look_s = 0.0
@@ -247,9 +251,10 @@ class ProcessRun:
             self._report_refusals(link)
             plane.clocks.ask(EVERY_S)
             supervision.name_the_frozen()
+            supervision.name_the_cut_off()
             if (failure := supervision.failure()) is not None:
                 return supervision.root_of(failure, link, actors)
-            if all(child.ended() for child in actors) and self._remote.ended():
+            if all(child.ended() for child in actors) and self._remote.ended(self._now()):
                 return None
             plant = plane.child(PLANT.name)
             if (

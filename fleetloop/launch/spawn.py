@@ -138,6 +138,7 @@ def _recorder(place: Place) -> RecorderBrief:
         str(place.folder),
         ticks.ticks,
         ticks.bus_time_ns(ticks.ticks) + AFTERWARDS_NS,
+        fills_gaps=place.orders.deployment.may_rejoin,
     )
 
 

@@ -17,9 +17,10 @@ CONSEQUENCES_S = 0.3
 class Supervision:
     """Finds failures among the processes of a run, here and on other machines."""
 
-    def __init__(self, plane: ControlPlane, schedule: Schedule) -> None:
+    def __init__(self, plane: ControlPlane, schedule: Schedule, patience_s: float = 0.0) -> None:
         self._plane = plane
         self._schedule = schedule
+        self._patience_s = patience_s  # with silence, beyond the deadline of a tick
 
     def failure(self) -> Failure | None:
         """The failure that explains the others, None if there is none."""
@@ -50,7 +51,7 @@ class Supervision:
 
     def silent(self) -> Failure | None:
         """The process whose progress stopped, None while all are well."""
-        plane, limit_s = self._plane, self._schedule.tick_deadline_s
+        plane, limit_s = self._plane, self._schedule.tick_deadline_s + self._patience_s
         now_s = plane.now()
         for name in (PLANT.name, RECORDER.name):
             child, silence = plane.child(name), plane.vitals.silence(name, now_s)
@@ -74,6 +75,13 @@ class Supervision:
                 text = f"{child.name}: did not read its messages, and was cut off"
                 return Failure(GAVE_UP, child.name, text)
         return None
+
+    def name_the_cut_off(self) -> None:
+        """Name the roles on other machines that are cut off, and go on."""
+        plane = self._plane
+        when = self._schedule.when(plane.outcome.ticks)
+        for process in plane.remote.newly_cut_off(plane.now()):
+            plane.note(process, f"{when}: cut off: its machine, or the network to it")
 
     def name_the_frozen(self) -> None:
         """In real time, where no process waits for another: name a silent one at once."""

@@ -4,8 +4,10 @@ It stands apart from the lockstep path, so that neither writing nor a slow disk 
 outlives the launcher for as long as it takes to complete the file. Started by `fleetloop run`.
 """
 
+import struct
 from collections import Counter
 from collections.abc import Iterable
+from math import nan
 from pathlib import Path
 
 from bridge.can_bus import sockets
@@ -35,6 +37,8 @@ GAPS = 8
 """Consecutive blocks after a gap from which on the missing rows count as lost."""
 ROOM_BYTES = 1 << 26
 """Of what waits of one source: a slow disk may take its time."""
+_TIME = struct.Struct("<d")
+"""t_s, the first signal of every row."""
 _WHOSE = {"plant": "the plant for {}", "controller": "{}'s controller", "can": "bus {}"}
 
 
@@ -43,6 +47,9 @@ class _Recorder:
         self._record = record
         self._ticks = brief.ticks
         self._last_frame_ns = brief.last_frame_ns
+        self._fills_gaps = brief.fills_gaps
+        self._period_s = brief.period_ns * 1e-9
+        self._filled: Counter[str] = Counter()  # rows that did not come, by source
         self.refusals = Refusals()
         self._gaps: Counter[str] = Counter()  # blocks in a row that leave one, by source
         sources = {f"{kind}/{r}" for r in brief.robots for kind in ("plant", "controller")}
@@ -59,6 +66,8 @@ class _Recorder:
         """Store what may be stored; return whether the record has more now."""
         kind, _, robot = arrival.tag.partition("/")
         rows = Rows.decode(arrival.payload, self._row_sizes[arrival.tag])
+        if rows is not None and self._fills_gaps and kind != "can":
+            self._fill_gap(arrival.tag, rows)
         wrong = "not well formed" if rows is None else self._wrong(kind, robot, rows)
         if rows is None or wrong is not None:
             self._refuse(arrival.tag, wrong or "")
@@ -90,15 +99,39 @@ class _Recorder:
         if rows.final:
             self.unfinished.discard(tag)
 
+    def _fill_gap(self, tag: str, rows: Rows) -> None:
+        """Of rows that a source said while it was cut off, only the time is known."""
+        kind, _, robot = tag.partition("/")
+        source: Source = "plant" if kind == "plant" else "controller"
+        expected = self._record.next_tick(robot, source)
+        first = rows.first_tick
+        if expected is None or not (rows.length or rows.final) or not expected < first:
+            return
+        if first + rows.length > self._ticks or first - self._record.written > AHEAD_TICKS:
+            return
+        unknown = [nan] * (self._row_sizes[tag] // _TIME.size - 1)
+        rest = struct.pack(f"<{len(unknown)}d", *unknown)
+        for begin in range(expected, first, BLOCK_TICKS):
+            ticks = range(begin, min(begin + BLOCK_TICKS, first))
+            block = b"".join(_TIME.pack(tick * self._period_s) + rest for tick in ticks)
+            self._record.add(robot, source, begin, block)
+        self._filled[tag] += first - expected
+
+    def gaps(self) -> list[str]:
+        """The rows that did not come, in words."""
+        return [
+            f"{count} rows of {_whose(tag)} did not come while it was cut off: not a number"
+            for tag, count in self._filled.items()
+        ]
+
     def note_dropped(self, dropped: Iterable[Dropped]) -> None:
         """Count what found no room."""
         for tag, _, count in dropped:
             self._refuse(tag, "more of it waited already than there is room for", count)
 
     def _refuse(self, tag: str, why: str, count: int = 1) -> None:
-        kind, _, name = tag.partition("/")
-        what = "frame block" if kind == "can" else "row block"
-        self.refusals.note(what, _WHOSE[kind].format(name), why.partition(" ")[0], why, count)
+        what = "frame block" if tag.startswith("can/") else "row block"
+        self.refusals.note(what, _whose(tag), why.partition(" ")[0], why, count)
 
     def _wrong(self, kind: str, robot: str, rows: Rows) -> str | None:
         """Why a block can't be of this run, None if it can."""
@@ -134,6 +167,11 @@ class _Recorder:
             self.ticks = max(self.ticks, rows.first_tick + rows.length)
         if rows.final:
             self._record.end(robot, source)
+
+
+def _whose(tag: str) -> str:
+    kind, _, name = tag.partition("/")
+    return _WHOSE[kind].format(name)
 
 
 def run(brief: RecorderBrief, stop: Stop) -> str:
@@ -197,7 +235,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         if lost:
             record.note_lost("; ".join(lost))
         summary = Report(
-            notices=tuple(refused),
+            notices=(*recorder.gaps(), *refused),
             flooders=tuple(recorder.refusals.floods()),
             cpu_ns=process_cpu_ns() - began_ns,
         )

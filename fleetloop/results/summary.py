@@ -172,12 +172,20 @@ def _nanoseconds(t_s: np.ndarray) -> np.ndarray:
     return rounded
 
 
+def _known(s: np.ndarray) -> np.ndarray:
+    """The rows that came: of others not even the path variable is known; all, if none did."""
+    known: np.ndarray = np.isfinite(s)
+    return known if known.any() else ~known
+
+
 def _robot(
     rows: np.ndarray, v_r: np.ndarray, member: Membership, period_s: float
 ) -> dict[str, Any]:
     """Of one robot while it is a member of the formation."""
     ticks = min(len(rows), member.leaves_tick)
     rows, v_r = rows[member.ticks], v_r[: len(rows)][member.ticks]
+    known = _known(rows["s"])
+    rows, v_r = rows[known], v_r[known]
     t, last = rows["t_s"], _final(rows["t_s"])
     torque = max(_peak(rows["tau_right_wheel_N_m"]), _peak(rows["tau_left_wheel_N_m"]))
     return {
@@ -213,7 +221,8 @@ def _spread_of(
     values = spread(controllers, members)
     if not len(values):
         return None
-    t = next(iter(controllers.values()))["t_s"][: len(values)]
+    known = _known(values)
+    t, values = next(iter(controllers.values()))["t_s"][: len(values)][known], values[known]
     return {
         "peak": float(values.max()),
         "settle_s": settle_s(t, values),

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from configs.deployment import Deployment, check_deployment, load_deployment, passwords
+from configs.deployment import Deployment, check_deployment, load_deployment
 from configs.errors import ScenarioError
 from configs.loading import load
+from configs.users import passwords
 
 VCAN = {"interface": "socketcan", "channel": "vcan0"}
 NETWORK = {"endpoint": "tcp/10.0.0.1:7447"}

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -24,11 +24,22 @@ class Run:
     """A `fleetloop run` that is going on."""
 
     program: tuple[str, ...] = ("-m", "fleetloop")
+    before: Sequence[str] = ()
+    """Words before the command, as `ip netns exec HOST`."""
 
     def __init__(self, folder: Path, *args: str) -> None:
         self.folder = folder
         self._process = subprocess.Popen(
-            [sys.executable, *self.program, "run", *args, "--no-report", "--out", str(folder)],
+            [
+                *self.before,
+                sys.executable,
+                *self.program,
+                "run",
+                *args,
+                "--no-report",
+                "--out",
+                str(folder),
+            ],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -58,19 +69,20 @@ class Run:
         assert said is not None, self._texts
         return said
 
-    def await_bus_time(self, seconds: float) -> None:
-        """Return when the bus of r1 has reached this time: the countdown is over, rows flow."""
+    def await_bus(self) -> can.BusABC:
+        """Return the bus of r1 as soon as it is there."""
         deadline = time.monotonic() + WAIT_S
         while True:
             assert self._process.poll() is None, self.end()
             assert time.monotonic() < deadline
             try:
-                bus = can.Bus(interface="fleetloop", channel="r1")
+                return can.Bus(interface="fleetloop", channel="r1")
             except can.CanInitializationError:
                 self.wait(0.02)
-            else:
-                break
-        with bus:
+
+    def await_bus_time(self, seconds: float) -> None:
+        """Return when the bus of r1 has reached this time: the countdown is over, rows flow."""
+        with self.await_bus() as bus:
             while (message := bus.recv(WAIT_S)) is not None and message.timestamp < seconds:
                 pass
         for child in self.launcher.children(recursive=True):

@@ -22,7 +22,7 @@ def rows(tag: str, first: int, count: int, *, final: bool = False) -> Arrival:
     return Arrival(tag, "", Rows(first, count, block, final).encode())
 
 
-def record(path: Path, *arrivals: Arrival) -> tuple[_Recorder, Record]:
+def record(path: Path, *arrivals: Arrival, fills_gaps: bool = False) -> tuple[_Recorder, Record]:
     """What comes of these messages."""
     network = NetworkLink("x", "", "", "")
     brief = RecorderBrief(
@@ -39,6 +39,7 @@ def record(path: Path, *arrivals: Arrival) -> tuple[_Recorder, Record]:
         "",
         300,
         0,
+        fills_gaps,
     )
     with RunRecord(path, dict.fromkeys(brief.robots, SIGNALS), "", brief.period_ns) as file:
         recorder = _Recorder(brief, file)
@@ -94,6 +95,33 @@ def test_a_gap_costs_its_source_the_rest_and_nobody_else(tmp_path: Path) -> None
     assert "begins at tick 101, expected 100" in recorder.refusals.lines()[0]
     assert len(found.controller["r1"]) == 100
     assert len(found.plant["r1"]) == len(found.controller["r2"]) == 300
+
+
+def test_rows_of_a_source_that_was_cut_off_are_not_a_number_but_at_their_time(
+    tmp_path: Path,
+) -> None:
+    recorder, found = record(
+        tmp_path / "a.mcap",
+        rows("controller/r1", 0, 100),
+        rows("controller/r1", 240, 40),
+        rows("controller/r1", 140, 40),  # said before, and late
+        rows("controller/r1", 290, 10, final=True),
+        *whole("plant/r1", "plant/r2", "controller/r2"),
+        fills_gaps=True,
+    )
+    assert not recorder.unfinished
+    assert recorder.gaps() == [
+        "150 rows of r1's controller did not come while it was cut off: not a number"
+    ]
+    assert recorder.refusals.lines() == [
+        "refused 1 row block of r1's controller: begins at tick 140, expected 280"
+    ]
+    mine = found.controller["r1"]
+    assert len(mine) == 300
+    values = mine[SIGNALS[1].name]
+    known = np.r_[0:100, 240:280, 290:300]
+    assert np.flatnonzero(np.isfinite(values)).tolist() == known.tolist()
+    assert mine[SIGNALS[0].name][100:240] == pytest.approx(np.arange(100, 240) * 1e-3)
 
 
 def test_what_is_no_rows_is_counted(tmp_path: Path) -> None:
