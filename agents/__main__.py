@@ -109,7 +109,7 @@ class _Connections(NamedTuple):
     hellos: Hellos
     rows: RowBuffer
     report: Publisher
-    watch: LauncherWatch | None
+    watch: LauncherWatch | None = None
 
     def await_peers(self, deliver: Callable[[Arrival], None], stop: Stop) -> None:
         """Wait for the first message of every peer, then declare this controller ready."""

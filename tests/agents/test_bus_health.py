@@ -294,3 +294,27 @@ def test_in_real_time_a_subscription_is_undeclared_when_its_edge_goes_and_declar
     assert before[0] < 0
     assert before[1:] == ("declare", key)
     assert later == [(100, "undeclare", key), (200, "declare", key), (300, "undeclare", key)]
+
+
+class Watch:
+    """A launcher that is away between two instants of bus time."""
+
+    def __init__(self, rig: Rig, from_ns: int, to_ns: int) -> None:
+        self.rig, self.from_ns, self.to_ns = rig, from_ns, to_ns
+
+    @property
+    def away(self) -> bool:
+        return self.from_ns <= self.rig.wire.bus_ns < self.to_ns
+
+
+def test_a_robot_that_is_cut_off_from_the_launcher_stops_and_comes_back_with_it() -> None:
+    rig = Rig(*REARM)
+    away_ns, back_ns = 13 * S // 10, 19 * S // 10
+    rig.loop._watch = Watch(rig, away_ns, back_ns)
+    rig.run()
+    stopped, rearming, driving = rig.bench.agent.guard.events
+    assert stopped.phase is Phase.STOPPED
+    assert stopped.reason == "cut off from the launcher"
+    assert (rearming.phase, driving.phase) == (Phase.REARMING, Phase.DRIVING)
+    away = [frame for at_ns, frame in rig.wire.log if away_ns + S // 100 < at_ns < back_ns]
+    assert set(set_points(away)) <= {ZERO}
