@@ -57,10 +57,10 @@ class Claim(NamedTuple):
 
 
 def claims(rows: Sequence[Row]) -> list[Claim]:
-    """Every claim; those that several rows test come once for each."""
+    """Every claim, those that can't be tested last; one that several rows test, once for each."""
     ours = [row for row in rows if row.law == PAPER_LAW]
     first = ours[0] if ours else None
-    return [
+    found = [
         *_convergence(first),
         *_adaptation(first, [row for row in rows if row.law == FIXED_LAW]),
         *_simplicity(rows, first),
@@ -74,6 +74,7 @@ def claims(rows: Sequence[Row]) -> list[Claim]:
             Verdict.NOT_TESTABLE,
         ),
     ]
+    return sorted(found, key=lambda one: one.verdict is Verdict.NOT_TESTABLE)
 
 
 def _judged(claim: str, where: str, measured: str, *, holds: bool) -> Claim:
@@ -96,7 +97,8 @@ def _convergence(ours: Row | None) -> Iterator[Claim]:
     known = [error for error in _ERRORS if final[error[0]] is not None]
     open_ = [symbol for name, symbol, _ in known if settled[name] is None]
     if open_:
-        said = f"{' and '.join(open_)} not within ±{SETTLE_BAND:g} at the end"
+        after_s = ours.scenario.ends_at_s
+        said = f"{' and '.join(open_)} not within ±{SETTLE_BAND:g} after {after_s:g} s"
     else:
         latest = max(settled[name] for name, _, _ in known)
         said = f"all within ±{SETTLE_BAND:g} from {latest:.1f} s on"

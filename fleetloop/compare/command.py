@@ -14,7 +14,7 @@ from configs.errors import ExitStatus, InfrastructureError, ScenarioError
 from configs.loading import folder_of, load
 from configs.overrides import Overrides
 from configs.scenario import Scenario
-from fleetloop.compare.claims import claims
+from fleetloop.compare.claims import Verdict, claims
 from fleetloop.compare.contenders import contenders, scenario_under
 from fleetloop.compare.figures import all_figures
 from fleetloop.compare.page import page
@@ -104,7 +104,8 @@ def _finish(
     else:
         print_tables(scenario.name, rows, seeds)
         for one in found:
-            say(f"{one.verdict.value:<17}  {one.claim} ({one.where}): {one.measured}")
+            if one.verdict is not Verdict.NOT_TESTABLE:
+                say(f"{one.verdict.value:<13}  {one.claim} ({one.where}): {one.measured}")
     run_folder.write(out / NUMBERS, to_json(numbers))
     figures = [(item, png(item)) for item in all_figures(rows, seeds[0])]
     try:

@@ -1,10 +1,10 @@
 """Figures of a comparison: a line per law, of its worst robot at every tick.
 
-Left the whole course on a logarithmic scale, metres to micrometres in one picture; right the final
-part, linear, at the scale of the laws that have settled.
+Left the whole course on a logarithmic scale, metres to micrometres in one picture, at the scale of
+the laws that came through; right the final part, linear, at the scale of those that have settled.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import matplotlib as mpl
@@ -74,6 +74,7 @@ def all_figures(rows: Sequence[Row], seed: int) -> list[Captioned]:
         for run in row.outcomes
         if run is row.runs.get(seed) and run.courses is not None
     }
+    sound = {row.label for row in rows if row.sound}
     figures = []
     with mpl.rc_context(STYLE), np.errstate(all="ignore"):
         for quantity in _QUANTITIES:
@@ -83,39 +84,31 @@ def all_figures(rows: Sequence[Row], seed: int) -> list[Captioned]:
                 if quantity.name in found and len(found[quantity.name].t_s) > 1
             }
             if lines:
-                figure = _drawn(quantity, lines)
+                figure = _drawn(quantity, lines, sound)
                 figures.append(Captioned(quantity.file, quantity.caption, figure))
     return figures
 
 
-def _drawn(quantity: _Quantity, lines: Mapping[tuple[int, str], Course]) -> Figure:
+def _drawn(
+    quantity: _Quantity, lines: Mapping[tuple[int, str], Course], sound: Collection[str]
+) -> Figure:
     height_in = HEIGHT_IN + _LEGEND_IN * -(-len(lines) // 2)
     figure = Figure(figsize=(1.25 * WIDTH_IN, height_in), dpi=DPI, layout="constrained")
     whole, close = figure.subplots(1, 2, width_ratios=(3, 2))
     end_s = max(float(course.t_s[-1]) for course in lines.values())
     from_s = max(end_s - FINAL_S, 0.0)
-    ends = []
+    came_through = [course for (_, label), course in lines.items() if label in sound or not sound]
     for (n, label), course in lines.items():
         colour, dash = style_of(n)
         values = np.abs(drawable(course.values))
         whole.plot(course.t_s, np.where(values > 0, values, np.nan), color=colour, linestyle=dash)
         late = course.t_s >= from_s
         close.plot(course.t_s[late], values[late], color=colour, linestyle=dash, label=label)
-        ends.append(values[late])
     if quantity.band:
-        whole.axhline(SETTLE_BAND, color="0.5", linewidth=0.8, linestyle=":")
-        whole.annotate(
-            f"settled: {SETTLE_BAND:g}",
-            (1.0, SETTLE_BAND),
-            xycoords=("axes fraction", "data"),
-            ha="right",
-            va="bottom",
-            fontsize=7,
-            color="0.4",
-        )
-    _logarithmic(whole)
-    close.set_ylim(0.0, _ceiling(quantity, ends))
-    close.set_title(f"final: from {from_s:g} s on", fontsize=9)
+        _mark_band(whole)
+    _logarithmic(whole, came_through)
+    close.set_ylim(0.0, _ceiling(quantity, came_through, from_s))
+    close.set_title(f"final: the last {min(FINAL_S, end_s):.3g} s", fontsize=9)
     close.ticklabel_format(axis="y", style="sci", scilimits=(-3, 3))
     for axes in (whole, close):
         axes.set_xlabel("t [s]")
@@ -125,15 +118,34 @@ def _drawn(quantity: _Quantity, lines: Mapping[tuple[int, str], Course]) -> Figu
     return figure
 
 
-def _ceiling(quantity: _Quantity, ends: Sequence[np.ndarray]) -> float:
-    """The top of the right panel: of laws that have settled, or else of all."""
-    peaks = [float(np.nanmax(values, initial=0.0)) for values in ends]
+def _mark_band(axes: Axes) -> None:
+    axes.axhline(SETTLE_BAND, color="0.5", linewidth=0.8, linestyle=":")
+    axes.annotate(
+        f"settled: {SETTLE_BAND:g}",
+        (1.0, SETTLE_BAND),
+        xycoords=("axes fraction", "data"),
+        ha="right",
+        va="bottom",
+        fontsize=7,
+        color="0.4",
+    )
+
+
+def _ceiling(quantity: _Quantity, lines: Sequence[Course], from_s: float) -> float:
+    """The top of the right panel: of laws that have settled, or else of all these."""
+    peaks = [_peak(line.values[line.t_s >= from_s]) for line in lines]
     settled = [peak for peak in peaks if peak <= SETTLE_BAND] if quantity.band else peaks
     return 1.1 * max(settled or peaks) or 1.0
 
 
-def _logarithmic(axes: Axes) -> None:
-    """A logarithmic scale over a range that shows something."""
+def _peak(values: np.ndarray) -> float:
+    return float(np.nanmax(np.abs(drawable(values)), initial=0.0))
+
+
+def _logarithmic(axes: Axes, lines: Sequence[Course]) -> None:
+    """A logarithmic scale over the range of these lines; others may leave it at the top."""
     axes.set_yscale("log")
-    low, high = axes.get_ylim()
-    axes.set_ylim(max(low, high * 10.0**-_DECADES), high)
+    high = 2.0 * max(_peak(line.values) for line in lines)
+    if high > 0.0:
+        low, _ = axes.get_ylim()
+        axes.set_ylim(max(low, high * 10.0**-_DECADES), high)

@@ -57,7 +57,7 @@ def page(
 
 def _claims(found: Sequence[Claim]) -> str:
     lines = "".join(
-        f"<tr><td>{escape(one.claim)}</td><td>{escape(one.where)}</td>"
+        f'<tr><td>{escape(one.claim)}</td><td class="where">{escape(one.where)}</td>'
         f"<td>{escape(one.measured)}</td>"
         f'<td class="verdict {_COLOUR[one.verdict]}">{escape(one.verdict.value)}</td></tr>'
         for one in found

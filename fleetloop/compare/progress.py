@@ -20,7 +20,7 @@ class Bars:
         # Without a thread of its own: it is shown a few times a second anyway.
         self._bars = Progress(
             TextColumn("{task.description}"),
-            BarColumn(),
+            BarColumn(bar_width=24),
             TextColumn("{task.completed:6.2f} / {task.total:g} s"),
             console=console,
             transient=True,

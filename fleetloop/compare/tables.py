@@ -114,11 +114,11 @@ def notes(seeds: Sequence[int]) -> list[str]:
     worst = f", the worst of seeds {', '.join(map(str, seeds))}" if len(seeds) > 1 else ""
     return [
         f"settled: within ±{SETTLE_BAND:g} from then on, all robots; final: the last {FINAL_S:g} s,"
-        f" greatest magnitude of any robot or, rms, over all{worst}",
+        f" or all of a shorter run, greatest magnitude of any robot or, rms, over all{worst}",
         "rms of the position error hypot(x_e, y_e) and of the wheels' torque over the whole run;"
         " change: rms from tick to tick",
         "Θ̂ off by: ‖Θ̂ − Θ‖ / ‖Θ‖ at start and end, the worst robot; step: processor time of the"
-        " law alone, the same motions to all in turn",
+        " law alone, the same motions to all in turn; × first: in the first law that came through",
     ]
 
 
@@ -147,5 +147,7 @@ def print_tables(title: str, rows: Sequence[Row], seeds: Sequence[int]) -> None:
 def trouble_lines(rows: Sequence[Row]) -> Iterator[str]:
     """Laws whose robots stopped, or whose runs ended early, and why."""
     for row in rows:
-        for text in row.troubles:
-            yield f"STOPPED {row.label}: {text}"
+        if row.troubles:
+            first, *others = row.troubles
+            more = f"; {len(others)} more in compare.json" if others else ""
+            yield f"STOPPED {row.label}: {first}{more}"
