@@ -52,6 +52,7 @@ from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.network.telemetry import RowBuffer
 from configs.brief import AgentBrief
 from configs.leader_speed import speed_at
+from configs.netem import MOST_DELAY_NS
 from configs.signals import AGE_PREFIX
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
@@ -120,7 +121,8 @@ class Agent:
     def _pose_history(self, brief: AgentBrief) -> int:
         """Longest age of a fix [ticks]: the odometry since then is kept for that long."""
         if self._network is not None and self._network.carries_poses:
-            oldest = brief.host.pose_age_limit_ns // brief.schedule.period_ns
+            oldest_ns = min(brief.host.pose_age_limit_ns, MOST_DELAY_NS)
+            oldest = oldest_ns // brief.schedule.period_ns
             return max(oldest, POSE_HISTORY_TICKS, self._pose_delay)
         return POSE_HISTORY_TICKS if brief.schedule.realtime else self._pose_delay
 

@@ -35,6 +35,7 @@ LOCALISATION = "localisation"
 """The localisation system's name as the source of an edge."""
 EVERY_ROBOT = "*"
 MOST_DELAY_S = 60.0
+MOST_DELAY_NS = 60_000_000_000
 LEAST_MEAN_S = 1e-9
 """Of a lognormal delay: scenario time has nanoseconds."""
 LEAST_BANDWIDTH_BIT_S = 1.0

@@ -6,7 +6,7 @@ from math import log, sqrt
 from random import Random
 
 from configs.netem import (
-    MOST_DELAY_S,
+    MOST_DELAY_NS,
     ConstantDelay,
     Delay,
     LognormalDelay,
@@ -15,7 +15,6 @@ from configs.netem import (
     UniformDelay,
 )
 
-_MOST_NS = round(MOST_DELAY_S * 1e9)
 Draw = Callable[[], int | None]
 """The delay of the next message [ns]; None: it is lost."""
 
@@ -48,7 +47,7 @@ def lognormal_parameters(mean_s: float, std_s: float) -> tuple[float, float]:
 
 
 def _bounded(delay_s: float) -> int:
-    return min(max(round(delay_s * 1e9), 0), _MOST_NS)
+    return min(max(round(delay_s * 1e9), 0), MOST_DELAY_NS)
 
 
 def _following(delays_s: Iterator[float]) -> Draw:

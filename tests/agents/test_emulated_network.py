@@ -3,7 +3,7 @@
 from math import isnan
 
 import pytest
-from support.robot_bench import NOWHERE
+from support.robot_bench import NOWHERE, Bench
 
 from agents.emulated_network import HERE, EmulatedNetwork
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
@@ -99,6 +99,13 @@ def test_the_first_message_is_sent_from_as_far_as_the_start_poses_are_apart() ->
     edges.send_path_state("r1", state(0))
     assert edges.path_states(0) == []
     assert edges.counts()["r1"]["lost"] == 1
+
+
+def test_odometry_is_kept_for_the_longest_delay_however_old_a_pose_may_be() -> None:
+    edge = 'network={edge=[{edges=["localisation -> *"], duplication=0.5}]}'
+    bench = Bench("r2", "host.pose_age_limit_s=1e9", edge)  # of the 1e9 s no memory holds the ticks
+    assert bench.agent.network is not None
+    assert bench.agent.network.carries_poses
 
 
 @pytest.mark.parametrize("robot", ["r1", "r2"])
