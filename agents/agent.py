@@ -253,7 +253,7 @@ class Agent:
         """Apply what the emulated network delivers at this tick."""
         now_ns = tick * self._schedule.period_ns
         network.measure(tick if self._realtime else tick - self._place_delay)
-        for robot, state in network.path_states(now_ns):
+        for robot, state in network.path_states(now_ns, self._edges.heard):
             self._neighbours.receive(robot, state.t_ns, state.s, state.v_hat)
         fix = network.newest_pose(now_ns)
         if fix is None or tick - fix.tick > self._history or fix.tick <= self._fix_tick:
@@ -343,7 +343,8 @@ class Agent:
     def _leader_speed(self, tick: int, without: float) -> float:
         """v_r as it is heard; `without`: nothing heard over an emulated edge."""
         if self._network is not None:
-            return self._network.leader_speed(tick, self._leader, without)
+            heard = self._edges.h > 0.0
+            return self._network.leader_speed(tick, self._leader, without, exists=heard)
         if self._leader is None:
             return 0.0
         return speed_at(self._leader.changes, tick * self._schedule.period_ns)

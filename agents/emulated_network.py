@@ -13,7 +13,7 @@ well, from the localisation system, and nowhere else: the controller doesn't kno
 sent from as far as the robots were apart at the last poses that both have.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from math import hypot, nan
 
 from bridge.netem.channel import Channel
@@ -124,12 +124,12 @@ class EmulatedNetwork:
                 apart_m = hypot(there.x_m - here.x_m, there.y_m - here.y_m)
                 self._distances_m[robot] = apart_m
 
-    def path_states(self, now_ns: int) -> list[tuple[str, PathState]]:
-        """The path states that are due, in the order of names."""
+    def path_states(self, now_ns: int, heard: Collection[str]) -> list[tuple[str, PathState]]:
+        """The path states that are due, in the order of names; `heard`: whose edges exist."""
         return [
             (robot, delivery.message)
             for robot, channel in self._paths.items()
-            for delivery in channel.receive(now_ns)
+            for delivery in channel.receive(now_ns, exists=robot in heard)
         ]
 
     def newest_pose(self, now_ns: int) -> PoseFix | None:
@@ -142,12 +142,21 @@ class EmulatedNetwork:
             self._fix_ns = newest.t_ns
         return newest
 
-    def leader_speed(self, tick: int, leader: LeaderSpeed | None, without: float) -> float:
-        """v_r at a tick as the robot hears it [m/s]; `without`: nothing heard, or not for long."""
+    def leader_speed(
+        self, tick: int, leader: LeaderSpeed | None, without: float, *, exists: bool = True
+    ) -> float:
+        """v_r at a tick as the robot hears it [m/s].
+
+        `without` if nothing is heard, or not for long, or if the leader's edge doesn't exist.
+        """
         now_ns = tick * self._schedule.period_ns
         channel = self._leader
         if channel is None or leader is None:
             return without if leader is None else speed_at(leader.changes, now_ns)
+        if not exists:
+            channel.receive(now_ns, exists=False)
+            self._v_r = nan
+            return without
         if self._schedule.shares(tick):
             channel.send(now_ns, speed_at(leader.changes, now_ns))
         for sent_ns, v_r in channel.receive(now_ns):

@@ -128,12 +128,18 @@ class Channel(Generic[Message]):
             else:
                 self._await(now_ns, left_ns + copy_delay_ns, message)
 
-    def receive(self, now_ns: int) -> list[Delivery[Message]]:
-        """The messages that are due, in the order in which they arrive."""
+    def receive(self, now_ns: int, *, exists: bool = True) -> list[Delivery[Message]]:
+        """The messages that are due, in the order in which they arrive.
+
+        Where the edge doesn't exist now, they are lost.
+        """
         due, counts = self._due, self.counts
         arrived: list[Delivery[Message]] = []
         while due and due[0][0] <= now_ns:
             _, _, sent_ns, message = heappop(due)
+            if not exists:
+                counts.lost += 1
+                continue
             counts.delivered += 1
             if self._newest_ns is not None and sent_ns < self._newest_ns:
                 counts.reordered += 1

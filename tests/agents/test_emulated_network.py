@@ -32,9 +32,9 @@ def test_a_path_state_is_due_at_its_date_and_the_delay_however_late_it_came() ->
     edges = network('{default={delay={kind="constant", delay_s=0.03}}}')
     assert edges.carries_path_of("r1")
     edges.send_path_state("r1", state(10))  # of 20 ms
-    assert edges.path_states(49 * MS) == []
+    assert edges.path_states(49 * MS, ["r1"]) == []
     edges.send_path_state("r1", state(20))  # of 40 ms
-    assert [s.tick for _, s in edges.path_states(90 * MS)] == [10, 20]
+    assert [s.tick for _, s in edges.path_states(90 * MS, ["r1"])] == [10, 20]
 
 
 def test_of_poses_that_are_due_the_newest_counts() -> None:
@@ -88,7 +88,7 @@ def test_a_message_is_sent_from_as_far_as_the_last_poses_of_both_are_apart() -> 
     edges.receive_place("r1", pose(15, 3.0, 3.9))
     edges.measure(15)  # this robot's own is as before
     edges.send_path_state("r1", state(20))
-    assert [s.tick for _, s in edges.path_states(40 * MS)] == [0, 20]
+    assert [s.tick for _, s in edges.path_states(40 * MS, ["r1"])] == [0, 20]
     assert edges.counts()["r1"]["lost"] == 1
 
 
@@ -97,7 +97,7 @@ def test_the_first_message_is_sent_from_as_far_as_the_start_poses_are_apart() ->
     edges.receive_place("r1", pose(-1, 5.1))
     edges.receive_place(HERE, pose(-1, 0.0))
     edges.send_path_state("r1", state(0))
-    assert edges.path_states(0) == []
+    assert edges.path_states(0, ["r1"]) == []
     assert edges.counts()["r1"]["lost"] == 1
 
 
@@ -106,6 +106,31 @@ def test_odometry_is_kept_for_the_longest_delay_however_old_a_pose_may_be() -> N
     bench = Bench("r2", "host.pose_age_limit_s=1e9", edge)  # of the 1e9 s no memory holds the ticks
     assert bench.agent.network is not None
     assert bench.agent.network.carries_poses
+
+
+def test_what_is_due_while_an_edge_does_not_exist_is_lost() -> None:
+    edges = network('{default={delay={kind="constant", delay_s=0.03}}}')
+    for tick in (10, 20, 30):
+        edges.send_path_state("r1", state(tick))  # due at 50, 70 and 90 ms
+    assert [s.tick for _, s in edges.path_states(60 * MS, ["r1"])] == [10]
+    assert edges.path_states(80 * MS, []) == []
+    assert [s.tick for _, s in edges.path_states(90 * MS, ["r1"])] == [30]
+    counts = edges.counts()["r1"]
+    assert (counts["sent"], counts["delivered"], counts["lost"]) == (3, 2, 1)
+
+
+def test_a_leader_whose_edge_goes_is_heard_again_by_what_it_says_afterwards() -> None:
+    late = '{edge=[{edges=["leader -> r1"], delay={kind="constant", delay_s=0.1}}]}'
+    edges = network(late, "r1")
+    says = LeaderSpeed((SpeedChange(0, 0.6, 0), SpeedChange(1000 * MS, 0.2, 0)))
+    heard = {
+        tick * 2: edges.leader_speed(tick, says, -1.0, exists=not 400 <= tick < 600)
+        for tick in range(700)  # gone from 0.8 s to 1.2 s
+    }
+    assert (heard[798], heard[800], heard[1198]) == (0.6, -1.0, -1.0)
+    assert (heard[1298], heard[1300]) == (-1.0, 0.2)
+    counts = edges.counts()["leader"]
+    assert (counts["sent"], counts["lost"]) == (50, 5)
 
 
 @pytest.mark.parametrize("robot", ["r1", "r2"])
