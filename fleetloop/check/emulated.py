@@ -128,7 +128,9 @@ class _Fleet:
         for edges in self._edges_to.values():
             edges.follow(tick)
         ages = [
-            self._exchange(edge, channel, now_ns, v_r, shares=shares and self._exists(edge, tick))
+            self._exchange(edge, channel, now_ns, v_r, shares=shares)
+            if self._exists(edge, tick)
+            else self._lose(edge, channel, now_ns)
             for edge, channel in self._channels.items()
         ]
         for robot, state in self._states.items():
@@ -147,7 +149,16 @@ class _Fleet:
         return ages
 
     def _exists(self, edge: EmulatedEdge, tick: int) -> bool:
-        return edge.source == LEADER or self._edges_to[edge.hearer].exists(edge.source, tick)
+        edges = self._edges_to[edge.hearer]
+        return edges.h > 0.0 if edge.source == LEADER else edges.exists(edge.source, tick)
+
+    def _lose(
+        self, edge: EmulatedEdge, channel: Channel[tuple[float, float]], now_ns: int
+    ) -> float:
+        """Of an edge that doesn't exist: what is due is lost, and nothing known any more."""
+        channel.receive(now_ns, exists=False)
+        self._newest_ns[edge] = None
+        return nan
 
     def _exchange(
         self,

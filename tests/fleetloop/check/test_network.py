@@ -129,3 +129,16 @@ def test_the_forecast_over_a_network_is_the_run() -> None:
         t_s = scenario.clock.control_period_s * np.arange(len(rows[name]))
         ours = np.interp(t_s, ahead.t_s, ahead.s[:, n])
         assert np.abs(ours - rows[name]["s"]).max() < 0.02
+
+
+def test_nothing_is_known_over_an_edge_that_does_not_exist() -> None:
+    late = 'network={default={delay={kind="constant", delay_s=0.2}}}'
+    scenario = load("switching", ("duration_s=10.0", "expect=[]", late))
+    ahead = emulated_forecast(scenario, lambda _: pytest.fail("no loss by distance"))
+    ticks = np.round(ahead.t_s / scenario.clock.control_period_s).astype(int).tolist()
+    for edge, ages in zip(ahead.edges, ahead.age_s.T, strict=True):
+        (there,) = (one for one in scenario.topology.hears[edge[1]] if one.speaker == edge[0])
+        exists = np.array([there.exists(tick) for tick in ticks])
+        heard = np.isfinite(ages)
+        assert heard.any()
+        assert not (heard & ~exists).any()
