@@ -46,7 +46,7 @@ class Verdict(NamedTuple):
 def drawn(number: int, duration_s: float = DURATION_S) -> str:
     """The scenario file of a number."""
     draw = Random(f"scenario {number}")
-    period_s = draw.choice((0.01, 0.02))
+    period_s = draw.choice((0.01, 0.02, 0.02))
     robots = [f"r{n + 1}" for n in range(draw.randint(2, 4))]
     speed = round(draw.uniform(0.2, 0.8), 2)
     data: dict[str, Any] = {
@@ -58,7 +58,7 @@ def drawn(number: int, duration_s: float = DURATION_S) -> str:
             "control_period_s": period_s,
             "share_period_s": draw.choice((0.02, 0.06, 0.1, 0.2, 0.5, 1.0)),
             "localisation_period_s": 0.02,
-            "plant_step_s": period_s / 4,
+            "plant_step_s": period_s / 2,
             "countdown_s": 0.6,
         },
         "leader": {"speed_m_s": speed},
@@ -226,8 +226,9 @@ def table(verdicts: Iterable[Verdict]) -> Iterator[str]:
     for level in LEVELS:
         yield f"| {level} | {counts[level, True]} | {counts[level, False]} |"
     yield ""
-    fine = counts["ok", False]
-    yield f'{total} scenarios; false "ok": {fine}, {fine / max(total, 1):.1%} of all'
+    fails = counts["ok", False]
+    called = max(counts["ok", True] + fails, 1)
+    yield f"{total} scenarios; of those called ok {fails} fail, {fails / called:.1%}"
     yield f"{refused} more were refused when they were loaded"
 
 

@@ -29,7 +29,7 @@ _MOST_INSTANTS = 1000
 """Graphs of a switching one that (46) is looked at for."""
 _EFOLDS = 3.0
 """An error that grows for less than this many time constants stays small in a short run."""
-_POSITIVE, _SMALL_GAIN = 4.0, 2.0
+POSITIVE, SMALL_GAIN = 4.0, 2.0
 """p²/(q d_max) from which (45) averages, and from which no delay is too long."""
 _AMPLE_S = 1.0
 """A margin of delay that is worth no warning of its own."""
@@ -130,7 +130,7 @@ def gain_class(graph: Graph, p: float, q: float) -> Finding:
         limit="≥ 4: any delay, any switching with a jointly rooted union; string stable",
         basis="gain and sign of (45)",
     )
-    if ratio >= _POSITIVE:
+    if ratio >= POSITIVE:
         return fine
     if graph.switches:
         return replace(
@@ -138,21 +138,21 @@ def gain_class(graph: Graph, p: float, q: float) -> Finding:
             level="warning",
             key="coordination.p",
             limit="≥ 4: graphs that each pass (46) may diverge when they switch",
-            remedy=f"raise coordination.p to {np.sqrt(_POSITIVE * q * degree):.3g}",
+            remedy=f"raise coordination.p to {np.sqrt(POSITIVE * q * degree):.3g}",
         )
-    if ratio >= _SMALL_GAIN:
+    if ratio >= SMALL_GAIN:
         return replace(fine, limit="≥ 2: any delay; string stable; switching graphs needs 4")
     fine = replace(fine, limit="< 2: this graph as it is, by (46); amplifies from robot to robot")
     if delay_margin_s(graph, p, q) >= _AMPLE_S:
         return fine
-    least = np.sqrt(_SMALL_GAIN * q * degree)
+    least = np.sqrt(SMALL_GAIN * q * degree)
     remedy = f'raise coordination.p to {least:.3g}, or graph.weights = "normalised"'
     limit, key = "≥ 2 for any delay, ≥ 4 for switching", "coordination.p"
     return replace(fine, level="warning", limit=limit, key=key, remedy=remedy)
 
 
 def _positive(graph: Graph, p: float, q: float) -> bool:
-    return p * p >= _POSITIVE * q * graph.max_in_degree
+    return p * p >= POSITIVE * q * graph.max_in_degree
 
 
 def _right_side(graph: Graph) -> float:

@@ -40,7 +40,7 @@ from configs.scenario import Scenario
 from fleetloop.check.coordination import Forecast, Matrix, delay_margin_s
 from fleetloop.check.emulated import EmulatedForecast
 from fleetloop.check.finding import Finding, Level
-from fleetloop.check.graph import graph_conditions
+from fleetloop.check.graph import POSITIVE, SMALL_GAIN, graph_conditions
 from fleetloop.settling import LOST_M, SETTLE_BAND
 
 CARRIES_PART = 0.9
@@ -219,21 +219,23 @@ def _carried(scenario: Scenario, ahead: EmulatedForecast) -> Iterator[Finding]:
             remedy="shorter delays, or a larger coordination.silence_limit_s",
             basis=finding.basis,
         )
-    comes_and_goes = [edge for edge, part in parts.items() if 0.0 < part < CARRIES_PART]
-    gains = scenario.coordination
-    if comes_and_goes and gains.p**2 < 4.0 * gains.q * graph.max_in_degree:
-        edge = min(comes_and_goes, key=lambda one: parts[one])
-        value = f"{edge[0]} -> {edge[1]} counts in {parts[edge]:.0%} of the time"
-        remedy = "a switching graph: p² ≥ 4 q d_max covers it, or a larger silence limit"
-        basis = "(45) switched"
+    yield from _come_and_go(scenario, parts)
+
+
+def _come_and_go(scenario: Scenario, parts: dict[Edge, float]) -> Iterator[Finding]:
+    """Edges that count in a part of the time only: the graph switches at random."""
+    graph, gains = scenario.topology, scenario.coordination
+    some = [edge for edge, part in parts.items() if 0.0 < part < CARRIES_PART]
+    if some and gains.p**2 < POSITIVE * gains.q * graph.max_in_degree:
+        edge = min(some, key=lambda one: parts[one])
         yield Finding(
             "warning",
             "edges come and go",
-            value,
+            f"{edge[0]} -> {edge[1]} counts in {parts[edge]:.0%} of the time",
             key="coordination.p",
             limit=f"≥ {CARRIES_PART:.0%}",
-            remedy=remedy,
-            basis=basis,
+            remedy="raise it until p² ≥ 4 q d_max, which covers switching, or lose less",
+            basis="(45) switched",
         )
 
 
@@ -256,15 +258,14 @@ def _margin(scenario: Scenario, ahead: Forecast, ages_s: dict[Edge, float]) -> F
     lost = ahead.spread[-1] > LOST_M and ahead.spread[-1] > ahead.spread[0]
     level: Level = "error" if margin_s <= most_s and lost else "warning"
     remedy = 'compensation = "extrapolate", or ' if both else ""
-    remedy += f"p ≥ {sqrt(2.0 * gains.q * graph.max_in_degree):.3g}, shorter delays"
+    remedy += f"p ≥ {sqrt(SMALL_GAIN * gains.q * graph.max_in_degree):.3g}, shorter delays"
     return Finding(level, title, value, key="coordination", limit=limit, remedy=remedy, basis=basis)
 
 
 def _bias(scenario: Scenario, ages_s: dict[Edge, float]) -> Finding:
     """What `hold` leaves at the leader's final speed."""
     gains = scenario.coordination
-    v_r = scenario.leader.steps[-1].speed_m_s if scenario.leader.steps else 0.0
-    v_r = v_r if scenario.leader.steps else scenario.leader.speed_m_s
+    v_r = (scenario.leader.steps or (scenario.leader,))[-1].speed_m_s
     found = hold_bias(scenario.topology, ages_s, gains.p, gains.q, v_r)
     title, basis = 'bias of compensation = "hold"', "(45) with ages, steady"
     if found is None:
