@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from rich.markup import escape
 from rich.table import Table
 
 from configs.deployment import Deployment, load_deployment
@@ -15,8 +14,9 @@ from configs.overrides import Overrides
 from configs.roles import AGENT
 from configs.scenario import Scenario
 from fleetloop.check.examine import examine
-from fleetloop.check.finding import Finding, named, resting_on, robots_of, worst
+from fleetloop.check.finding import Finding, resting_on, worst
 from fleetloop.check.rehearsal import rehearse
+from fleetloop.check.table import print_findings
 from fleetloop.terminal import ResultConsole, say, say_json
 
 _VERDICTS = {
@@ -24,7 +24,6 @@ _VERDICTS = {
     "warning": "no error; mind the warnings",
     "error": "would not work as it is",
 }
-_MARKS = {"ok": "[green]ok[/]", "warning": "[yellow]warning[/]", "error": "[red]error[/]"}
 
 
 def check_scenario(
@@ -48,54 +47,9 @@ def check_scenario(
     if as_json:
         _say_json(findings=found)
         return ExitStatus.FAILED if unsound else ExitStatus.OK
-    console = ResultConsole()
-    table = _table(scenario, found)
-    if console.is_terminal:
-        console.print(table)
-    else:  # a line for each
-        console.print_whole(table)
+    print_findings(scenario, found)
     say(_VERDICTS[worst(found)])
     return ExitStatus.FAILED if unsound else ExitStatus.OK
-
-
-def _table(scenario: Scenario, findings: Sequence[Finding]) -> Table:
-    """A row for each finding; those that are ok share the row of the first robot."""
-    graph = scenario.topology
-    table = Table(
-        "",
-        "what",
-        "robots",
-        "value",
-        "limit",
-        "rests on",
-        "to change",
-        title=f"{scenario.name}: robots {len(graph.robots)}, edges {len(graph.edges)}",
-        title_justify="left",
-        header_style="dim",
-        box=None,
-        padding=(0, 1),
-    )
-    by_title: dict[str, list[Finding]] = {}
-    for finding in findings:
-        by_title.setdefault(finding.title, []).append(finding)
-    for group in by_title.values():
-        well = [finding for finding in group if finding.level == "ok"]
-        if well:
-            others = robots_of(well[1:])
-            table.add_row(*_cells(well[0], graph.robots, likewise=named(others, graph.robots)))
-        for finding in group:
-            if finding.level != "ok":
-                table.add_row(*_cells(finding, graph.robots))
-    return table
-
-
-def _cells(finding: Finding, everybody: Sequence[str], likewise: str = "") -> tuple[str, ...]:
-    robots = named(finding.robots, everybody) + (f", likewise {likewise}" if likewise else "")
-    key = "" if finding.key in finding.remedy else finding.key
-    change = ": ".join(part for part in (key, finding.remedy) if part)
-    what, value, limit = finding.title, finding.value, finding.limit
-    cells = what, robots, value, limit, finding.basis, change
-    return _MARKS[finding.level], *map(escape, cells)
 
 
 def _find(
