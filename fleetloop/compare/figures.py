@@ -104,9 +104,9 @@ def _drawn(
         whole.plot(course.t_s, np.where(values > 0, values, np.nan), color=colour, linestyle=dash)
         late = course.t_s >= from_s
         close.plot(course.t_s[late], values[late], color=colour, linestyle=dash, label=label)
+    _logarithmic(whole, came_through)
     if quantity.band:
         _mark_band(whole)
-    _logarithmic(whole, came_through)
     close.set_ylim(0.0, _ceiling(quantity, came_through, from_s))
     close.set_title(f"final: the last {min(FINAL_S, end_s):.3g} s", fontsize=9)
     close.ticklabel_format(axis="y", style="sci", scilimits=(-3, 3))
@@ -119,6 +119,10 @@ def _drawn(
 
 
 def _mark_band(axes: Axes) -> None:
+    """Mark it where it is in sight: a label outside of the axes would take their place."""
+    low, high = axes.get_ylim()
+    if not low < SETTLE_BAND < high:
+        return
     axes.axhline(SETTLE_BAND, color="0.5", linewidth=0.8, linestyle=":")
     axes.annotate(
         f"settled: {SETTLE_BAND:g}",
