@@ -42,9 +42,14 @@ def effects_of(network: Network, edge: EmulatedEdge) -> Effects:
     return effects
 
 
-def effects_to(network: Network, graph: Graph, hearer: str) -> dict[str, Effects]:
-    """The effects of the edges to a robot by their sources, of those that have any."""
-    heard = [edge.speaker for edge in graph.hears[hearer]]
+def effects_to(
+    network: Network, graph: Graph, hearer: str, *, of_robots: bool = True
+) -> dict[str, Effects]:
+    """The effects of the edges to a robot by their sources, of those that have any.
+
+    `of_robots`: of its in-neighbours, too.
+    """
+    heard = [edge.speaker for edge in graph.hears[hearer]] if of_robots else []
     leader = [LEADER] if hearer in graph.leader else []
     all_of = {
         source: effects_of(network, EmulatedEdge(source, hearer))

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from configs.choices import chosen_anew, shared_part
 from configs.drives import Drive
 from configs.edges import FOREVER, LEADER, Edge, parse_edge, presence
-from configs.emulated_edges import SOURCES, effects_to
+from configs.emulated_edges import effects_to
 from configs.graph import Graph, generated, of_matrix, random_rooted
 from configs.graph_section import GraphSection
 from configs.host import Host
@@ -111,11 +111,8 @@ class Scenario(BaseModel):
         emulated = self.network.default != Effects() or bool(self.network.edge)
         if not emulated and not self.topology.switches and self.clock.mode == "lockstep":
             return ()
-        with_effects = effects_to(self.network, self.topology, name)
-        return (
-            *(edge.speaker for edge in self.topology.hears[name]),
-            *(source for source in SOURCES if source in with_effects),
-        )
+        others = effects_to(self.network, self.topology, name, of_robots=False)
+        return (*(edge.speaker for edge in self.topology.hears[name]), *others)
 
     @property
     def names(self) -> tuple[str, ...]:
