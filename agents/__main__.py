@@ -91,8 +91,9 @@ def _run(
         link.subscribe(keys.leader_speed(name), "leader")
 
     hellos = Hellos(brief.schedule.hello_every_s)
-    hellos.add(path, agent.share(-1).encode())
-    hellos.add(telemetry, Rows(0, 0, b"", False).encode())
+    if not brief.rejoins:
+        hellos.add(path, agent.share(-1).encode())
+        hellos.add(telemetry, Rows(0, 0, b"", False).encode())
     run_loop = _realtime if brief.schedule.realtime else _lockstep
     connections = _Connections(agent, bus, link, subscriptions, path, hellos, rows, report, watch)
     return run_loop(connections, stop)

@@ -39,7 +39,7 @@ from agents.coordination import CoordinationState, Coordinator
 from agents.emulated_network import HERE, EmulatedNetwork
 from agents.guard import UNCHANGED, Guard, Phase, TorqueOutcome
 from agents.in_edges import InEdges
-from agents.joining import joining
+from agents.joining import Joining
 from agents.laws.build import build
 from agents.laws.failure import DIVERGED, failure
 from agents.laws.interface import PathVariable, Reference, RobotMotion
@@ -56,6 +56,7 @@ from configs.netem import MOST_DELAY_NS
 from configs.signals import AGE_PREFIX
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
+_NOWHERE = RobotMotion(nan, nan, nan, nan, nan)
 _NO_REFERENCE = Reference(nan, nan, nan, nan, nan)
 POSE_HISTORY_TICKS = 64
 """Longest age of a fix in real time [ticks]."""
@@ -90,8 +91,11 @@ class Agent:
         self._edges = InEdges(brief.hears, brief.leader_link, self._neighbours)
         start = brief.coordination
         self._coordination = CoordinationState(start.v_hat_0, start.mu_0, brief.s_0)
-        self._start = self._coordination
-        self._joins, self._leaves = brief.membership.joins_tick, brief.membership.leaves_tick
+        self._joining = Joining(
+            brief, self._neighbours, self._edges, self._coordinator, self._coordination
+        )
+        self._leaves = brief.membership.leaves_tick
+        self._located = False  # by a fix
         self.feedback_since = self._drives.feedback_since
         """Whether both encoder frames were received after a bus time [ns]."""
         self._diverged = False  # the next path variable is beyond reach
@@ -177,6 +181,8 @@ class Agent:
 
     def missing_to_start(self) -> list[str]:
         """Senders whose first message is required for the start and has not arrived."""
+        if self.brief.rejoins:  # the others have started
+            return []
         missing = [f"the path variable of {robot}" for robot in sorted(self._awaited)]
         if self._start_fix is None:
             missing.append("the localisation system")
@@ -236,7 +242,7 @@ class Agent:
             return self._guard.shut_down()
         if not self._guard.begun:
             self._guard.begin(tick)
-        if self._joins <= tick < self._leaves:
+        if self._joining.joins <= tick < self._leaves:
             return self._control(tick, motion)
         return self._stand_by(tick, motion)
 
@@ -295,6 +301,7 @@ class Agent:
         except DIVERGED:  # beyond arithmetic: ignored
             return carried
         self._guard.note_pose(tick - ago)
+        self._located = True
         if self._pose_mismatch_m < inf:
             apart_m = hypot(motion.x - carried.x, motion.y - carried.y)
             far = apart_m > self._pose_mismatch_m
@@ -357,19 +364,14 @@ class Agent:
             frames = self._guard.leave(tick)
         else:
             frames = self._guard.command(tick, 0.0, 0.0)
-            after = joining(
-                self._neighbours,
-                t_ns + self._schedule.period_ns,
-                self._edges.h,
-                v_r,
-                self._start,
-            )
+            after = self._joining.state(tick + 1, v_r, self._leader, located=self._located)
             self._accept_path_variable(t_ns * 1e-9 + self._h, after)
-            if tick + 1 == self._joins:
-                self._guard.note_joining(self._joins, self._coordination.s)
+            if tick + 1 == self._joining.joins:
+                self._guard.note_joining(tick + 1, self._coordination.s)
         ages = self._ages_s(t_ns) if self._records_ages else ()
         sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
-        row = (t_ns * 1e-9, *motion, nan, nan, nan, nan, 0, nan, nan, nan)
+        known = self._located or not self.brief.rejoins
+        row = (t_ns * 1e-9, *(motion if known else _NOWHERE), nan, nan, nan, nan, 0, nan, nan, nan)
         self._rows.add(tick, (*row, *ages, *self._no_signals, *sent))
         return frames
 
@@ -377,6 +379,10 @@ class Agent:
         """Ages of the data of every source [s], in the order of the record; NaN: none yet."""
         ages = self._neighbours.ages_s(t_ns)
         return ages if self._network is None else ages + self._network.ages_s(t_ns)
+
+    def speaks(self, tick: int) -> bool:
+        """Whether the robot is part of the formation, so that its path state means something."""
+        return self._joining.joins <= tick < self._leaves
 
     def _accept_path_variable(self, t_s: float, after: CoordinationState) -> None:
         """Accept the next path variable; one beyond reach is rejected, and the robot stops."""

@@ -65,8 +65,8 @@ class Guard:
         host, schedule = brief.host, brief.schedule
         client = protocol(brief.drives.choice.plugin).client(brief.drives)
         self.drives: DriveClient = DryRun(client) if host.dry_run else client
-        self.phase = Phase.ARMING
-        self.begun = False
+        self.phase = Phase.STOPPED if brief.rejoins else Phase.ARMING
+        self.begun = brief.rejoins
         """Whether tick 0 has come."""
         self.outcome = TorqueOutcome.WITHHELD
         """The outcome of the law's torques in this tick."""
@@ -91,7 +91,7 @@ class Guard:
         self._pose_until = self._pose_age_ticks if host.pose_age_limit_ns else schedule.ticks
         """The last tick that the newest fix is good for."""
         self._noted_faults: dict[str, str] = {}  # by source
-        self._rearming = Rearming(host)
+        self._rearming = Rearming(host, at_least=int(brief.rejoins))
         self._refusal: str | None = None  # came while READY; only a person may clear it
 
     # --- notes from the agent ---------------------------------------------------------------
@@ -127,8 +127,9 @@ class Guard:
             self._stop(tick, "could not arm again: a frame of it was not sent")
 
     def note_joining(self, tick: int, s: float) -> None:
-        """Note that the robot joins the formation at a tick."""
-        self._announce(f"{self._when(tick)}: joins the formation at s = {s:.4g} m")
+        """Note that the robot joins the formation at a tick, or again after a restart."""
+        joins = "re-joins" if self._brief.rejoins else "joins"
+        self._announce(f"{self._when(tick)}: {joins} the formation at s = {s:.4g} m")
 
     # --- before tick 0 ---------------------------------------------------------------------------
 
@@ -138,9 +139,11 @@ class Guard:
         Raises:
             InfrastructureError: the drives were not armed when control had to start.
         """
+        drives, now_ns = self.drives, self._bus_time_ns(tick)
+        if self.begun:  # of a controller that re-joins, until the drives are heard
+            return drives.rest(now_ns)
         if tick >= 0:
             self.begin(tick)
-        drives, now_ns = self.drives, self._bus_time_ns(tick)
         if self._refusal is not None:
             return drives.rest(now_ns)
         if not drives.armed:

@@ -1,4 +1,4 @@
-"""The path variable of a robot that is about to join the formation.
+"""The path variable of a robot that joins the formation late, or again.
 
     s_i = Σ a_ij s_j / Σ a_ij,   v̂_i = (Σ a_ij v̂_j + h_i v_r) / (Σ a_ij + h_i),   μ_i = 0
 
@@ -7,10 +7,77 @@ that agrees (s_j = s, v̂_j = v_r, μ_j = 0) nothing changes for the others then
 the neighbours', so max s − min s doesn't grow. With its own place on the path instead, D behind, it
 would pull those that hear it back, and what all agree on by β_i D, β of βᵀ L = 0, βᵀ 1 = 1. The
 robot's body is where it is: its law drives it to its place.
+
+A controller that was started again in a run that goes on takes it likewise, once it knows its pose,
+the leader and a neighbour. One without in-neighbours heard only the leader, whose profile it knows:
+its (38), (40) and (45) are repeated from t = 0, so its path variable goes on as if nothing had
+happened.
 """
 
-from agents.coordination import CoordinationState
-from agents.neighbours import Neighbours
+from collections.abc import Callable
+
+from agents.coordination import CoordinationState, Coordinator
+from agents.in_edges import InEdges
+from agents.neighbours import Neighbours, Sums
+from bridge.network.messages import LeaderSpeed
+from configs.brief import AgentBrief
+from configs.edges import FOREVER
+from configs.leader_speed import speed_at
+
+_NOBODY = Sums(0, 0.0, 0.0, 0.0)
+
+
+class Joining:
+    """When a robot is part of the formation, and its path variable before that."""
+
+    __slots__ = ("_awaits", "_brief", "_coordinator", "_edges", "_neighbours", "_start", "joins")
+
+    def __init__(
+        self,
+        brief: AgentBrief,
+        neighbours: Neighbours,
+        edges: InEdges,
+        coordinator: Coordinator,
+        start: CoordinationState,
+    ) -> None:
+        self._brief = brief
+        self._neighbours = neighbours
+        self._edges = edges
+        self._coordinator = coordinator
+        self._start = start
+        self._awaits = brief.rejoins  # what it needs to know to re-join
+        self.joins = FOREVER if brief.rejoins else brief.membership.joins_tick
+        """The first tick of its membership."""
+
+    def state(
+        self, tick: int, v_r: float, leader: LeaderSpeed | None, *, located: bool
+    ) -> CoordinationState:
+        """The state with which the robot would join at a tick.
+
+        Args:
+            tick: the next one.
+            v_r: of the leader, as it is heard.
+            leader: its profile, if that is known.
+            located: whether the robot's pose is known.
+        """
+        period_ns = self._brief.schedule.period_ns
+        if self._awaits and located and (leader is not None or self._brief.leader_link is None):
+            self._rejoin(tick, leader)
+        return joining(self._neighbours, tick * period_ns, self._edges.h, v_r, self._start)
+
+    def _rejoin(self, tick: int, leader: LeaderSpeed | None) -> None:
+        """Join at the next tick, unless there are in-neighbours and none is heard yet."""
+        period_ns = self._brief.schedule.period_ns
+        if not self._brief.hears:
+
+            def v_r(k: int) -> float:
+                return 0.0 if leader is None else speed_at(leader.changes, k * period_ns)
+
+            self._start = repeated(self._start, self._coordinator, self._edges.h, v_r, tick)
+        elif not self._neighbours.carried_on(tick * period_ns)[0]:
+            return
+        self._awaits = False
+        self.joins = max(tick, self._brief.membership.joins_tick)
 
 
 def joining(
@@ -21,3 +88,17 @@ def joining(
     if degree == 0.0:
         return start
     return CoordinationState((v + h * v_r) / (degree + h), 0.0, s / degree)
+
+
+def repeated(
+    start: CoordinationState,
+    coordinator: Coordinator,
+    h: float,
+    v_r: Callable[[int], float],
+    ticks: int,
+) -> CoordinationState:
+    """The state after so many ticks of a robot without in-neighbours; `v_r`: by tick [m/s]."""
+    state = start
+    for tick in range(ticks):
+        state = coordinator.advance(state, _NOBODY, h, v_r(tick))
+    return state

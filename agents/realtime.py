@@ -114,7 +114,9 @@ class RealtimeLoop:
                 if arrival is None:
                     break
                 if arrival.tag != "go":
-                    deliver(self._agent, arrival)
+                    # Of a run that goes on nothing else can be judged before the time is known.
+                    if not self._agent.brief.rejoins or arrival.tag == "leader":
+                        deliver(self._agent, arrival)
                 elif (epoch_ns := self._epoch_ns(arrival.payload)) is not None:
                     return epoch_ns
                 arrival = self._link.receive(0.0)
@@ -133,14 +135,17 @@ class RealtimeLoop:
             refusals.note("go", LAUNCHER.name, "not well formed")
             return None
         epoch_ns = monotonic_of(go.epoch_ns, self._clock)
-        if far := implausible_start(epoch_ns, self._schedule.longest_start_s, self._clock):
+        within_s = self._schedule.longest_start_s
+        if self._agent.brief.rejoins:
+            within_s += self._schedule.ticks * self._schedule.period_s
+        if far := implausible_start(epoch_ns, within_s, self._clock):
             refusals.note("go", LAUNCHER.name, "clocks", far)
             return None
         self._agent.last_tick = min(self._schedule.ticks, max(go.ticks, 0))
         return epoch_ns
 
     def run(self, epoch_ns: int, stop: Stop) -> None:
-        """Run from the countdown to the closing tick, or to a stop.
+        """Run from the countdown, or of a run that goes on from now, to the closing tick or a stop.
 
         Raises:
             InfrastructureError: the drives were not armed when control had to start, or the bus
@@ -151,6 +156,9 @@ class RealtimeLoop:
         period_ns, phase_ns = schedule.period_ns, agent.brief.phase_ns
         self._power_up_ns = epoch_ns - schedule.countdown_ticks * period_ns
         tick = -schedule.countdown_ticks
+        if agent.brief.rejoins:
+            gone = (self._clock.monotonic_ns() - epoch_ns - phase_ns) // period_ns + 1
+            tick = min(max(tick, gone), agent.last_tick)
         lateness, subscriptions = self._lateness, self._subscriptions
         self._drop_backlog()
         while agent.phase is not Phase.DONE:
@@ -182,7 +190,7 @@ class RealtimeLoop:
             if tick >= subscriptions.next_change:
                 subscriptions.change(tick)
             tick += 1
-            if schedule.shares(tick):
+            if schedule.shares(tick) and agent.speaks(tick):
                 self._path.put(agent.share(tick).encode())
         with suppress(can.CanError, OSError):
             self._bus.recv(0.0)  # flushes batched frames

@@ -15,9 +15,9 @@ class Rearming:
 
     __slots__ = ("_attempts_left", "_began_ns", "_limits", "_well_since_ns")
 
-    def __init__(self, limits: HostLimits) -> None:
+    def __init__(self, limits: HostLimits, *, at_least: int = 0) -> None:
         self._limits = limits
-        self._attempts_left = limits.rearm_attempts if limits.rearm else 0
+        self._attempts_left = max(limits.rearm_attempts if limits.rearm else 0, at_least)
         self._well_since_ns: int | None = None
         self._began_ns = 0
 

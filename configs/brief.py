@@ -180,6 +180,7 @@ class AgentBrief:
     network: NetworkLink
     detached: bool = False  # no launcher is its parent: the run's end is when the launcher's
     # token on the network goes
+    rejoins: bool = False  # in real time, a run that goes on; another process was its controller
 
     @property
     def located(self) -> tuple[str, ...]:
@@ -303,4 +304,4 @@ class RecorderBrief:
     runtime_folder: str  # holds the buses' sockets; goes when the launcher was killed
     ticks: int  # of the run: no rows are of later ones
     last_frame_ns: int  # bus time after which no frame ends
-    fills_gaps: bool = False  # sources may be cut off: their missing rows are not a number
+    fills_gaps: bool = False  # sources may be cut off or start again: missing rows aren't numbers

@@ -186,6 +186,12 @@ def _host(scenario: Scenario) -> Iterator[Problem]:
     if host.rearm and scenario.localisation.source == "odometry":
         remedy = "odometry alone doesn't know where a robot is after a fault: false, or fixes"
         yield Problem("host.rearm", True, remedy)
+    if host.restarts and clock.mode == "lockstep":
+        remedy = "the tick at which it ended is lost, and all wait for it: 0, or real time"
+        yield Problem("host.restarts", host.restarts, remedy)
+    elif host.restarts and scenario.localisation.source == "odometry":
+        remedy = "odometry alone doesn't know where a robot is after that: 0, or fixes"
+        yield Problem("host.restarts", host.restarts, remedy)
     for key, (limit, what) in least.items():
         value = getattr(host, key)
         if value is not None and value < limit:

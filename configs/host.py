@@ -46,6 +46,11 @@ class Host(Parameters):
     rearm_after_s: SecondsOrZero = parameter(0.5, "all must have been well for this long")
     rearm_attempts: Annotated[int, Ge(1), Le(1000)] = parameter(3, "in a run")
     rearm_limit_s: Seconds = parameter(1.0, "longest wait for closed loop then")
+    restarts: Annotated[int, Ge(0), Le(100)] = parameter(
+        0,
+        "in real time: how often a controller's process that was killed or crashed is started"
+        " again, and re-joins",
+    )
     bus_error_limit_s: SecondsOrZero = parameter(
         5.0,
         "errors of a bus that isn't ours are tolerated for this long, then the controller gives up",

@@ -31,7 +31,7 @@ from configs.resolve import leader_brief, schedule
 from configs.roles import LAUNCHER, PLANT, identity_of, processes_of
 from configs.scenario import Scenario
 from fleetloop.launch import open_files, placement
-from fleetloop.launch.child import GAVE_UP, Failure, end, refuse_shadowed_roles
+from fleetloop.launch.child import GAVE_UP, Child, Failure, end, refuse_shadowed_roles
 from fleetloop.launch.clock_offsets import (
     EVERY_S,
     START_EVERY_S,
@@ -44,7 +44,8 @@ from fleetloop.launch.fork_server import ForkServer
 from fleetloop.launch.machine import WATCH_EVERY_S, MachineWatch
 from fleetloop.launch.outcome import Outcome
 from fleetloop.launch.remote_roles import RemoteRoles
-from fleetloop.launch.spawn import Orders, spawn
+from fleetloop.launch.restarts import Restarts
+from fleetloop.launch.spawn import Orders, respawn, spawn
 from fleetloop.launch.supervision import CONSEQUENCES_S, Supervision
 
 GO_AHEAD_NS = 200_000_000
@@ -94,6 +95,7 @@ class ProcessRun:
         self._supervision = Supervision(self._plane, self._schedule, patience_s)
         limit_s = self._schedule.tick_deadline_s
         self._ending = Ending(self._plane, self._run, self._machine, record, limit_s)
+        self._hellos = Hellos(self._schedule.hello_every_s, clock=clock)
         self._next_look_s = 0.0
         self._ready_s: float | None = None
         self._links: dict[str, NetworkLink] = {}
@@ -181,8 +183,7 @@ class ProcessRun:
     def _await_ready(self, link: LauncherLink, stop: Stop) -> Failure | None:
         """Publish the leader's speed until all tokens are there, then go until the plant ticks."""
         run, ticks = self._run, self._schedule
-        go = link.publisher(keys.go(run))
-        hellos = Hellos(ticks.hello_every_s, clock=self._clock)
+        go, hellos = link.publisher(keys.go(run)), self._hellos
         speed = LeaderSpeed(leader_brief(self._scenario).speed_changes)
         hellos.add(link.publisher(keys.leader_speed(run)), speed.encode())
         deadline = self._now() + ticks.start_deadline_s
@@ -244,16 +245,24 @@ class ProcessRun:
 
     def _watch(self, link: LauncherLink, stop: Stop) -> Failure | None:
         """Follow the run until the plant and all controllers have ended."""
+        most, folder = self._scenario.host.restarts, sockets.folder_of(self._run)
+        with Restarts(self._plane, most, folder, self._respawned) as restarts:
+            return self._follow(link, stop, restarts)
+
+    def _follow(self, link: LauncherLink, stop: Stop, restarts: Restarts) -> Failure | None:
         plane, supervision = self._plane, self._supervision
-        actors = plane.actors
         while not stop.requested:
             plane.receive(link, WATCH_EVERY_S)
             self._report_refusals(link)
             plane.clocks.ask(EVERY_S)
             supervision.name_the_frozen()
             supervision.name_the_cut_off()
+            restarts.welcome(self._hellos)
             if (failure := supervision.failure()) is not None:
-                return supervision.root_of(failure, link, actors)
+                if restarts.replace(failure, link):
+                    continue
+                return supervision.root_of(failure, link, plane.actors)
+            actors = plane.actors
             if all(child.ended() for child in actors) and self._remote.ended(self._now()):
                 return None
             plant = plane.child(PLANT.name)
@@ -270,6 +279,11 @@ class ProcessRun:
                 plane.settle(link, actors, CONSEQUENCES_S)
                 return supervision.failure() or silent
         return None
+
+    def _respawned(self, robot: str, fork_server: ForkServer) -> Child:
+        """The process of a controller that was started again."""
+        folder = sockets.folder_of(self._run)
+        return respawn(self._orders, self._links, folder, robot, fork_server)
 
     def _report_refusals(self, link: LauncherLink) -> None:
         """Look for floods now and then; announce what the router refused or cut off."""

@@ -74,6 +74,20 @@ def spawn(
             children[-1].tell(brief)
 
 
+def respawn(
+    orders: Orders, links: Links, folder: Path, robot: str, fork_server: ForkServer
+) -> Child:
+    """Start the controller of a robot again, in real time, in a run that goes on.
+
+    Raises:
+        InfrastructureError: a process can't be had.
+    """
+    place = Place(orders, links[AGENT.identity(robot)], folder, robot, {})
+    child = Child(fork_server, AGENT.process(robot), AGENT.module)
+    child.tell(replace(_agent(place), rejoins=True))
+    return child
+
+
 def _ours(orders: Orders) -> tuple[str, ...]:
     """The robots on buses of ours, which the plant of this machine serves."""
     deployment = orders.deployment
@@ -138,7 +152,7 @@ def _recorder(place: Place) -> RecorderBrief:
         str(place.folder),
         ticks.ticks,
         ticks.bus_time_ns(ticks.ticks) + AFTERWARDS_NS,
-        fills_gaps=place.orders.deployment.may_rejoin,
+        fills_gaps=orders.deployment.may_rejoin or orders.scenario.host.restarts > 0,
     )
 
 

@@ -120,7 +120,7 @@ class _Recorder:
     def gaps(self) -> list[str]:
         """The rows that did not come, in words."""
         return [
-            f"{count} rows of {_whose(tag)} did not come while it was cut off: not a number"
+            f"{count} rows of {_whose(tag)} did not come: not a number"
             for tag, count in self._filled.items()
         ]
 

@@ -31,10 +31,22 @@ Judged = dict[str, Any]
 def spread(controllers: Mapping[str, np.ndarray], members: Mapping[str, Membership]) -> np.ndarray:
     """max_i s_i − min_i s_i over the members at every tick at which all robots have a row."""
     ticks = min(len(rows) for rows in controllers.values())
-    there = np.zeros((ticks, len(controllers)), dtype=bool)
-    for column, robot in enumerate(controllers):
-        there[members[robot].ticks, column] = True
-    return spread_of(np.stack([rows["s"][:ticks] for rows in controllers.values()], 1), there)
+    there = [counted(rows, members[robot])[:ticks] for robot, rows in controllers.items()]
+    s = [rows["s"][:ticks] for rows in controllers.values()]
+    return spread_of(np.stack(s, axis=1), np.stack(there, axis=1))
+
+
+def _mask(member: Membership, ticks: int) -> np.ndarray:
+    """By tick, whether a robot is a member."""
+    there = np.zeros(ticks, dtype=bool)
+    there[member.ticks] = True
+    return there
+
+
+def counted(rows: np.ndarray, member: Membership) -> np.ndarray:
+    """Rows of a controller at which its robot is a member; not those until it has re-joined."""
+    there: np.ndarray = _mask(member, len(rows)) & ~np.isnan(rows["s"])
+    return there
 
 
 def spread_of(s: np.ndarray, there: np.ndarray) -> np.ndarray:
@@ -46,20 +58,22 @@ def spread_of(s: np.ndarray, there: np.ndarray) -> np.ndarray:
 
 
 def judge(expect: Expect, record: Record, scenario: Scenario) -> Judged:
-    """Compare an expectation with the record; a robot counts while it is a member."""
+    """Compare an expectation with the record; a robot counts while it is a member.
+
+    Where one has no rows of its controller, which was started again, the window isn't reached.
+    """
     period_s = scenario.clock.control_period_s
     end_s = scenario.ends_at_s if expect.to_s is None else expect.to_s
     parts, seen_s, whole = [], [], True
-    for member, t, series in _series(expect, record, scenario):
+    for member, t, series, known in _series(expect, record, scenario):
         to_s = min(end_s, member.leaves_tick * period_s)
         if not member.overlaps(expect.from_s / period_s, end_s / period_s):
             continue
-        chosen = np.zeros(len(t), dtype=bool)
-        chosen[member.ticks] = True
-        part = series[chosen & (t >= expect.from_s) & (t <= end_s)]
+        window = _mask(member, len(t)) & (t >= expect.from_s) & (t <= end_s)
+        part = series[window & known]
         seen_s.append(float(t[-1]) if len(t) else 0.0)
         # The last tick of a window may be up to a period before its end.
-        whole &= len(part) > 0 and seen_s[-1] > to_s - 1.01 * period_s
+        whole &= 0 < len(part) == window.sum() and seen_s[-1] > to_s - 1.01 * period_s
         parts.append(part)
     values = np.concatenate(parts) if parts else np.empty(0)
     judged: Judged = {k: v for k, v in asdict(expect).items() if v is not None}
@@ -109,19 +123,26 @@ def out_of_reach(scenario: Scenario) -> list[str]:
 
 def _series(
     expect: Expect, record: Record, scenario: Scenario
-) -> list[tuple[Membership, np.ndarray, np.ndarray]]:
-    """When it counts, times and values, one row per robot; of a spread one for all."""
+) -> list[tuple[Membership, np.ndarray, np.ndarray, np.ndarray]]:
+    """When it counts, times, values, and whether they are known: of a spread one for all robots."""
     robots = expect.robots or record.robots
     if expect.signal == SPREAD:
         rows = {robot: record.controller[robot] for robot in robots}
         values = spread(rows, scenario.members)
-        return [(ALWAYS, rows[robots[0]]["t_s"][: len(values)], values)]
-    source = record.plant if expect.signal in _OF_PLANT else record.controller
-    having = [robot for robot in robots if expect.signal in (source[robot].dtype.names or ())]
-    return [
-        (scenario.members[robot], source[robot]["t_s"], source[robot][expect.signal])
-        for robot in having
-    ]
+        known = np.ones(len(values), dtype=bool)
+        for robot, part in rows.items():
+            member = scenario.members[robot]
+            known &= (counted(part, member) | ~_mask(member, len(part)))[: len(values)]
+        return [(ALWAYS, rows[robots[0]]["t_s"][: len(values)], values, known)]
+    of_plant = expect.signal in _OF_PLANT
+    source = record.plant if of_plant else record.controller
+    found = []
+    for robot in robots:
+        own, member = source[robot], scenario.members[robot]
+        if expect.signal in (own.dtype.names or ()):
+            known = np.ones(len(own), dtype=bool) if of_plant else counted(own, member)
+            found.append((member, own["t_s"], own[expect.signal], known))
+    return found
 
 
 def _within(expect: Expect, values: np.ndarray, found: dict[str, float]) -> bool:

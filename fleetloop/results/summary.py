@@ -76,9 +76,9 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
     longest = max(controllers.values(), key=len, default=None)
     v_r = np.empty(0) if longest is None else leader_speed(scenario)(_nanoseconds(longest["t_s"]))
     robots = {
-        robot: _robot(rows, v_r, member, scenario.clock.control_period_s)
+        robot: _robot(rows, v_r, scenario.members[robot], scenario.clock.control_period_s)
         for robot, rows in controllers.items()
-        if len(rows[(member := scenario.members[robot]).ticks])
+        if len(rows[scenario.members[robot].ticks])
     }
     simulated_s = round(ticks * scenario.clock.control_period_s, 9)
     return {

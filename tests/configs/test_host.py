@@ -26,6 +26,15 @@ def test_by_default_ages_are_limited_and_torques_are_not() -> None:
     assert (drives.encoder_age_limit_ns, drives.heartbeat_age_limit_ns) == (50_000_000, 500_000_000)
 
 
+def test_only_in_real_time_and_with_fixes_a_controller_is_started_again() -> None:
+    with pytest.raises(ScenarioError, match=r"host.restarts=1: the tick at which it ended"):
+        brief("host.restarts=1")
+    realtime = "host.restarts=1", "clock.mode='realtime'"
+    assert brief(*realtime).host.restarts == 1
+    with pytest.raises(ScenarioError, match=r"host.restarts=1: odometry alone"):
+        brief(*realtime, "localisation.source='odometry'")
+
+
 def test_only_errors_of_a_bus_that_is_not_ours_are_borne() -> None:
     assert brief(bus=(("interface", "fleetloop"),)).host.bus_error_limit_ns == 0
     assert brief(bus=(("interface", "socketcan"),)).host.bus_error_limit_ns == 5_000_000_000

@@ -33,7 +33,8 @@ class Bench:
         brief = replace(brief, **changes)
         model = AxisModel.of(plant_brief(scenario, network=NOWHERE).robots[0].drive)
         self.rows: list[tuple[float, ...]] = []
-        self._row = row_of(controller_signals(brief.law.load().SIGNALS))
+        signals = controller_signals(brief.law.load().SIGNALS, scenario.aged(robot))
+        self._row = row_of(signals)
         self.agent = Agent(brief, RowBuffer(self._row, self._keep))
         self.axes = [OdriveNode(model, 0, 1), OdriveNode(model, 1, 2)]
         self.schedule = brief.schedule

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.processes import completed, running
+from support.processes import WAIT_S, completed, running
 
 from fleetloop.record.reader import Record
 
@@ -52,6 +52,49 @@ def test_a_controller_that_is_killed_ends_a_real_time_run_with_its_name(tmp_path
         status, out = run.end()
         assert status == 3
         assert "agent/r3 was killed by SIGKILL, after " in out
+        assert run.survivors() == []
+
+
+RESTART = ("--set", "host.restarts=1", "--set", "coordination.v_hat_0=0.6")
+
+
+@pytest.mark.parametrize("robot", ["r1", "r3"])
+def test_a_controller_that_is_killed_is_started_again_and_rejoins(
+    robot: str, tmp_path: Path
+) -> None:
+    """r1 hears the leader only, r3 a neighbour."""
+    expect = "expect=[{signal='s_spread', from_s=5.0, max=0.02}]"
+    args = ("realtime_100hz", "--duration", "6", *RESTART, "--set", expect)
+    with running(tmp_path / "a", *args, bus_time_s=1.5) as run:
+        run.child(robot).kill()
+        run.await_line(rf"{robot}: tick \d+ .*: re-joins the formation at s = .*", WAIT_S)
+        status, out = run.end()
+        assert status == 0, out
+        assert run.survivors() == []
+    summary = run.summary()
+    assert summary["verdict"] == "held"
+    said = summary["notices"][robot]
+    assert f"agent/{robot} was killed by SIGKILL; started again, start 1 of 1" in said
+    assert any(line.endswith("DRIVING: armed again") for line in said)
+    record = Record.open(tmp_path / "a" / "record.mcap")
+    rows = record.controller
+    assert all(len(part) == 600 for part in rows.values())
+    gone = np.isnan(rows[robot]["s"])
+    assert 0 < gone.sum() < 500
+    # All agree: for the others nothing jumps, and the robot is where it would have been.
+    for other, part in rows.items():
+        assert np.abs(np.diff(part["s"])[~np.isnan(np.diff(part["s"]))]).max() < 0.02, other
+    assert summary["s_spread"]["peak"] < 0.02
+
+
+def test_one_end_too_many_ends_the_run(tmp_path: Path) -> None:
+    with running(tmp_path / "a", "realtime_100hz", *RESTART, bus_time_s=1.5) as run:
+        run.child("r3").kill()
+        run.await_line(r"r3: tick \d+ .*: re-joins the formation at s = .*", WAIT_S)
+        run.child("r2").kill()
+        status, out = run.end()
+        assert status == 3
+        assert "agent/r2 was killed by SIGKILL, after " in out
         assert run.survivors() == []
 
 

@@ -110,9 +110,7 @@ def test_rows_of_a_source_that_was_cut_off_are_not_a_number_but_at_their_time(
         fills_gaps=True,
     )
     assert not recorder.unfinished
-    assert recorder.gaps() == [
-        "150 rows of r1's controller did not come while it was cut off: not a number"
-    ]
+    assert recorder.gaps() == ["150 rows of r1's controller did not come: not a number"]
     assert recorder.refusals.lines() == [
         "refused 1 row block of r1's controller: begins at tick 140, expected 280"
     ]

@@ -121,7 +121,7 @@ def test_what_a_run_leaves_is_read(finished_run: Path) -> None:
 def test_a_run_that_diverged_to_no_number_is_shown(finished_run: Path, tmp_path: Path) -> None:
     record, scenario = Record.open(finished_run / "record.mcap"), load("two_robots")
     for rows in record.controller.values():
-        for name in rows.dtype.names[2:]:
+        for name in set(rows.dtype.names[2:]) - {"s"}:  # beyond its reach it isn't taken
             rows[name][1500:] = np.nan
     summary = summarise(record, scenario, RunStats("lockstep"))
     (tmp_path / "summary.json").write_text(to_json(summary))

@@ -1,0 +1,94 @@
+"""Controllers that are started again in real time: how often, and until when they are awaited.
+
+killed, crashed    its process is replaced, `host.restarts` times in all, and told leader and clock
+re-joined          its progress comes again
+gave up            it said why it can't go on: that ends the run as ever, and so does one too many
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Self
+
+from bridge.network.barrier import Hellos
+from bridge.network.link import Link, waiting
+from configs.roles import AGENT
+from fleetloop.launch.child import Child, Failure
+from fleetloop.launch.control_plane import ControlPlane
+from fleetloop.launch.fork_server import ForkServer
+
+
+class Restarts:
+    """Replaces the processes of controllers in one run.
+
+    Args:
+        plane: of the run; its children are replaced.
+        most: how often, all robots together.
+        folder: of the run's sockets.
+        respawn: starts the controller of a robot again, by a fork server.
+
+    A fork server waits for the next failure, its modules imported. It is a context manager, and
+    ends with it.
+    """
+
+    def __init__(
+        self,
+        plane: ControlPlane,
+        most: int,
+        folder: Path,
+        respawn: Callable[[str, ForkServer], Child],
+    ) -> None:
+        self._plane = plane
+        self._most = self._left = most
+        self._respawn = respawn
+        self._since_s: dict[str, float] = {}
+        self._folder = folder
+        self._fork_server: ForkServer | None = None
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Start the fork server of the next restart, if there may be one."""
+        self._fork_server = ForkServer(self._folder, batch=False) if self._left else None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._fork_server is not None:
+            self._fork_server.__exit__(None, None, None)
+
+    def replace(self, failure: Failure, link: Link) -> bool:
+        """Start the process that failed again; False if that isn't to be done.
+
+        Raises:
+            InfrastructureError: a process can't be had.
+        """
+        plane = self._plane
+        role, _, robot = failure.name.partition("/")
+        child = plane.child(failure.name)
+        fork_server = self._fork_server
+        if not (failure.unexpected and role == AGENT.name) or child is None or fork_server is None:
+            return False
+        self._left -= 1
+        count = f"start {self._most - self._left} of {self._most}"
+        plane.note(failure.name, f"{failure.text}; started again, {count}")
+        child.close()
+        with fork_server:  # has to end, so that the launcher is the parent
+            again = self._respawn(robot, fork_server)
+        plane.children[plane.children.index(child)] = again
+        self._prepare()
+        # What came meanwhile is no silence.
+        for arrival in waiting(link):
+            plane.process(arrival)
+        self._since_s[failure.name] = plane.now()
+        return True
+
+    def welcome(self, hellos: Hellos) -> None:
+        """Say what a controller needs to know as long as one hasn't re-joined."""
+        if not self._since_s:
+            return
+        hellos.say()
+        now_s = self._plane.now()
+        for process, since_s in list(self._since_s.items()):
+            silence = self._plane.vitals.silence(process, now_s)
+            if silence is not None and now_s - silence.lasted_s > since_s:
+                del self._since_s[process]
