@@ -55,6 +55,29 @@ def test_s_dot_settles_to_the_leaders_speed_of_the_moment_or_never(finished_run:
     assert settle("leader.steps=[{t_s=3.0, speed_m_s=2.0}]") is None
 
 
+def test_rows_that_did_not_come_are_left_out_and_others_that_are_no_numbers_are_not(
+    finished_run: Path,
+) -> None:
+    def summary(lost: slice, *signals: str) -> Summary:
+        record = Record.open(finished_run / "record.mcap")
+        rows = record.controller["r1"].copy()
+        for name in signals:
+            rows[name][lost] = np.nan
+        record.controller["r1"] = rows
+        return summarise(record, load("two_robots"), RunStats("realtime"))
+
+    whole = summary(slice(0, 0))
+    ticks = whole["robots"]["r1"]["ticks"]
+    middle = slice(ticks // 2, ticks // 2 + 100)
+    cut = summary(middle, *(name for name in ("s", "s_dot", "x_e_m", "tau_right_wheel_N_m")))
+    assert cut["robots"]["r1"]["ticks"] == ticks
+    assert cut["robots"]["r1"]["final_max"] == whole["robots"]["r1"]["final_max"]
+    assert np.isfinite(cut["robots"]["r1"]["peak_torque_wheel_N_m"])
+    assert np.isfinite(cut["s_spread"]["peak"])
+    diverged = summary(middle, "tau_right_wheel_N_m")
+    assert np.isnan(diverged["robots"]["r1"]["peak_torque_wheel_N_m"])
+
+
 def uneven(run: Path, *expect: Expect) -> Summary:
     scenario = load("two_robots").model_copy(update={"expect": expect})
     return summarise(Record.open(run / "record.mcap"), scenario, RunStats("lockstep"))
