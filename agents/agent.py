@@ -34,24 +34,20 @@ from collections.abc import Sequence
 from math import hypot, inf, isfinite, nan
 from typing import Any
 
-from agents.admission import Admission
 from agents.coordination import CoordinationState, Coordinator
-from agents.emulated_network import HERE, EmulatedNetwork
 from agents.guard import UNCHANGED, Guard, Phase, TorqueOutcome
-from agents.in_edges import InEdges
 from agents.joining import Joining
 from agents.laws.build import build
 from agents.laws.failure import DIVERGED, failure
 from agents.laws.interface import PathVariable, Reference, RobotMotion
 from agents.limits import EncoderCheck
 from agents.localisation import Localiser
-from agents.neighbours import Neighbours
 from agents.paths import robot_path
+from agents.reception import Reception
 from bridge.frame import Frame
-from bridge.network.messages import LeaderSpeed, PathState, PoseFix
+from bridge.network.messages import PathState, PoseFix
 from bridge.network.telemetry import RowBuffer
 from configs.brief import AgentBrief
-from configs.leader_speed import speed_at
 from configs.netem import MOST_DELAY_NS
 from configs.signals import AGE_PREFIX
 
@@ -80,15 +76,28 @@ class Agent:
         self._law_step, self._law_hold = law.step, law.hold
         self._no_signals = (nan,) * law.signals
         self._law_state: Any = None  # the law's own
-        self._pose_delay = brief.schedule.pose_delay_ticks
-        self._place_delay = brief.schedule.place_delay_ticks
-        self.network = self._network = EmulatedNetwork(brief) if brief.channels else None
+        self._reception = reception = Reception(brief)
+        self._advance = reception.advance
+        self.admission = reception.admission
+        """Plausibility of received messages, and the count of refused ones."""
+        self.network = reception.network
         """The emulated edges to this robot; None if none has effects."""
+        self.receive_pose = reception.receive_pose
+        """Store a pose from the localisation system."""
+        self.receive_place = reception.receive_place
+        """Store the pose of an in-neighbour, for the emulated network."""
+        self.receive_path_state = reception.receive_path_state
+        """Store the path state of an in-neighbour."""
+        self.receive_leader_speed = reception.receive_leader_speed
+        """Store the virtual leader's speed profile."""
+        self.missing_to_start = reception.missing_to_start
+        """Senders whose first message is required for the start and has not arrived."""
+        self.missing = reception.missing
+        """Messages that are due at a tick and have not arrived."""
+        self._neighbours, self._edges = reception.neighbours, reception.edges
         self._history = self._pose_history(brief)
         self._localiser = Localiser(brief.localisation, brief.wheels, self._history)
-        self._neighbours = Neighbours(brief.hears, brief.coordination, self._h)
         self._coordinator = Coordinator(brief.coordination, self._h)
-        self._edges = InEdges(brief.hears, brief.leader_link, self._neighbours)
         start = brief.coordination
         self._coordination = CoordinationState(start.v_hat_0, start.mu_0, brief.s_0)
         self._joining = Joining(
@@ -99,17 +108,8 @@ class Agent:
         self.feedback_since = self._drives.feedback_since
         """Whether both encoder frames were received after a bus time [ns]."""
         self._diverged = False  # the next path variable is beyond reach
-        self.admission = self._admission = Admission(brief)
-        """Plausibility of received messages, and the count of refused ones."""
         self._reach = brief.reach
-        self._leader: LeaderSpeed | None = None
-        self._start_fix: PoseFix | None = None
-        self._fixes: dict[int, PoseFix] = {}  # by tick, until due
-        self._path_states: dict[int, dict[str, PathState]] = {}  # by tick, until due
-        self._fix_tick = -1  # of the newest fix of the emulated network
         self._records_ages = any(signal.name.startswith(AGE_PREFIX) for signal in brief.signals)
-        self._realtime = brief.schedule.realtime
-        self._awaited = {e.speaker for e in brief.hears if e.exists(0) or not self._realtime}
         self._encoder_check = EncoderCheck(brief.host.encoder_mismatch_limit_wheel_rad, self._h)
         fused = brief.localisation == "fused"
         self._pose_mismatch_m = brief.host.pose_mismatch_limit_m if fused else inf
@@ -124,85 +124,24 @@ class Agent:
 
     def _pose_history(self, brief: AgentBrief) -> int:
         """Longest age of a fix [ticks]: the odometry since then is kept for that long."""
-        if self._network is not None and self._network.carries_poses:
+        if self.network is not None and self.network.carries_poses:
             oldest_ns = min(brief.host.pose_age_limit_ns, MOST_DELAY_NS)
             oldest = oldest_ns // brief.schedule.period_ns
-            return max(oldest, POSE_HISTORY_TICKS, self._pose_delay)
-        return POSE_HISTORY_TICKS if brief.schedule.realtime else self._pose_delay
+            return max(oldest, POSE_HISTORY_TICKS, brief.schedule.pose_delay_ticks)
+        return POSE_HISTORY_TICKS if brief.schedule.realtime else brief.schedule.pose_delay_ticks
 
     @property
     def phase(self) -> Phase:
         """The phase of the controller."""
         return self._guard.phase
 
-    # --- reception ---------------------------------------------------------------------------
-
-    def receive_pose(self, fix: PoseFix) -> None:
-        """Store a pose from the localisation system; ticks below 0: the start pose."""
-        if not self._admission.admits_pose(fix):
-            return
-        if fix.tick < 0:
-            self._start_fix = fix
-        else:
-            self._fixes[fix.tick] = fix
-        if self._network is not None:
-            self._network.receive_place(HERE, fix)
-
-    def receive_place(self, robot: str, fix: PoseFix) -> None:
-        """Store the pose of an in-neighbour for the emulated network; the controller has no use."""
-        if self._network is not None and self._admission.admits_pose(fix, robot):
-            self._network.receive_place(robot, fix)
-
-    def receive_path_state(self, robot: str, state: PathState) -> None:
-        """Store the path state of an in-neighbour; ticks below 0: its start value."""
-        if not self._edges.exists(robot, state.tick):  # discarded unseen
-            self._awaited.discard(robot)
-            return
-        if not self._admission.admits_path_state(robot, state):
-            return
-        self._awaited.discard(robot)
-        if state.tick < 0 or self._realtime:
-            self._receive_due(robot, state)
-        else:
-            self._path_states.setdefault(state.tick, {})[robot] = state
-
-    def receive_leader_speed(self, speed: LeaderSpeed) -> None:
-        """Store the virtual leader's speed profile."""
-        if self._admission.admits_leader_speed(speed):
-            self._leader = speed
-
     def refusals(self) -> list[str]:
         """Refused messages, in words."""
-        return self._admission.refusals.lines()
+        return self.admission.refusals.lines()
 
     def notices(self) -> list[str]:
         """Notices for the report, in words."""
         return [*self._guard.notices(), *self.refusals()]
-
-    def missing_to_start(self) -> list[str]:
-        """Senders whose first message is required for the start and has not arrived."""
-        if self.brief.rejoins:  # the others have started
-            return []
-        missing = [f"the path variable of {robot}" for robot in sorted(self._awaited)]
-        if self._start_fix is None:
-            missing.append("the localisation system")
-        if self._leader is None and self.brief.leader_link is not None:
-            missing.append("the leader")
-        return missing + (self._network.missing_to_start() if self._network is not None else [])
-
-    def missing(self, tick: int) -> list[str]:
-        """Messages that are due at this tick by the schedule and have not arrived."""
-        missing = []
-        pose_tick = tick - self._pose_delay
-        if self._schedule.localises(pose_tick) and pose_tick not in self._fixes:
-            missing.append("pose")
-        place_tick = tick - self._place_delay
-        if self._network is not None and self._schedule.localises(place_tick):
-            missing += self._network.missing(place_tick)
-        if self._schedule.shares(tick):
-            heard = self._path_states.get(tick, {})
-            missing += [f"path state of {r}" for r in self._edges.follow(tick) if r not in heard]
-        return missing
 
     # --- one period --------------------------------------------------------------------------
 
@@ -217,7 +156,7 @@ class Agent:
         Raises:
             InfrastructureError: the drives were not armed when control had to start.
         """
-        self._admission.tick = tick
+        self.admission.tick = tick
         self._edges.follow(tick)
         wheel_motion = self._drives.motion()
         if wheel_motion is None:
@@ -226,17 +165,14 @@ class Agent:
         if self._encoder_check.active:
             self._guard.note_fault("encoders", self._encoder_check(wheel_motion))
         if tick <= 0:
-            if self._start_fix is not None:
-                start = self._start_fix
+            start = self._reception.start_fix
+            if start is not None:
                 motion = self._localiser.fix(start.x_m, start.y_m, start.theta_rad)
             if tick < 0:
                 return self._guard.arm(tick)
-        if self._realtime:
-            motion = self._apply_newest_fix(tick, motion)
-        elif self._schedule.owes(tick):
-            motion = self._apply_due(tick, motion)
-        if self._network is not None:
-            motion = self._apply_emulated(tick, motion, self._network)
+        fix = self._advance(tick)
+        if fix is not None:
+            motion = self._apply_fix(tick, fix, motion)
         if tick >= self.last_tick:
             self.closed = True
             return self._guard.shut_down()
@@ -246,56 +182,14 @@ class Agent:
             return self._control(tick, motion)
         return self._stand_by(tick, motion)
 
-    def _receive_due(self, robot: str, state: PathState) -> None:
-        """Hand a path state on, through its emulated edge if it has one."""
-        if self._network is None or not self._network.carries_path_of(robot):
-            self._neighbours.receive(robot, state.t_ns, state.s, state.v_hat)
-        elif state.tick >= 0:  # what is said before the start is no message of the emulated network
-            self._network.send_path_state(robot, state)
+    def _apply_fix(self, tick: int, fix: PoseFix, carried: RobotMotion) -> RobotMotion:
+        """Apply a fix at its own instant, unless its odometry is lost.
 
-    def _apply_emulated(
-        self, tick: int, motion: RobotMotion, network: EmulatedNetwork
-    ) -> RobotMotion:
-        """Apply what the emulated network delivers at this tick."""
-        now_ns = tick * self._schedule.period_ns
-        network.measure(tick if self._realtime else tick - self._place_delay)
-        for robot, state in network.path_states(now_ns, self._edges.heard):
-            self._neighbours.receive(robot, state.t_ns, state.s, state.v_hat)
-        fix = network.newest_pose(now_ns)
-        if fix is None or tick - fix.tick > self._history or fix.tick <= self._fix_tick:
-            return motion
-        self._fix_tick = fix.tick
-        return self._apply_fix(tick, fix, tick - fix.tick, motion)
-
-    def _apply_due(self, tick: int, motion: RobotMotion) -> RobotMotion:
-        """Apply the messages due at this tick, in the order of names, not of arrival."""
-        for robot, state in sorted(self._path_states.pop(tick, {}).items()):
-            self._receive_due(robot, state)
-        fix = self._fixes.pop(tick - self._pose_delay, None)
-        if fix is None:
-            return motion
-        if self._network is not None and self._network.carries_poses:
-            self._network.send_pose(fix)
-            return motion
-        return self._apply_fix(tick, fix, self._pose_delay, motion)
-
-    def _apply_newest_fix(self, tick: int, motion: RobotMotion) -> RobotMotion:
-        """In real time: apply the newest fix at its own instant, unless its odometry is lost."""
-        if not self._fixes:
-            return motion
-        fixes = [self._fixes[number] for number in sorted(self._fixes)]
-        self._fixes.clear()
-        if self._network is not None and self._network.carries_poses:
-            for fix in fixes:
-                self._network.send_pose(fix)
-            return motion
-        ago = max(tick - fixes[-1].tick, 0)
-        if ago > POSE_HISTORY_TICKS:
-            return motion
-        return self._apply_fix(tick, fixes[-1], ago, motion)
-
-    def _apply_fix(self, tick: int, fix: PoseFix, ago: int, carried: RobotMotion) -> RobotMotion:
-        """Apply a fix of some ticks ago; `carried` is the motion without it."""
+        `carried` is the motion without it.
+        """
+        ago = max(tick - fix.tick, 0)
+        if ago > self._history:
+            return carried
         try:
             motion = self._localiser.fix(fix.x_m, fix.y_m, fix.theta_rad, ago)
         except DIVERGED:  # beyond arithmetic: ignored
@@ -317,7 +211,7 @@ class Agent:
         v_hat, mu, s = coordination = self._coordination
         s_dot = mu + v_hat
         sums = self._neighbours.sums(t_ns, s)
-        v_r = self._leader_speed(tick, v_hat)
+        v_r = self._reception.leader_speed(tick, v_hat)
         after = self._coordinator.advance(coordination, sums, self._edges.h, v_r)
         along = _new(PathVariable, (s, s_dot, (after[0] + after[1] - s_dot) / self._h))
         guard = self._guard
@@ -342,43 +236,31 @@ class Agent:
         x_d, y_d, theta_d, _, _ = reference
         used = (t_ns * 1e-9, *motion, s, s_dot, mu, v_hat, sums.neighbours, x_d, y_d, theta_d)
         if self._records_ages:
-            signals = (*self._ages_s(t_ns), *signals)
+            signals = (*self._reception.ages_s(t_ns), *signals)
         sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
         self._rows.add(tick, (*used, *signals, *sent))
         return frames
 
-    def _leader_speed(self, tick: int, without: float) -> float:
-        """v_r as it is heard; `without`: nothing heard over an emulated edge."""
-        if self._network is not None:
-            heard = self._edges.h > 0.0
-            return self._network.leader_speed(tick, self._leader, without, exists=heard)
-        if self._leader is None:
-            return 0.0
-        return speed_at(self._leader.changes, tick * self._schedule.period_ns)
-
     def _stand_by(self, tick: int, motion: RobotMotion) -> Sequence[Frame]:
         """One tick before the robot joins the formation, or after it has left."""
         t_ns = tick * self._schedule.period_ns
-        v_r = self._leader_speed(tick, self._coordination.v_hat)
+        v_r = self._reception.leader_speed(tick, self._coordination.v_hat)
         if tick >= self._leaves:
             frames = self._guard.leave(tick)
         else:
             frames = self._guard.command(tick, 0.0, 0.0)
-            after = self._joining.state(tick + 1, v_r, self._leader, located=self._located)
+            after = self._joining.state(
+                tick + 1, v_r, self._reception.leader, located=self._located
+            )
             self._accept_path_variable(t_ns * 1e-9 + self._h, after)
             if tick + 1 == self._joining.joins:
                 self._guard.note_joining(tick + 1, self._coordination.s)
-        ages = self._ages_s(t_ns) if self._records_ages else ()
+        ages = self._reception.ages_s(t_ns) if self._records_ages else ()
         sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
         known = self._located or not self.brief.rejoins
         row = (t_ns * 1e-9, *(motion if known else _NOWHERE), nan, nan, nan, nan, 0, nan, nan, nan)
         self._rows.add(tick, (*row, *ages, *self._no_signals, *sent))
         return frames
-
-    def _ages_s(self, t_ns: int) -> list[float]:
-        """Ages of the data of every source [s], in the order of the record; NaN: none yet."""
-        ages = self._neighbours.ages_s(t_ns)
-        return ages if self._network is None else ages + self._network.ages_s(t_ns)
 
     def speaks(self, tick: int) -> bool:
         """Whether the robot is part of the formation, so that its path state means something."""

@@ -162,7 +162,7 @@ def test_states_of_far_ticks_are_not_kept() -> None:
     bench.drive(1)
     for tick in range(0, 100_000 * SHARE, SHARE):
         bench.agent.receive_path_state("r1", state(tick))
-    assert sum(map(len, bench.agent._path_states.values())) <= LEAD_TICKS // SHARE + 2
+    assert sum(map(len, bench.agent._reception._path_states.values())) <= LEAD_TICKS // SHARE + 2
     assert any("path states of r1" in line for line in bench.agent.notices())
 
 
