@@ -92,3 +92,14 @@ def test_a_robot_alone_with_its_leader_has_the_radius_of_a_first_order_lag() -> 
 def test_rings_converge_however_slowly_they_share(period_s: float) -> None:
     for robots in (2, 3, 4, 6):
         assert max(radii(shape("ring", robots), 2.0, 1.0, period_s, 4.0)) < 1.0
+
+
+def test_the_moving_leader_is_followed_stands_and_goes_on_in_the_forecast() -> None:
+    ahead = forecast(load("moving_leader"))
+    at = {t_s: n for n, t_s in enumerate(np.round(ahead.t_s, 6).tolist())}
+    v_r = [float(ahead.v_r[at[t_s]]) for t_s in (4.98, 5.0, 22.0, 37.0, 50.0, 59.5, 70.0)]
+    assert v_r == pytest.approx([0.4, 0.6, 0.4, 0.1, 0.0, 0.25, 0.5])
+    stands = (ahead.t_s >= 54.0) & (ahead.t_s <= 58.0)
+    assert ahead.spread[stands].max() < 0.02
+    assert np.abs(ahead.s_dot[stands]).max() < 0.01
+    assert ahead.s_dot[ahead.t_s >= 76.0] == pytest.approx(0.5, abs=0.03)

@@ -11,7 +11,7 @@ from configs.loading import load
 from configs.sections import Expect
 from configs.signals import PATH_ERRORS
 from fleetloop.record.reader import Record
-from fleetloop.results.figures import all_figures
+from fleetloop.results.figures import all_figures, speed_estimates
 from fleetloop.results.summary import RunStats, Summary, settle_s, summarise, to_json
 from fleetloop.results.tables import (
     final_line,
@@ -76,6 +76,16 @@ def test_rows_that_did_not_come_are_left_out_and_others_that_are_no_numbers_are_
     assert np.isfinite(cut["s_spread"]["peak"])
     diverged = summary(middle, "tau_right_wheel_N_m")
     assert np.isnan(diverged["robots"]["r1"]["peak_torque_wheel_N_m"])
+
+
+def test_a_figure_of_the_speeds_draws_the_leaders_steps_and_ramps(finished_run: Path) -> None:
+    record = Record.open(finished_run / "record.mcap")
+    steps = "leader.steps=[{t_s=1.0, speed_m_s=0.2, ramp_s=1.5}, {t_s=3.0, speed_m_s=0.5}]"
+    (axes,) = speed_estimates(record, load("two_robots", [steps])).axes
+    (line,) = [line for line in axes.lines if line.get_label().startswith("leader")]
+    t_s, v_r = line.get_data()
+    at = np.interp([0.5, 1.75, 2.5, 2.9, 3.1], t_s, v_r)
+    assert at == pytest.approx([0.6, 0.4, 0.2, 0.2, 0.5], abs=1e-6)
 
 
 def uneven(run: Path, *expect: Expect) -> Summary:
