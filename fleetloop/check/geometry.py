@@ -21,7 +21,7 @@ from fleetloop.check.course import STANDS_STILL, Course, Series, path_of
 from fleetloop.check.finding import Finding
 
 AWAY_M = 1e9
-PLACES, LEAST_PLACES = 4_000, 40
+PLACES, LEAST_PLACES = 1_000, 40
 """Path points for the spacing at equal s, all robots together, about, and of each at least."""
 
 
