@@ -9,7 +9,7 @@
     STOPPED    no obstacle for `rearm_after`, and rearm allowed   REARMING   torque 0; idle
     REARMING   both drives in closed loop without error           DRIVING    arming frames, torque 0
     REARMING   an obstacle, or `rearm_limit`                      STOPPED    torque 0, idle
-    DRIVING…   the tick at which the robot leaves                 LEFT       torque 0, idle
+    any        the tick at which the robot leaves the formation   LEFT       torque 0, idle
     any        the closing tick, or told to stop                  DONE       torque 0, idle (estop)
 
 A fault is a drive that drops out or falls silent, two senders of a drive's telemetry, a bus that
@@ -23,11 +23,11 @@ its first tick.
 
 A robot that joins late stands until then: in phase DRIVING, torque 0, its law not called. It
 listens, and so that nothing jumps for the others it takes its path variable from what it hears
-(`agents.joining`). After it has left nobody hears it.
+(`agents.joining`). After it has left nobody hears it. A controller that was started again, in real
+time, begins STOPPED, with one attempt to arm, and joins as one that is late.
 
 A stopped robot goes on sharing its path variable, so that its neighbours aren't cut off. A dry run
 goes through the same phases without a frame. Its only inputs are frames, messages, tick numbers.
-One file: a control period is read in one place.
 """
 
 from collections.abc import Sequence
