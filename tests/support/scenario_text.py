@@ -2,9 +2,11 @@
 
 import tomllib
 
+import pytest
 import tomli_w
 
-from configs.errors import Complaint
+from configs.errors import Complaint, ScenarioError
+from configs.loading import loads
 from configs.overrides import Override
 
 SMALL = """
@@ -28,3 +30,11 @@ def changed(text: str, *changes: str) -> str:
         assert isinstance(override, Override), override
         assert not isinstance(override.apply(data), Complaint), change
     return tomli_w.dumps(data)
+
+
+def problems(text: str, *changes: str) -> list[str]:
+    """The lines that refuse a file with these changes."""
+    with pytest.raises(ScenarioError) as caught:
+        loads("file.toml", changed(text, *changes))
+    assert caught.value.exit_status == 2
+    return str(caught.value).splitlines()

@@ -1,89 +1,20 @@
 """Controllers that somebody else starts: `fleetloop agent` against a run with roles excluded."""
 
 import re
-import secrets
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
-import psutil
 import pytest
 from support.addresses import free_port, multicast_bus, multicast_goes_nowhere
-from support.certificates import certificates
+from support.elsewhere import SCENARIO, SHORT, Agent, deployment, start, with_password
 from support.own_files import write_own_at_100_hz
 from support.processes import Run, completed
 
 from fleetloop.record.reader import Record
 
 pytestmark = pytest.mark.system
-SCENARIO = ("two_robots_100hz", "--set", "expect=[]")
-SHORT = ("--duration", "1")
-
-
-class Agent:
-    """A `fleetloop agent` that is going on."""
-
-    def __init__(
-        self,
-        robot: str,
-        deployment: Path,
-        *args: str,
-        scenario: Sequence[str] = SCENARIO,
-        ahead_s: float = 0.0,
-    ) -> None:
-        program = ("-m", "fleetloop")
-        if ahead_s:
-            program = (str(Path(__file__).parents[1] / "support/shifted_agent.py"), str(ahead_s))
-        self.process = subprocess.Popen(
-            [
-                *(sys.executable, *program, "agent", scenario[0], robot, *scenario[1:]),
-                *("--deployment", str(deployment), *args),
-            ],
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-
-    def end(self, within_s: float = 120.0) -> tuple[int, str]:
-        """(exit status, what it said)."""
-        _, said = self.process.communicate(timeout=within_s)
-        return self.process.returncode, said
-
-    def kill(self) -> None:
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.communicate()
-
-
-@pytest.fixture
-def agents() -> Iterator[list[Agent]]:
-    started: list[Agent] = []
-    yield started
-    for agent in started:
-        agent.kill()
-
-
-def deployment(folder: Path, scheme: str = "tcp", extra: str = "", name: str = "where") -> Path:
-    """r2's controller is elsewhere."""
-    file = folder / f"{name}.toml"
-    file.write_text(
-        'roles = ["plant", "recorder", "agent/r1"]\n[network]\n'
-        f'endpoint = "{scheme}/localhost:{free_port()}"\n{extra}'
-    )
-    return file
-
-
-def with_password(folder: Path) -> Path:
-    users = folder / "users"
-    users.write_text(f"agent-r2:{secrets.token_hex(8)}\n")
-    users.chmod(0o600)
-    return deployment(folder, extra='users = "users"\n')
-
-
-def start(folder: Path, where: Path, *args: str) -> Run:
-    return Run(folder / "run", *SCENARIO, "--deployment", str(where), *args)
 
 
 @pytest.mark.wall_clock
@@ -232,67 +163,6 @@ def test_who_waits_for_a_router_that_is_not_there_can_be_interrupted(tmp_path, a
     assert (status, said) == (130, "agent/r2: interrupted by SIGTERM\n")
 
 
-def test_a_wrong_password_is_refused_within_the_start_deadline(tmp_path, agents) -> None:
-    where = with_password(tmp_path)
-    run = start(tmp_path, where, "--set", "clock.start_deadline_s=6.0")
-    try:
-        other = tmp_path / "other"
-        other.mkdir()
-        (other / "users").write_text("agent-r2:guess\n")
-        (other / "users").chmod(0o600)
-        (other / "where.toml").write_text(where.read_text())
-        agents.append(Agent("r2", other / "where.toml"))
-        status, said = agents[0].end()
-        assert status == 3
-        assert re.search(r"the router at tcp/localhost:\d+: it refused the login: not the", said)
-        status, out = run.end()
-        assert status == 3
-        # Once or twice: asked as a client if the router listened by then, and once more for why.
-        times = r"( \(2 times\))?"
-        refused = rf"refused the login of 'agent-r2' from [0-9.:\[\]]+: wrong password{times}"
-        assert re.search(rf"not (there|ready within 6 s): agent/r2 \({refused}\)", out), out
-        assert re.search(r"router: refused the login of 'agent-r2' from .*: wrong password\n", out)
-    finally:
-        run.kill()
-    assert psutil.Process().children() == []
-
-
-INTRUDER = """
-import sys
-from bridge.network import keys
-from bridge.network.client import open_client
-from configs.connections import NetworkLink
-with open_client(NetworkLink("", sys.argv[1], "bench", "word"), 10.0) as link:
-    for _ in range(5):
-        # Not by a publisher: that sends nothing once it is told that nobody listens.
-        link._session.put(keys.report(sys.argv[2], "agent/r1"), b"forged")
-"""
-
-
-@pytest.mark.wall_clock
-def test_a_denied_put_is_named_in_log_and_summary(tmp_path: Path) -> None:
-    (tmp_path / "users").write_text("bench:word\n")
-    (tmp_path / "users").chmod(0o600)
-    where = tmp_path / "where.toml"
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
-    guest = f'[network]\nendpoint = "{endpoint}"\nusers = "users"\nguests = {{ bench = ["*"] }}\n'
-    where.write_text(guest)
-    run = start(tmp_path, where, "--duration", "4")
-    try:
-        run.await_bus_time(1.3)
-        program = [sys.executable, "-c", INTRUDER, endpoint, SCENARIO[0]]
-        subprocess.run(program, check=True, timeout=30)
-        status, out = run.end()
-        assert status == 0, out
-    finally:
-        run.kill()
-    what = f"denied to 'bench' from 127.0.0.1: put on fleetloop/{SCENARIO[0]}/@report/agent/r1"
-    assert f"router: {what}\n" in out
-    (said,) = run.summary()["notices"]["router"]
-    # How often, the client decides too: it may be told that nobody listens there.
-    assert re.fullmatch(rf"{re.escape(what)}( \([2-5] times\))?", said)
-
-
 @pytest.mark.wall_clock
 def test_the_plant_may_be_elsewhere_too(tmp_path) -> None:
     (tmp_path / "users").write_text("plant:secret\n")
@@ -319,52 +189,3 @@ def test_the_plant_may_be_elsewhere_too(tmp_path) -> None:
     assert plant.returncode == 0, said
     assert "ended after 200 ticks" in said
     assert run.summary()["ticks"] == 200
-
-
-def with_certificate(folder: Path, machine: str, base: Path | None = None) -> Path:
-    tls = (
-        f'tls = {{ ca = "ca.pem", certificate = "{machine}.pem", private_key = "{machine}.key" }}\n'
-    )
-    if base is None:
-        return deployment(folder, "tls", tls, machine)
-    file = folder / f"{machine}.toml"
-    file.write_text(base.read_text().replace("router.", f"{machine}."))
-    return file
-
-
-@pytest.mark.parametrize("key", ["ca", "certificate", "private_key"])
-def test_files_of_tls_that_are_missing_are_errors_of_the_deployment(
-    key: str, tmp_path: Path, agents: list[Agent]
-) -> None:
-    certificates(tmp_path, ("agent-r2",))
-    where = with_certificate(tmp_path, "agent-r2")
-    file = {"ca": "ca.pem", "certificate": "agent-r2.pem", "private_key": "agent-r2.key"}[key]
-    (tmp_path / file).unlink()
-    run = start(tmp_path, where)
-    agents.append(Agent("r2", where))
-    try:
-        for status, said in (run.end(), agents[0].end()):
-            assert status == 2
-            assert f"network.tls.{key} = {tmp_path / file}: No such file or directory" in said
-    finally:
-        run.kill()
-
-
-@pytest.mark.wall_clock
-def test_a_certificate_is_an_identity_and_another_one_is_not(tmp_path, agents) -> None:
-    certificates(tmp_path, ("router", "agent-r2", "agent-r1"))
-    where = with_certificate(tmp_path, "router")
-    impostor = with_certificate(tmp_path, "agent-r1", where)
-    run = start(tmp_path, where, "--duration", "2")
-    try:
-        agents.append(Agent("r2", impostor))
-        status, said = agents[0].end()
-        assert status == 2
-        assert "is the certificate of 'agent-r1' (its common name), not of 'agent-r2'" in said
-        genuine = with_certificate(tmp_path, "agent-r2", where)
-        agents.append(Agent("r2", genuine, "--set", "duration_s=2.0"))
-        status, out = run.end()
-        assert status == 0, out
-        assert agents[1].end()[0] == 0
-    finally:
-        run.kill()

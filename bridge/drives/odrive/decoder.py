@@ -10,7 +10,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from bridge.drives.interface import NodeSeen
-from bridge.drives.odrive import frames as odrive
+from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import Command
 from bridge.frame import EFF, ERR, RTR, Frame
 
@@ -84,8 +84,8 @@ LAYOUTS: Mapping[Command, Layout] = {
     Command.HEARTBEAT: _numbers(
         "<IBBBx",
         "Axis_Error",
-        Signal("Axis_State", meaning=odrive.AxisState),
-        Signal("Procedure_Result", meaning=odrive.ProcedureResult),
+        Signal("Axis_State", meaning=f.AxisState),
+        Signal("Procedure_Result", meaning=f.ProcedureResult),
         Signal("Trajectory_Done_Flag", bits=1),
     ),
     Command.ESTOP: _numbers("<"),
@@ -93,14 +93,12 @@ LAYOUTS: Mapping[Command, Layout] = {
     Command.RX_SDO: _numbers("<BHxI", "Opcode", *_SDO_VALUE),
     Command.TX_SDO: _numbers("<xHxI", *_SDO_VALUE),
     Command.ADDRESS: _numbers("<BIH", "Node_ID", "Serial_Number"),
-    Command.SET_AXIS_STATE: _numbers(
-        "<I", Signal("Axis_Requested_State", meaning=odrive.AxisState)
-    ),
+    Command.SET_AXIS_STATE: _numbers("<I", Signal("Axis_Requested_State", meaning=f.AxisState)),
     Command.GET_ENCODER_ESTIMATES: _floats(("Pos_Estimate", "rev"), ("Vel_Estimate", "rev/s")),
     Command.SET_CONTROLLER_MODE: _numbers(
         "<II",
-        Signal("Control_Mode", meaning=odrive.ControlMode),
-        Signal("Input_Mode", meaning=odrive.InputMode),
+        Signal("Control_Mode", meaning=f.ControlMode),
+        Signal("Input_Mode", meaning=f.InputMode),
     ),
     Command.SET_INPUT_POS: _numbers(
         "<fhh",
@@ -137,15 +135,15 @@ def decode(frame: Frame) -> Message | None:
         return None
     number = can_id & 0x7FF
     try:
-        command = Command(number & (1 << odrive.BITS) - 1)
+        command = Command(number & (1 << f.BITS) - 1)
         layout = LAYOUTS[command]
     except (ValueError, KeyError):
         return None
-    node = number >> odrive.BITS
+    node = number >> f.BITS
     name = _NAMES.get(command, command.name.title())
     if can_id & RTR or (not data and _is_answered(command)):
         return Message(node, name, (), request=True)
-    raw = layout.packed.unpack(odrive.padded(data, layout.packed.size))
+    raw = layout.packed.unpack(f.padded(data, layout.packed.size))
     if command is Command.ADDRESS:
         raw = (raw[0], raw[1] | raw[2] << 32)
     values = tuple(map(_value, layout.signals, raw))
@@ -172,9 +170,9 @@ def _is_answered(command: Command) -> bool:
 
 def _value(signal: Signal, raw: float) -> Value:
     if signal.name in _ERRORS:
-        return Value(signal.name, odrive.error_names(odrive.AxisError(int(raw))), "")
+        return Value(signal.name, f.error_names(f.AxisError(int(raw))), "")
     if signal.meaning is not None:
-        return Value(signal.name, odrive.name_of(signal.meaning, int(raw)), "")
+        return Value(signal.name, f.name_of(signal.meaning, int(raw)), "")
     if signal.scale != 1.0:
         return Value(signal.name, raw * signal.scale, signal.unit)
     return Value(signal.name, raw & signal.bits if isinstance(raw, int) else raw, signal.unit)
@@ -183,11 +181,11 @@ def _value(signal: Signal, raw: float) -> Value:
 def node_seen(frame: Frame) -> NodeSeen | None:
     """The node that a frame concerns, with its state if it is a heartbeat; None: no CANSimple."""
     can_id, data = frame
-    if can_id & (EFF | ERR) or (can_id & (1 << odrive.BITS) - 1) not in LAYOUTS:
+    if can_id & (EFF | ERR) or (can_id & (1 << f.BITS) - 1) not in LAYOUTS:
         return None
-    node, command = (can_id & 0x7FF) >> odrive.BITS, can_id & (1 << odrive.BITS) - 1
+    node, command = (can_id & 0x7FF) >> f.BITS, can_id & (1 << f.BITS) - 1
     if command != Command.HEARTBEAT or can_id & RTR or not data:
         return NodeSeen(node)
-    heartbeat = odrive.decode_heartbeat(data)
-    state = odrive.name_of(odrive.AxisState, heartbeat.state)
-    return NodeSeen(node, state, odrive.error_names(heartbeat.errors))
+    heartbeat = f.decode_heartbeat(data)
+    state = f.name_of(f.AxisState, heartbeat.state)
+    return NodeSeen(node, state, f.error_names(heartbeat.errors))
