@@ -13,6 +13,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from random import Random
 from typing import Any, NamedTuple
 
@@ -43,8 +44,8 @@ class Verdict(NamedTuple):
     faults: tuple[str, ...]
 
 
-def drawn(number: int, duration_s: float = DURATION_S) -> str:
-    """The scenario file of a number."""
+def drawn(number: int, *, ideal: bool = False) -> str:
+    """The scenario file of a number; `ideal`: with ideal drives, all else the same."""
     draw = Random(f"scenario {number}")
     period_s = draw.choice((0.01, 0.02, 0.02))
     robots = [f"r{n + 1}" for n in range(draw.randint(2, 4))]
@@ -52,7 +53,7 @@ def drawn(number: int, duration_s: float = DURATION_S) -> str:
     data: dict[str, Any] = {
         "schema": 1,
         "name": f"random_{number}",
-        "duration_s": duration_s,
+        "duration_s": DURATION_S,
         "seed": number + 1,
         "clock": {
             "control_period_s": period_s,
@@ -75,6 +76,8 @@ def drawn(number: int, duration_s: float = DURATION_S) -> str:
     }
     if draw.random() < 0.6:
         data["network"] = _network(draw, data["graph"]["edges"])
+    if ideal:
+        data["drive"]["preset"] = "ideal"
     path, places, heading = _path(draw, len(robots))
     data["path"] = path
     data["robot"] = [
@@ -184,17 +187,17 @@ def _path(draw: Random, count: int) -> tuple[dict[str, Any], list[tuple[Any, ...
             return {"kind": "circle", "radius_m": radius_m}, places, 0.5 * math.pi
 
 
-def verdict(number: int, duration_s: float = DURATION_S) -> Verdict:
+def verdict(number: int, *, ideal: bool = False) -> Verdict:
     """Check and run one scenario."""
     name = f"random_{number}"
     try:
-        scenario = loads(name, drawn(number, duration_s))
+        scenario = loads(name, drawn(number, ideal=ideal))
         findings = examine(name, scenario)
     except ScenarioError as error:
         return Verdict(number, REFUSED, tuple(str(error).splitlines()), ("not run",))
     level = worst(findings)
     reasons = tuple(titled(one) for one in findings if one.level == level != "ok")
-    return Verdict(number, level, reasons, faults(scenario, rehearsal(scenario, duration_s)))
+    return Verdict(number, level, reasons, faults(scenario, rehearsal(scenario, DURATION_S)))
 
 
 def faults(scenario: Scenario, run: Rehearsal) -> tuple[str, ...]:
@@ -247,13 +250,14 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=500, help="scenarios (default: 500)")
     parser.add_argument("--first", type=int, default=0, help="number of the first one")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--ideal", action="store_true", help="ideal drives: coordination alone")
     parser.add_argument("--quick", action="store_true", help="20 scenarios")
     options = parser.parse_args()
     count = 20 if options.quick else options.count
     numbers = range(options.first, options.first + count)
     verdicts = []
     with ProcessPoolExecutor(options.jobs) as pool:
-        for one in pool.map(verdict, numbers):
+        for one in pool.map(partial(verdict, ideal=options.ideal), numbers):
             verdicts.append(one)
             print(*one, sep="; ", file=sys.stderr, flush=True)
     print(*table(verdicts), sep="\n")
