@@ -17,7 +17,6 @@ FLEET = "".join(
     f'[[robot]]\nname = "r{n}"\npose = {{ x_m = 0.0, y_m = {n}.0 }}\n' for n in (1, 2, 3)
 )
 UsageError = typer.BadParameter.__base__ or Exception
-PLACES = {"roles", "robot"}
 
 
 TABLES = [
@@ -28,7 +27,8 @@ TABLES = [
 @pytest.mark.parametrize("snippet", TABLES, ids=lambda s: s.where)
 def test_files_that_are_shown_are_taken(snippet: Snippet, tmp_path: Path) -> None:
     data = tomllib.loads(snippet.text)
-    if data.keys() & PLACES or "endpoint" in data.get("network", ()):
+    placed = "roles" in data or isinstance(data.get("robot"), dict)
+    if placed or "endpoint" in data.get("network", ()):
         for name in re.findall(r'"([\w./-]+\.(?:pem|key))"', snippet.text):
             (tmp_path / name).touch()
         check_deployment("shown", data, load("two_robots_100hz"), tmp_path)
