@@ -107,7 +107,7 @@ def test_a_check_says_where_real_drives_would_be_driven(tmp_path, capsys) -> Non
     file.write_text('[robot.r2]\nbus = { interface = "socketcan", channel = "can0" }\n')
     assert check_scenario("two_robots_100hz", (), deployment=file, as_json=True) == 0
     places = {
-        finding["robots"][0]: finding["text"]
+        finding["robots"][0]: finding["value"]
         for finding in json.loads(capsys.readouterr().out)["findings"]
         if finding["title"] == "place"
     }
