@@ -270,7 +270,7 @@ def _bias(scenario: Scenario, ages_s: dict[Edge, float]) -> Finding:
     title, basis = 'bias of compensation = "hold"', "(45) with ages, steady"
     if found is None:
         return Finding("warning", title, "without end", basis=basis)
-    value = f"spread {found.spread_m:.3g} m, speed {found.speed_m_s:+.3g} m/s"
+    value = f"spread {found.spread_m:.3g} m, speed {found.speed_m_s + 0.0:+.3g} m/s"
     limit = f"≤ {SETTLE_BAND:g} m and m/s"
     if max(found.spread_m, abs(found.speed_m_s)) <= SETTLE_BAND:
         return Finding("ok", title, value, limit=limit, basis=basis)

@@ -71,7 +71,8 @@ class Supervision:
             deaf = identity_of(child.name) in link.denials.cut_off
             # In real time the newest message is as good as those that were lost.
             needed = not self._schedule.realtime or child.name == RECORDER.name
-            if deaf and needed and child.name not in plane.alive and not child.ended():
+            going = child.name not in plane.outcome.reports  # a token goes at a good end as well
+            if deaf and needed and going and child.name not in plane.alive and not child.ended():
                 text = f"{child.name}: did not read its messages, and was cut off"
                 return Failure(GAVE_UP, child.name, text)
         return None

@@ -16,9 +16,9 @@ HANGS = """
 import os, signal, sys
 
 def test_hangs():
-    with open(os.environ["LOG"], "w") as fifo:
-        fifo.write(f"{os.getpid()}\\n")
     try:
+        with open(os.environ["LOG"], "w") as fifo:
+            fifo.write(f"{os.getpid()}\\n")
         signal.pause()
     finally:
         with open(os.environ["LOG"], "w") as fifo:

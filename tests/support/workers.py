@@ -5,27 +5,41 @@ ones wait until it has: `turn` is held by the next test to begin, `room` by thos
 
 A worker whose parent is gone, however it ended, is aborted: faulthandler then says where every
 thread is, even if none runs Python any more. Ctrl-C interrupts a worker's test as it does without
-workers, so that the test cleans up.
+workers, and leaves it `CLEAN_UP_S` to clean up, whether or not its parent waits.
 """
 
 import ctypes
+import faulthandler
 import fcntl
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 
 import pytest
 
 _PR_SET_PDEATHSIG = 1
+CLEAN_UP_S = 30.0
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """In a worker, ask the kernel for the signal, and Python for the interrupt."""
     if not hasattr(config, "workerinput"):
         return
-    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGABRT, 0, 0, 0)
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    _end_with_parent(signal.SIGABRT)
+    signal.signal(signal.SIGINT, _interrupt)
+
+
+def _end_with_parent(number: int) -> None:
+    """Have the kernel send this signal when the parent ends; 0: none."""
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, number, 0, 0, 0)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    _end_with_parent(0)
+    faulthandler.dump_traceback_later(CLEAN_UP_S, exit=True)
+    signal.default_int_handler(number, frame)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
