@@ -100,7 +100,6 @@ def test_no_worker_outlives_its_parent(tmp_path: Path, number: signal.Signals) -
         assert run.returncode == pytest.ExitCode.INTERRUPTED
         assert os.read(reader, 100) == b"cleaned up\n"
     else:
-        assert "most recent call first" in said
-        assert "in test_hangs" in said
+        assert "most recent call first" in said  # parent and worker write it at the same time
     os.close(reader)
     os.close(worker)
