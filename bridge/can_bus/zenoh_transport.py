@@ -9,6 +9,9 @@ packets, and then at the hub, which drops and counts what is too much. Leaving w
 `CLOSE_S`, until the hub has all that was sent. The guest holds a liveliness token for as long as it
 lives and watches the relay's: when that goes, or the network to it (noticed within Zenoh's lease),
 the connection is broken for good, with the reason.
+
+Credit and the answer to a BYE are put on a thread of their own, not on Zenoh's, which must not wait
+(`ZenohLink.each`).
 """
 
 import atexit
@@ -57,6 +60,7 @@ class ZenohTransport:
         self._sender, self._receiver = Sender(), Receiver()
         self._held: deque[bytes] = deque()  # past the backlog: no room is given back for them yet
         self._broken = ""
+        self._answers: queue.SimpleQueue[bytes] = queue.SimpleQueue()  # b"": the last
         self._ended = threading.Event()
         try:
             self._link = open_client(network, timeout_s)
@@ -71,6 +75,7 @@ class ZenohTransport:
         except (zenoh.ZError, OSError) as error:
             self._link.close()
             raise OSError(str(error)) from error
+        threading.Thread(target=self._answer, daemon=True).start()
         # Later, when the interpreter ends, a session can't be closed and keeps the process.
         atexit.register(self.close)
         again_s = _FIRST_HELLO_S
@@ -95,11 +100,9 @@ class ZenohTransport:
         kind = packet[0] if packet else 0
         answer = self._keep_or_answer(packet, kind)
         if answer is not None:
-            with contextlib.suppress(OSError):
-                self._publish(answer)
+            self._answers.put(answer)
         if kind in _ENDS:
-            # After the answer: the waiting thread then closes the session.
-            self._ended.set()
+            self._answers.put(b"")
 
     def _keep_or_answer(self, packet: bytes, kind: int) -> bytes | None:
         with self._news:
@@ -137,6 +140,15 @@ class ZenohTransport:
 
     def _has_packets(self) -> bool:
         return not self._packets.empty()
+
+    # --- on a thread of its own ------------------------------------------------------------------
+
+    def _answer(self) -> None:
+        while answer := self._answers.get():
+            with contextlib.suppress(OSError):
+                self._publish(answer)
+        # After the answers: the waiting thread then closes the session.
+        self._ended.set()
 
     # --- transport -------------------------------------------------------------------------------
 
@@ -204,4 +216,5 @@ class ZenohTransport:
             with contextlib.suppress(OSError):
                 self._publish(encode_text(BYE))
         self._ended.wait(CLOSE_S)
+        self._answers.put(b"")  # ends their thread
         self._link.close()

@@ -66,7 +66,11 @@ class ZenohLink:
         self._subscribers.pop(key).undeclare()
 
     def each(self, key: str, act: Callable[[bytes], None]) -> None:
-        """Call `act`, on the network's thread, with what others put on `key`."""
+        """Call `act`, on the network's thread, with what others put on `key`.
+
+        `act` must not put: a put may wait for room, and the thread that would make it may be this
+        one; then the session is lost.
+        """
         self.each_keyed(key, lambda _, payload: act(payload))
 
     def each_keyed(self, key_expr: str, act: Callable[[str, bytes], None]) -> None:

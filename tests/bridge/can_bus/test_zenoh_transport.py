@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import can
@@ -17,7 +17,11 @@ from support.hub_running import Running, lost_at
 
 from bridge.can_bus import connection, flow_control, zenoh_transport
 from bridge.can_bus.flow_control import INITIAL_CREDIT_BYTES, LEAST_BYTES
+from bridge.can_bus.packet import BYE
 from bridge.frame import Frame
+from bridge.network.client import open_client
+from bridge.network.link import Publisher
+from bridge.network.zenoh_link import ZenohLink
 
 OPEN = """
 import sys, time, can
@@ -129,6 +133,42 @@ def test_a_guest_that_reads_late_has_lost_nothing(running: Running) -> None:
         for bus in (local, late):
             heard = [int.from_bytes(bus.recv(5.0).data, "big") for _ in range(3000)]
             assert heard == list(range(3000))
+
+
+def test_credit_and_the_answer_to_the_end_are_not_put_on_the_networks_thread(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hearers: set[int] = set()
+    puts: list[tuple[int, int]] = []  # kind of packet, thread
+
+    class Watched:
+        def __init__(self, publisher: Publisher) -> None:
+            self._publisher = publisher
+
+        def put(self, packet: bytes) -> None:
+            puts.append((packet[0], threading.get_ident()))
+            self._publisher.put(packet)
+
+    def watched(*args) -> ZenohLink:
+        link = open_client(*args)
+        each, publisher = link.each, link.publisher
+
+        def watched_each(key: str, act: Callable[[bytes], None]) -> None:
+            each(key, lambda packet: (hearers.add(threading.get_ident()), act(packet)))
+
+        link.each, link.publisher = watched_each, lambda key: Watched(publisher(key))
+        return link
+
+    monkeypatch.setattr(zenoh_transport, "open_client", watched)
+    packets = 2 * INITIAL_CREDIT_BYTES // LEAST_BYTES  # twice what comes without new credit
+    with running.open() as guest:
+        for n in range(packets):
+            running.deliver(Frame(1, n.to_bytes(4, "big")))
+        assert all(guest.recv(5.0) is not None for _ in range(packets))
+        running.close("the end")
+        error_within(guest, 5.0)
+    assert {flow_control.CREDIT, BYE} <= {kind for kind, _ in puts}
+    assert hearers and not hearers & {thread for _, thread in puts}  # one that waits makes no room
 
 
 def test_what_a_guest_does_not_read_is_dropped_and_counted_by_the_hub_as_for_all(
