@@ -158,8 +158,10 @@ class Graph:
         return np.diag(adjacency.sum(axis=1)) - adjacency
 
     def roots(self) -> tuple[str, ...]:
-        """Robots that reach all others."""
-        return tuple(robot for robot in self.robots if not self.unreached_from([robot]))
+        """Robots that reach all others: the strong component that none leads to, if it is one."""
+        strong = nx.condensation(self.digraph().subgraph(self.robots))
+        first = [strong.nodes[n]["members"] for n, degree in strong.in_degree() if not degree]
+        return tuple(r for r in self.robots if r in first[0]) if len(first) == 1 else ()
 
     def unreached_from(self, speakers: Iterable[str]) -> tuple[str, ...]:
         """Robots that none of the speakers reaches, directly or through others."""

@@ -82,6 +82,7 @@ def test_the_graph_is_rooted_iff_the_laplacian_has_a_simple_zero(drawn) -> None:
     names = [f"r{k}" for k in range(n)]
     graph = Graph.of(names, [(names[a], names[b]) for a, b in edges if a != b], ())
     assert bool(graph.roots()) == (np.linalg.matrix_rank(graph.laplacian(), tol=1e-9) == n - 1)
+    assert graph.roots() == tuple(i for i in graph.robots if not graph.unreached_from([i]))
 
 
 @given(n=st.integers(1, 20), degree=st.integers(1, 5), seed=st.integers(0, 1000))
