@@ -7,8 +7,10 @@
 with T_k = 0 for a step. Before the first change its speed holds. v_r = 0: the formation stands.
 """
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import pairwise
+from math import inf
 from typing import NamedTuple
 
 
@@ -27,14 +29,14 @@ class SpeedChange(NamedTuple):
 
 def speed_at(changes: Sequence[SpeedChange], t_ns: float) -> float:
     """v_r at a scenario time [m/s]; `changes`: at least one, in order, none within another."""
-    before = changes[0].speed_m_s
-    for from_ns, speed, ramp_ns in changes:
-        if t_ns < from_ns:
-            break
-        if t_ns < from_ns + ramp_ns:
-            return before + (speed - before) * ((t_ns - from_ns) / ramp_ns)
-        before = speed
-    return before
+    last = bisect_right(changes, (t_ns, inf)) - 1  # that has begun
+    if last < 0:
+        return changes[0].speed_m_s
+    from_ns, speed, ramp_ns = changes[last]
+    if t_ns >= from_ns + ramp_ns:
+        return speed
+    before = changes[max(last - 1, 0)].speed_m_s
+    return before + (speed - before) * ((t_ns - from_ns) / ramp_ns)
 
 
 def in_order(changes: Sequence[SpeedChange]) -> bool:
