@@ -232,8 +232,10 @@ class Hub:
         found = {}
         for name, bus in self._buses.items():
             garbage, lost = bus.counters.garbage, bus.counters.dropped
-            said = [f"clients sent {garbage} × what is no frame of classic CAN: it was dropped"]
-            said = said if garbage else []
+            said = []
+            if garbage:
+                what = "what is no frame of classic CAN: it was dropped"
+                said.append(f"clients sent {garbage} × {what}")
             if lost:
                 said.append(f"{lost} frames for clients were lost: they did not read them in time")
             if said:
