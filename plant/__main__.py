@@ -232,7 +232,10 @@ def _await_go(brief: PlantBrief, link: Link, hellos: Hellos, stop: Stop) -> None
 def _serve_until_go(
     brief: PlantBrief, end: DrivePort, link: Link, hellos: Hellos, stop: Stop
 ) -> int:
-    """Say hello and serve the buses until the launcher says when tick 0 is."""
+    """Say hello and serve the buses until the launcher says when tick 0 is.
+
+    By this machine's clock: the go is an instant of it, and other processes are waited for.
+    """
     limit_s = GO_SHARE * brief.schedule.start_deadline_s
     wrong: str | None = None
     deadline = SYSTEM_CLOCK.monotonic_s() + limit_s

@@ -8,7 +8,8 @@
 
 One thread, one epoll; no call blocks longer than asked. Packets that a client doesn't read are kept
 in its `connection`. At the end of a bus a client may read its backlog for `GOODBYE_S` at most, as
-long as it reads something every `STANDSTILL_S`; then it is told how many frames it lost.
+long as it reads something every `STANDSTILL_S`; then it is told how many frames it lost. These two
+are measured by this machine's clock, whatever time the buses keep: clients are real processes.
 """
 
 import contextlib

@@ -172,7 +172,10 @@ def cause(children: Iterable[Child]) -> Failure | None:
 
 
 def await_end(children: Iterable[Child], within_s: float) -> list[Child]:
-    """Wait until all have ended, at most `within_s`; return those that have not."""
+    """Wait until all have ended, at most `within_s`; return those that have not.
+
+    By this machine's clock, which real processes end by.
+    """
     children = list(children)
     deadline = SYSTEM_CLOCK.monotonic_s() + within_s
     for child in children:
