@@ -231,9 +231,7 @@ class Denials:
 
     def _count_denied(self, user: str, peer: str) -> None:
         """Cut off a client that goes on with what it has no right to."""
-        if len(self._denied) >= _REMEMBERED and peer not in self._denied:
-            del self._denied[next(iter(self._denied))]
-        self._denied[peer] += 1
+        _remember(self._denied, peer, self._denied[peer] + 1)
         if self._denied[peer] == MOST_DENIED and user:
             self.flooders.add(self._proof(user, peer))
             self.turn_away(peer)
@@ -275,7 +273,7 @@ class Denials:
 
 
 def _remember(known: dict[str, _Value], key: str, value: _Value) -> None:
-    if len(known) >= _REMEMBERED:
+    if key not in known and len(known) >= _REMEMBERED:
         del known[next(iter(known))]
     known[key] = value
 
