@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from configs.edges import LEADER, parse_edge
+from configs.edges import LEADER, edge_text, parse_edge
 from configs.errors import Problem
 from configs.graph import Graph
 from configs.netem import EVERY_ROBOT, LOCALISATION, Effects
@@ -21,7 +21,7 @@ class EmulatedEdge(NamedTuple):
     hearer: str
 
     def __str__(self) -> str:
-        return f"{self.source} -> {self.hearer}"
+        return edge_text(self)
 
 
 def edges_of(graph: Graph) -> list[EmulatedEdge]:
