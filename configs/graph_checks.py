@@ -1,9 +1,9 @@
 """Problems of the section [graph]: edges, weights, and the two conditions of Theorem 3.1."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 
 from configs.edge_checks import edge_problem, link_problems
-from configs.edges import LEADER, LEAST_WEIGHT, MOST_WEIGHT, edge_text, parse_edge
+from configs.edges import LEADER, LEAST_WEIGHT, MOST_WEIGHT, Edge, edge_text, parse_edge
 from configs.errors import Problem
 from configs.graph import Graph
 from configs.scenario import Scenario
@@ -68,7 +68,8 @@ def _weights(scenario: Scenario, table: Mapping[str, float]) -> Iterator[Problem
         yield Problem(key, dict(table), remedy)
         return
     topology = scenario.topology
-    known = [*topology.edges, *((LEADER, robot) for robot in topology.leader)]
+    links = ((LEADER, robot) for robot in topology.leader)
+    known = dict.fromkeys((*topology.edges, *links))  # a set, in order
     for text, weight in table.items():
         edge = parse_edge(text)
         if edge is None:
@@ -77,7 +78,7 @@ def _weights(scenario: Scenario, table: Mapping[str, float]) -> Iterator[Problem
             yield Problem(f"{key}.{text}", weight, _no_edge(edge, known))
 
 
-def _no_edge(edge: tuple[str, str], known: Sequence[tuple[str, str]]) -> str:
+def _no_edge(edge: Edge, known: Collection[Edge]) -> str:
     if edge[::-1] in known:
         return f"the graph has no such edge, but {edge_text(edge[::-1])}"
     return f"the graph has no such edge; it has {', '.join(map(edge_text, known))}"
