@@ -1,7 +1,7 @@
 """Relations between the sections of a scenario; all problems at once, none raised."""
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import ceil, floor, inf
 
 from pydantic import ValidationError
@@ -116,28 +116,41 @@ def _laws(scenario: Scenario) -> Iterator[Problem]:
                 yield Problem(key, value, remedy_of(item))
 
 
-def _expectable(scenario: Scenario, robots: Sequence[str], *, sound_edges: bool) -> list[str]:
-    """Signals that all of these robots have, or some robot if none is named.
+_Table = tuple[str, set[str] | None]
+"""A robot and its controller's signals; None: its law isn't here, of a record."""
 
-    Nothing if a law isn't here, of a record.
-    """
-    every = {SPREAD, *(signal.name for signal in PLANT_SIGNALS)}
-    tables = []
+
+def _tables(scenario: Scenario, *, sound_edges: bool) -> Iterator[_Table]:
+    """The signals of each robot whose law and gains are right."""
     for robot in scenario.robot:
-        if robots and robot.name not in robots:
-            continue
         try:
             control = scenario.control_of(robot)
         except ValidationError:  # said already
             continue
         if isinstance(control.parameters, Recorded):
-            return []
+            yield robot.name, None
+            continue
         signals = controller_signals(
             control.load().SIGNALS, scenario.aged(robot.name) if sound_edges else ()
         )
-        tables.append({signal.name for signal in signals})
+        yield robot.name, {signal.name for signal in signals}
+
+
+def _expectable(tables: Iterable[_Table], robots: Sequence[str]) -> list[str]:
+    """Signals that all of these robots have, or some robot if none is named.
+
+    Nothing if a law isn't here.
+    """
+    every = {SPREAD, *(signal.name for signal in PLANT_SIGNALS)}
+    named = []
+    for robot, table in tables:
+        if robots and robot not in robots:
+            continue
+        if table is None:
+            return []
+        named.append(table)
     of_all = set.intersection if robots else set.union
-    return sorted(every | of_all(*tables)) if tables else []
+    return sorted(every | of_all(*named)) if named else []
 
 
 def _periods(scenario: Scenario) -> Iterator[Problem]:
@@ -200,10 +213,11 @@ def _host(scenario: Scenario) -> Iterator[Problem]:
 
 
 def _expects(scenario: Scenario, *, sound_edges: bool) -> Iterator[Problem]:
+    tables = list(_tables(scenario, sound_edges=sound_edges)) if scenario.expect else []
     for n, expect in enumerate(scenario.expect):
         if expect.signal.startswith(AGE_PREFIX) and not sound_edges:
             continue  # named after an edge
-        known = _expectable(scenario, expect.robots or (), sound_edges=sound_edges)
+        known = _expectable(tables, expect.robots or ())
         where = f"expect.{n}"
         if known and expect.signal not in known:
             hint = guess(expect.signal, known, cutoff=0.5)

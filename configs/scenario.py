@@ -88,7 +88,7 @@ class Scenario(BaseModel):
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with these sections instead of its own; what was made of the old ones goes."""
         copied = super().model_copy(update=update, deep=deep)
-        for made in ("members", "topology", "reach"):
+        for made in ("ages_vary", "members", "topology", "reach"):
             copied.__dict__.pop(made, None)
         return copied
 
@@ -108,11 +108,16 @@ class Scenario(BaseModel):
         All its in-neighbours, where ages vary; the leader and the localisation system, where their
         edges are emulated.
         """
-        emulated = self.network.default != Effects() or bool(self.network.edge)
-        if not emulated and not self.topology.switches and self.clock.mode == "lockstep":
+        if not self.ages_vary:
             return ()
         others = effects_to(self.network, self.topology, name, of_robots=False)
         return (*(edge.speaker for edge in self.topology.hears[name]), *others)
+
+    @cached_property
+    def ages_vary(self) -> bool:
+        """Whether path states have other ages than the schedule's."""
+        emulated = self.network.default != Effects() or bool(self.network.edge)
+        return emulated or self.clock.mode == "realtime" or self.topology.switches
 
     @property
     def names(self) -> tuple[str, ...]:
