@@ -25,15 +25,13 @@ as in `agents.laws.fixed_dsc`; nothing adapts, and there is no state.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan, cos, inf, sin
+from math import atan, cos, sin
 
-from agents.laws.dsc_terms import Eight, sense, wheel_torques
-from agents.laws.fixed_dsc import PAPER_THETA, scaled
+from agents.laws.backstepping import Backstepping, BacksteppingGains
+from agents.laws.dsc_terms import sense
 from agents.laws.interface import (
     PATH_ERRORS,
-    AdaptationLimit,
     Fast,
-    Law,
     LawOutput,
     LoopElement,
     PathVariable,
@@ -45,26 +43,20 @@ from agents.laws.interface import (
     Wheels,
 )
 from agents.laws.path_errors import path_errors
-from configs.parameters import NotNegative, Parameters, Positive, parameter
+from configs.parameters import Positive, parameter
 
 _STEP_M = 1e-4
 """Of the central differences along the path."""
 
 
-class BacksteppingAnalytic(Law):
+class BacksteppingAnalytic(Backstepping):
     """Equations (15), (17), [1]-[4]."""
 
     @dataclass(frozen=True, slots=True, kw_only=True)
-    class Gains(Parameters):
-        """Gains of (15), (17), [2], [4], and the parameters."""
+    class Gains(BacksteppingGains):
+        """Those of backstepping, and the least divisor of [2]."""
 
-        k1: Positive = parameter(2.0, "(15), of x_e [1/s]")
-        k2: Positive = parameter(3.0, "(17), of y_e [1/m]")
-        k3: Positive = parameter(1.5, "[2], of the heading [1/s]")
-        k4: Positive = parameter(3.0, "[4], of the speeds [N·m·s/m, N·m·s/rad]")
         margin: Positive = parameter(0.1, "least 1 − G x_e")
-        theta: Eight = parameter(PAPER_THETA, "Θ of the design [kg·m², N·m·s]")
-        factor: NotNegative = parameter(1.0, "the law uses this multiple of theta")
 
     SIGNALS = (
         *PATH_ERRORS,
@@ -84,8 +76,8 @@ class BacksteppingAnalytic(Law):
         period_s: float,  # noqa: ARG002 - nothing is integrated
         path: RobotPath,
     ) -> None:
-        self._gains, self._wheels, self._path = gains, wheels, path
-        self._theta = scaled(gains.theta, gains.factor)
+        super().__init__(gains, wheels)
+        self._gains, self._path = gains, path
 
     def step(
         self,
@@ -95,18 +87,11 @@ class BacksteppingAnalytic(Law):
         along: PathVariable,
     ) -> LawOutput:
         """One tick of (9)-[4]."""
-        v, omega = motion.v, motion.omega
         errors = path_errors(*motion[:3], *reference[:3])  # (8)
         v_bar, v_rate, omega_bar, omega_rate, divisor = self.virtual(
-            errors, v, omega, reference, along
+            errors, motion.v, motion.omega, reference, along
         )
-        e_1, e_2 = v - v_bar, omega - omega_bar  # [3]
-        t1, t2, t3, t4, t5, t6, t7, t8 = self._theta
-        known_1 = omega * omega * t1 - v * t2 - omega * t3 - v_rate * t4
-        known_2 = -v * omega * t5 - v * t6 - omega * t7 - omega_rate * t8
-        k4, wheels = self._gains.k4, self._wheels
-        u_1, u_2 = -k4 * e_1 - known_1, -k4 * e_2 - known_2  # [4]
-        right, left = wheel_torques(u_1, u_2, wheels.radius_m, wheels.half_track_m)  # (3)
+        right, left, e_1, e_2 = self.torques(motion, v_bar, omega_bar, v_rate, omega_rate)
         said = (*errors, v_bar, omega_bar, v_rate, omega_rate, e_1, e_2, divisor)
         return LawOutput(right, left, None, said)
 
@@ -153,30 +138,6 @@ class BacksteppingAnalytic(Law):
 
     # --- what follows from the equations, for `fleetloop check` ---------------------------------
 
-    SPEED_GAIN = "k4"
-    LOOP_GAINS = ("k1", "k3", "k2", "k4")
-    REVERSES = True
-
-    @classmethod
-    def torque_limit_wheel_N_m(cls, gains: "BacksteppingAnalytic.Gains") -> float:  # noqa: ARG003
-        """None: [4] asks for whatever its terms are."""
-        return inf
-
-    @classmethod
-    def approach_rate_1_s(cls, gains: "BacksteppingAnalytic.Gains") -> float | None:
-        """k_1 of (15)."""
-        return gains.k1
-
-    @classmethod
-    def lateral_gain_1_m(cls, gains: "BacksteppingAnalytic.Gains") -> float | None:
-        """k_2 of (17)."""
-        return gains.k2
-
-    @classmethod
-    def speed_gain_N_m_s(cls, gains: "BacksteppingAnalytic.Gains") -> float | None:
-        """k_4 of [4]."""
-        return gains.k4
-
     @classmethod
     def loop_elements(
         cls,
@@ -197,12 +158,3 @@ class BacksteppingAnalytic(Law):
             return out.tau_right, out.tau_left, fast
 
         return (LoopElement((), step),)
-
-    @classmethod
-    def adaptation_limit(
-        cls,
-        gains: "BacksteppingAnalytic.Gains",  # noqa: ARG003
-        period_s: float,  # noqa: ARG003
-    ) -> AdaptationLimit | None:
-        """None: nothing adapts."""
-        return None
