@@ -187,7 +187,6 @@ class AdaptiveDsc(Law):
 
     SPEED_GAIN = "k4"
     LOOP_GAINS = ("k1", "k3", "k2", "k4")
-    REVERSES = True
     SATURATION = (
         "the paper's law learns the limit;"
         ' control.law = "adaptive_dsc_robust" doesn\'t, or start closer'

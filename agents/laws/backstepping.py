@@ -52,7 +52,6 @@ class Backstepping(Law):
 
     SPEED_GAIN = "k4"
     LOOP_GAINS = ("k1", "k3", "k2", "k4")
-    REVERSES = True
 
     @classmethod
     def torque_limit_wheel_N_m(cls, gains: BacksteppingGains) -> float:  # noqa: ARG003

@@ -199,7 +199,8 @@ def _sharing(scenario: Scenario, ahead: Forecast) -> Finding:
 def _leader(scenario: Scenario) -> list[Finding]:
     """By (18) y_e is damped with k_2 v̄_d ṡ: it stays at ṡ = 0, and grows at ṡ < 0.
 
-    Not with a law that follows its path backwards as well.
+    Not with a law that says that it follows its path backwards as well. The shipped ones don't say
+    it: their σ(ṡ) (`agents.laws.dsc_terms.sense`) is for a while, and no part of Theorem 3.1.
     """
     title = "ṡ > 0: the leader's speed"
     leader = scenario.leader
@@ -229,9 +230,7 @@ def _leader(scenario: Scenario) -> list[Finding]:
         text = (
             "v_r = 0: while they stand, robots don't come any closer to their paths sideways (18)"
         )
-        if key == "leader.speed_m_s":
-            return [Finding("warning", title, text, key=key)]
-        return [Finding("ok", title, text)]
+        return [Finding("warning", title, text, key=key)]
     return [Finding("ok", title, f"v_r ≥ {slowest:g} m/s")]
 
 
