@@ -71,7 +71,7 @@ def test_a_killed_launcher_leaves_nothing_and_the_plant_says_the_tick(
         # Whoever misses it first: the plant, or the robot that hears r2.
         (
             "r2",
-            r"no answer from the controller of r2 within 1 s|within 0\.75 s no path state of r2",
+            r"no answer from the controller of r2 within 0\.9 s|within 0\.75 s no path state of r2",
         ),
     ],
 )

@@ -90,8 +90,10 @@ def test_a_client_that_falls_silent_is_disarmed_by_the_watchdog(fleetloop_plant)
     with can.Bus(**plant.buses["r1"]) as bus:
         send(bus, 0x007, bytes([8, 0, 0, 0]))
         send(bus, 0x00E, bytes.fromhex("cdcccc3d"))  # 0.1 N·m
-        for state in (8, 1):
-            await_state(bus, state)
+        await_state(bus, 8)
+        idle = await_state(bus, 1)
+        # Bodies were last moved before that tick's heartbeat, under the torque until then.
+        assert any(m.timestamp > idle.timestamp for m in heard(bus, 1.0))
     assert plant.poses()["r1"].torque_right_wheel_N_m == 0.0
 
 
@@ -115,9 +117,12 @@ def send(bus: can.BusABC, identifier: int, data: bytes) -> None:
     bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
 
 
-def await_state(bus: can.BusABC, state: int) -> None:
-    """Return when the right drive says that it is in this state; at most 20 s of bus time."""
-    assert any(m.arbitration_id == 0x001 and m.data[4] == state for m in heard(bus, 20.0))
+def await_state(bus: can.BusABC, state: int) -> can.Message:
+    """The first heartbeat of the right drive with this state; at most 20 s of bus time."""
+    beats = (m for m in heard(bus, 20.0) if m.arbitration_id == 0x001)
+    beat = next((m for m in beats if m.data[4] == state), None)
+    assert beat is not None
+    return beat
 
 
 def heard(bus: can.BusABC, seconds: float) -> Iterator[can.Message]:

@@ -98,14 +98,16 @@ def test_error_and_fd_frames_are_counted_and_not_passed_on(
     assert f"{far.channel}: 1 frames, 1 error frames not passed on\n" in out
 
 
-def test_echoes_of_the_far_interface_are_dropped(buses, joined, far, stranger, capsys) -> None:
+def test_echoes_of_the_far_interface_are_dropped(buses, joined, far, capsys) -> None:
     echoing = replace(far, options={"receive_own_messages": True}, echoes=True)
     thread, _ = joined(echoing)
-    for k in range(50):
-        buses.deliver(ENCODER, stamp_ns=k)
-    stranger.send(message(0x7))
-    assert [stranger.recv(5.0).arbitration_id for _ in range(50)] == [0x009] * 50
-    assert buses.taken(1) == [Frame(0x7, b"")]
+    # It joins after the gateway, so whatever it hears, the gateway has got back before.
+    with can.Bus(interface="virtual", channel=far.channel) as stranger:
+        for k in range(50):
+            buses.deliver(ENCODER, stamp_ns=k)
+        assert [stranger.recv(5.0).arbitration_id for _ in range(50)] == [0x009] * 50
+        stranger.send(message(0x7))
+        assert buses.taken(1) == [Frame(0x7, b"")]
     buses.end()
     thread.join(10.0)
     assert "1 frames, 50 own echoes dropped" in capsys.readouterr().out
