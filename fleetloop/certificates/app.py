@@ -5,8 +5,6 @@ from typing import Annotated
 
 import typer
 
-from fleetloop.terminal import say
-
 DAYS, AUTHORITY_DAYS, MOST_DAYS = 365, 3650, 36500
 
 app = typer.Typer(
@@ -41,6 +39,7 @@ def init(
 ) -> None:
     """Make an authority and the router's certificate in a new folder."""
     from fleetloop.certificates.folder import CertificateFolder
+    from fleetloop.terminal import say
 
     made = CertificateFolder(folder)
     made.create(hosts or (), days=days, authority_days=authority_days)
@@ -69,6 +68,7 @@ def robot(
 ) -> None:
     """Make a key and a certificate for identities on other machines."""
     from fleetloop.certificates.folder import CertificateFolder
+    from fleetloop.terminal import say
 
     for identity in identities:
         made = CertificateFolder(folder).issue(identity, days=days, guest=guest)
@@ -87,6 +87,7 @@ def renew(
 ) -> None:
     """Prolong certificates. The key stays: only the certificate has to be copied again."""
     from fleetloop.certificates.folder import CertificateFolder
+    from fleetloop.terminal import say
 
     for name in names:
         made = CertificateFolder(folder).renew(name, days=days, hosts=hosts or ())
@@ -100,6 +101,7 @@ def revoke(
 ) -> None:
     """Revoke the key of an identity: from the next start of a router on it is refused."""
     from fleetloop.certificates.folder import CertificateFolder
+    from fleetloop.terminal import say
 
     for identity in identities:
         gone = CertificateFolder(folder).revoke(identity)

@@ -13,8 +13,10 @@ from support.command_line import fleetloop
 
 from configs.errors import ScenarioError
 from configs.loading import load, shipped
+from fleetloop.cli import app
 
-VERBS = ("run", "agent", "plant", "check", "report", "export", "diff", "init", "can")
+VERBS = [command.name or command.callback.__name__ for command in app.registered_commands]
+VERBS += [group.name for group in app.registered_groups]
 
 
 def program(*args: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -48,6 +50,12 @@ def test_h_is_help_and_the_version_is_told(tmp_path: Path) -> None:
     done = program("--version", cwd=tmp_path)
     assert done.stdout.startswith(f"fleetloop {version('fleetloop')} (Python 3.")
     assert "--show-completion" in program("-h", cwd=tmp_path).stdout
+
+
+def test_until_a_verb_is_chosen_none_of_its_libraries_is_imported() -> None:
+    heavy = "{'can', 'cryptography', 'networkx', 'numpy', 'pydantic', 'rich.progress', 'zenoh'}"
+    code = f"import sys, fleetloop.cli; assert not {heavy} & sys.modules.keys()"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=30)
 
 
 def test_a_shell_completes_the_names_of_shipped_scenarios(tmp_path: Path) -> None:
