@@ -15,7 +15,7 @@ status=0
 tests/support/within.sh 50m pytest -n 0 "$@" || status=$?
 if [[ $status -eq 1 ]]; then
     echo "tried again: the tests that failed"
-    tests/support/within.sh 20m pytest -n 0 --last-failed "$@"
+    tests/support/within.sh 20m pytest "$@" --last-failed -n 0
 elif [[ $status -ne 0 ]]; then
     exit "$status"
 fi
