@@ -23,7 +23,7 @@ from fleetloop.compare.results import Row, described
 from fleetloop.compare.runs import Planned, rows_of
 from fleetloop.compare.tables import print_tables
 from fleetloop.results import run_folder
-from fleetloop.results.report import FIGURES, png
+from fleetloop.results.report import write_figures
 from fleetloop.results.summary import finite, to_json
 from fleetloop.signals import stop_on_signals
 from fleetloop.terminal import note, say, say_json
@@ -107,13 +107,7 @@ def _finish(
             if one.verdict is not Verdict.NOT_TESTABLE:
                 say(f"{one.verdict.value:<13}  {one.claim} ({one.where}): {one.measured}")
     run_folder.write(out / NUMBERS, to_json(numbers))
-    figures = [(item, png(item)) for item in all_figures(rows, seeds[0])]
-    try:
-        (out / FIGURES).mkdir(exist_ok=True)
-    except OSError as error:
-        raise InfrastructureError(f"can't make {out / FIGURES}: {error.strerror}") from error
-    for item, data in figures:
-        run_folder.write(out / FIGURES / f"{item.name}.png", data)
+    figures = write_figures(out, all_figures(rows, seeds[0]))
     run_folder.write(out / PAGE, page(scenario, rows, seeds, found, figures))
     if not options.as_json:
         say(f"page     {out / PAGE}")

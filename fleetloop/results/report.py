@@ -55,17 +55,27 @@ def write_report(run: Path, record: Record | None = None) -> Path:
     if scenario.names != record.robots:
         raise ScenarioError(f"{path}: rows of {record.robots}, but a scenario of {scenario.names}")
     summary = _summary(path.parent, record, scenario)
-    figures = [(item, png(item)) for item in all_figures(record, scenario)]
-    folder = path.parent / FIGURES
+    figures = write_figures(path.parent, all_figures(record, scenario))
+    page = path.parent / PAGE
+    run_folder.write(page, _page(summary, scenario, record, figures))
+    return page
+
+
+def write_figures(run: Path, figures: Iterable[Captioned]) -> list[tuple[Captioned, bytes]]:
+    """Write figures into a run's folder of them; return each with its PNG file.
+
+    Raises:
+        InfrastructureError: one can't be written.
+    """
+    drawn = [(item, png(item)) for item in figures]
+    folder = run / FIGURES
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise InfrastructureError(f"can't make {folder}: {error.strerror or error}") from error
-    for item, data in figures:
+    for item, data in drawn:
         run_folder.write(folder / f"{item.name}.png", data)
-    page = path.parent / PAGE
-    run_folder.write(page, _page(summary, scenario, record, figures))
-    return page
+    return drawn
 
 
 def _summary(folder: Path, record: Record, scenario: Scenario) -> Summary:
