@@ -35,6 +35,7 @@ from math import hypot, inf, isfinite, nan
 from typing import Any
 
 from agents.coordination import CoordinationState, Coordinator
+from agents.faults import MessageFaults
 from agents.guard import UNCHANGED, Guard, Phase, TorqueOutcome
 from agents.joining import Joining
 from agents.laws.build import build
@@ -94,6 +95,8 @@ class Agent:
         """Senders whose first message is required for the start and has not arrived."""
         self.missing = reception.missing
         """Messages that are due at a tick and have not arrived."""
+        self.faults = MessageFaults(brief.faults, self.network)
+        """Faults of the messages to this robot."""
         self._neighbours, self._edges = reception.neighbours, reception.edges
         self._history = self._pose_history(brief)
         self._localiser = Localiser(brief.localisation, brief.wheels, self._history)
@@ -158,6 +161,7 @@ class Agent:
         """
         self.admission.tick = tick
         self._edges.follow(tick)
+        self.faults.begin(tick)
         wheel_motion = self._drives.motion()
         if wheel_motion is None:
             return self._guard.arm(tick)

@@ -67,6 +67,14 @@ class EmulatedNetwork:
         self._places: dict[str, PoseFix] = {}  # the newest of each robot
         self._distances_m = dict.fromkeys(brief.located, nan)
 
+    def channel(self, source: str) -> Channel[PathState] | Channel[float] | Channel[PoseFix]:
+        """The channel of a source that has one.
+
+        Raises:
+            KeyError: it has none.
+        """
+        return self._channels()[source]
+
     def carries_path_of(self, robot: str) -> bool:
         """Whether the path states of a robot go through a channel."""
         return robot in self._paths
@@ -179,6 +187,9 @@ class EmulatedNetwork:
 
     def counts(self) -> dict[str, Mapping[str, int]]:
         """Messages by source."""
+        return {source: channel.counts.as_dict() for source, channel in self._channels().items()}
+
+    def _channels(self) -> dict[str, Channel[PathState] | Channel[float] | Channel[PoseFix]]:
         channels: dict[str, Channel[PathState] | Channel[float] | Channel[PoseFix]] = {
             **self._paths
         }
@@ -186,4 +197,4 @@ class EmulatedNetwork:
             channels[LEADER] = self._leader
         if self._fixes is not None:
             channels[LOCALISATION] = self._fixes
-        return {source: channel.counts.as_dict() for source, channel in channels.items()}
+        return channels

@@ -18,6 +18,7 @@ from math import inf
 from configs.connections import NetworkLink, Settings
 from configs.curves import FormationOffset, ReferencePath
 from configs.edges import InEdge
+from configs.faults.base import PlannedFault
 from configs.host import Host
 from configs.leader_speed import SpeedChange
 from configs.membership import Membership
@@ -175,6 +176,7 @@ class AgentBrief:
     drives: DriveLink
     host: HostLimits
     channels: tuple[ChannelModel, ...]  # the emulated edges to it; others have no effects
+    faults: tuple[PlannedFault, ...]  # of messages to it, and of its process
     phase_ns: int  # in real time, this much after a tick's time the controller acts
     bus: Settings  # keyword arguments of can.Bus, verbatim
     network: NetworkLink
@@ -270,6 +272,7 @@ class PlantBrief:
     seed: int
     wire: WireModel | None  # of every bus; None: ideal, frames take no time
     traffic: bool  # tell the recorder what crosses the buses
+    faults: tuple[PlannedFault, ...]  # of bodies, drives, buses and the localisation system
     network: NetworkLink
     listeners: tuple[tuple[str, int], ...] = ()  # bus, inherited file descriptor of its socket
     attached: tuple[tuple[str, Settings], ...] = ()  # bus, keyword arguments of can.Bus: not ours

@@ -11,6 +11,7 @@ from configs.edge_checks import multiple_problem, no_such_robot
 from configs.edges import LEADER
 from configs.emulated_edges import emulation_problems
 from configs.errors import Problem
+from configs.faults.plan import fault_problems
 from configs.graph_checks import edge_problems, graph_problems
 from configs.paths import Spline, Varying
 from configs.plugins import Recorded
@@ -32,6 +33,7 @@ def cross_problems(scenario: Scenario) -> list[Problem]:
     ]
     edges = edge_problems(scenario)
     problems += [*_host(scenario), *_expects(scenario, sound_edges=not edges)]
+    problems += fault_problems(scenario, sound_edges=not edges)
     if not edges:
         problems += emulation_problems(scenario.network, scenario.topology)
     if not problems and not edges:

@@ -1,6 +1,6 @@
 """Edges of the emulated network: which effects each has, and entries that name none."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from typing import NamedTuple
 
 from configs.edges import LEADER, edge_text, parse_edge
@@ -37,17 +37,23 @@ def effects_of(network: Network, edge: EmulatedEdge) -> Effects:
     """The effects of one edge: of each key what the last entry that names the edge gives."""
     effects = Effects() if edge.source in SOURCES else network.default
     for entry in network.edge:
-        if any(_names(text, edge) for text in entry.edges):
+        if any(named(text, edge) for text in entry.edges):
             effects = changed(effects, base_of(Effects, entry))
     return effects
 
 
 def effects_to(
-    network: Network, graph: Graph, hearer: str, *, of_robots: bool = True
+    network: Network,
+    graph: Graph,
+    hearer: str,
+    *,
+    faulted: Container[str] = (),
+    of_robots: bool = True,
 ) -> dict[str, Effects]:
     """The effects of the edges to a robot by their sources, of those that have any.
 
-    `of_robots`: of its in-neighbours, too.
+    `faulted` sources are there without effects as well: faults concern their edges. `of_robots`: of
+    its in-neighbours, too.
     """
     heard = [edge.speaker for edge in graph.hears[hearer]] if of_robots else []
     leader = [LEADER] if hearer in graph.leader else []
@@ -55,10 +61,15 @@ def effects_to(
         source: effects_of(network, EmulatedEdge(source, hearer))
         for source in (*heard, *leader, LOCALISATION)
     }
-    return {source: effects for source, effects in all_of.items() if effects != Effects()}
+    return {
+        source: effects
+        for source, effects in all_of.items()
+        if effects != Effects() or source in faulted
+    }
 
 
-def _names(text: str, edge: EmulatedEdge) -> bool:
+def named(text: str, edge: EmulatedEdge) -> bool:
+    """Whether a text, perhaps with a `*`, names an edge."""
     pattern = parse_edge(text)
     if pattern is None:
         return False
@@ -75,7 +86,7 @@ def emulation_problems(network: Network, graph: Graph) -> Iterator[Problem]:
     edges = edges_of(graph)
     for n, entry in enumerate(network.edge):
         for text in entry.edges:
-            if problem := _problem_of(text, edges, graph.robots):
+            if problem := pattern_problem(text, edges, graph.robots):
                 yield Problem(f"network.edge.{n}.edges", text, problem)
             elif entry.distance is not None and _source_of(text) in SOURCES:
                 remedy = "only between robots: the source of this edge has no place"
@@ -87,7 +98,8 @@ def _source_of(text: str) -> str | None:
     return None if pattern is None else pattern[0]
 
 
-def _problem_of(text: str, edges: Sequence[EmulatedEdge], robots: Sequence[str]) -> str | None:
+def pattern_problem(text: str, edges: Sequence[EmulatedEdge], robots: Sequence[str]) -> str | None:
+    """Why a text names none of these edges, None if it names one."""
     pattern = parse_edge(text)
     if pattern is None:
         return 'must read "r1 -> r2", with * for every robot, or leader or localisation as source'
@@ -98,7 +110,7 @@ def _problem_of(text: str, edges: Sequence[EmulatedEdge], robots: Sequence[str])
     ):
         if name not in known:
             return f"{name}: must be one of {', '.join(known)}"
-    if any(_names(text, edge) for edge in edges):
+    if any(named(text, edge) for edge in edges):
         return None
     if hearer == EVERY_ROBOT:
         return f"no such edge in the graph: it has {', '.join(map(str, edges))}"

@@ -23,6 +23,8 @@ from configs.connections import OURS, NetworkLink, Settings
 from configs.curves import formation_offset, reference_path
 from configs.drives import Drive
 from configs.emulated_edges import effects_to
+from configs.faults.base import PlannedFault
+from configs.faults.plan import faulted_sources, planned_faults
 from configs.leader_speed import SpeedChange
 from configs.parameters import extended
 from configs.scenario import Scenario
@@ -92,6 +94,7 @@ def agent_brief(
         drives=_drive_link(scenario, robot, drive),
         host=_host_limits(scenario, ours=dict(bus).get("interface", OURS) == OURS),
         channels=channels(scenario, name),
+        faults=agent_faults(scenario, name),
         phase_ns=round(scenario.names.index(name) * ticks.period_ns / len(scenario.names)),
         bus=bus,
         network=network,
@@ -100,10 +103,21 @@ def agent_brief(
 
 def channels(scenario: Scenario, name: str) -> tuple[ChannelModel, ...]:
     """The emulated edges to a robot, without those that have no effects."""
-    effects_by_source = effects_to(scenario.network, scenario.topology, name)
+    effects_by_source = effects_to(
+        scenario.network, scenario.topology, name, faulted=faulted_sources(scenario, name)
+    )
     return tuple(
         extended(ChannelModel, effects, source=source, seed=f"{scenario.seed} {source} -> {name}")
         for source, effects in effects_by_source.items()
+    )
+
+
+def agent_faults(scenario: Scenario, name: str) -> tuple[PlannedFault, ...]:
+    """The faults of a robot's messages and of its process."""
+    return tuple(
+        one
+        for one in planned_faults(scenario)
+        if one.fault.PLACE != "plant" and name in (one.target, one.target.rpartition(" -> ")[2])
     )
 
 
@@ -181,6 +195,7 @@ def plant_brief(
         seed=scenario.seed,
         wire=wire_model(scenario),
         traffic=bool(scenario.bus.record),
+        faults=tuple(one for one in planned_faults(scenario) if one.fault.PLACE == "plant"),
         network=network,
     )
 

@@ -15,6 +15,9 @@ from configs.choices import chosen_anew, shared_part
 from configs.drives import Drive
 from configs.edges import FOREVER, LEADER, Edge, parse_edge, presence
 from configs.emulated_edges import effects_to
+from configs.faults.kinds import AnyFault
+from configs.faults.messages import LinkFault, PoseOutage
+from configs.faults.plan import faulted_sources
 from configs.graph import Graph, generated, of_matrix, random_rooted
 from configs.graph_section import GraphSection
 from configs.host import Host
@@ -83,6 +86,7 @@ class Scenario(BaseModel):
     network: Network = Network()
     robot_types: dict[Name, Body] = Field(default_factory=dict)
     robot: Annotated[tuple[Robot, ...], Len(1, 256)]
+    fault: Annotated[tuple[AnyFault, ...], Len(0, 1000)] = ()
     expect: tuple[Expect, ...] = ()
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
@@ -110,13 +114,20 @@ class Scenario(BaseModel):
         """
         if not self.ages_vary:
             return ()
-        others = effects_to(self.network, self.topology, name, of_robots=False)
+        others = effects_to(
+            self.network,
+            self.topology,
+            name,
+            faulted=faulted_sources(self, name),
+            of_robots=False,
+        )
         return (*(edge.speaker for edge in self.topology.hears[name]), *others)
 
     @cached_property
     def ages_vary(self) -> bool:
         """Whether path states have other ages than the schedule's."""
         emulated = self.network.default != Effects() or bool(self.network.edge)
+        emulated |= any(isinstance(fault, LinkFault | PoseOutage) for fault in self.fault)
         return emulated or self.clock.mode == "realtime" or self.topology.switches
 
     @property

@@ -270,8 +270,7 @@ class InProcessRun:
                     hearer.receive_path_state(robot, state)
 
     def _localise(self, robot: EmulatedRobot, agent: Agent, tick: int, t_ns: int) -> None:
-        x, y, theta, *_ = robot.state
-        fix = PoseFix.decode(PoseFix(tick, t_ns, x, y, theta).encode())
+        fix = PoseFix.decode(robot.pose_fix(tick, t_ns).encode())
         if fix is not None:
             agent.receive_pose(fix)
             for other in self._locators[robot.brief.robot]:

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from bridge.can_bus.hub import Hub
 from bridge.network.link import Publisher
-from bridge.network.messages import PoseFix, Progress
+from bridge.network.messages import Progress
 from bridge.network.telemetry import RowBuffer, Tap
 from bridge.process.awake import LOOK_S, STALL_S
 from bridge.process.clock import SYSTEM_CLOCK, Clock
@@ -169,8 +169,7 @@ class LockstepLoop:
             if 0 <= tick < self._ticks:
                 ends.rows.add(tick, robot.row(t_ns * 1e-9))
             if self._schedule.localises(tick):
-                state = robot.state
-                ends.pose.put(PoseFix(tick, t_ns, state.x, state.y, state.theta).encode())
+                ends.pose.put(robot.pose_fix(tick, t_ns).encode())
 
     def _go_on(self, lane: _Lane, now_ns: int) -> None:
         """Advance a bus to its next question, or through the end of its tick."""

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
 from bridge.network.link import Publisher
-from bridge.network.messages import PoseFix, Progress
+from bridge.network.messages import Progress
 from bridge.network.telemetry import RowBuffer, Tap
 from bridge.process.awake import Lateness
 from bridge.process.clock import SYSTEM_CLOCK, Clock
@@ -119,12 +119,12 @@ class RealtimeLoop:
             self._record_others(tick)
         for bus in self._buses.values():
             bus.move(bus_ns)
+            bus.faults.begin(tick)
             for robot in bus.robots:
                 if 0 <= tick < schedule.ticks:
                     self._rows[robot].add(tick, robot.row(t_ns * 1e-9))
             bus.send_due(bus_ns)
             if schedule.localises(tick):
                 for robot in bus.robots:
-                    x, y, theta, *_ = robot.state
-                    self._poses[robot].put(PoseFix(tick, t_ns, x, y, theta).encode())
+                    self._poses[robot].put(robot.pose_fix(tick, t_ns).encode())
             self._serve(0.0, power_up_ns)

@@ -16,6 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from bridge.drives import protocol
 from bridge.drives.interface import DriveMeasurements, DriveNode
 from bridge.frame import Frame
+from bridge.network.messages import PoseFix
 from configs.brief import PowertrainModel, RobotBrief, when
 from plant.body import RigidBody, State
 from plant.divergence import Divergence
@@ -38,6 +39,8 @@ class EmulatedRobot:
         "_gear_left",
         "_gear_right",
         "_left",
+        "_push_left_wheel_N_m",
+        "_push_right_wheel_N_m",
         "_right",
         "_torque_left_wheel_N_m",
         "_torque_right_wheel_N_m",
@@ -65,6 +68,7 @@ class EmulatedRobot:
         self._answered_ns = 0
         self._demand_right_wheel_N_m = self._demand_left_wheel_N_m = 0.0
         self._torque_right_wheel_N_m = self._torque_left_wheel_N_m = 0.0
+        self._push_right_wheel_N_m = self._push_left_wheel_N_m = 0.0
         pose = brief.pose
         self.state = State(
             pose.x_m, pose.y_m, pose.theta_rad, brief.v_m_s, brief.omega_rad_s, 0.0, 0.0
@@ -115,12 +119,42 @@ class EmulatedRobot:
             return
         step = period_s / substeps
         for n in range(substeps):
-            after = rk4(self._body, state, right, left, t_s + n * step, step)
+            after = rk4(
+                self._body,
+                state,
+                right + self._push_right_wheel_N_m,
+                left + self._push_left_wheel_N_m,
+                t_s + n * step,
+                step,
+            )
             if after is None:
                 state = self._stop(state, Divergence(t_s, state.v, state.omega, right, left))
                 break
             state = after
         self.state = state
+
+    # --- faults ------------------------------------------------------------------------------
+
+    def clear_faults(self) -> None:
+        """All faults of before end; what they did stays done."""
+        self._push_right_wheel_N_m = self._push_left_wheel_N_m = 0.0
+
+    def push(self, force_body_N: float, torque_body_N_m: float) -> None:
+        """From now on a force along the body's axis and a torque act on it, beside others.
+
+        They are as wheel torques r F/2 ± r T/(2 b): (4) multiplied by the body's inertia.
+        """
+        along = 0.5 * self._body.r * force_body_N
+        turning = 0.5 * self._body.r / self._body.b * torque_body_N_m
+        self._push_right_wheel_N_m += along + turning
+        self._push_left_wheel_N_m += along - turning
+
+    # --- motion ------------------------------------------------------------------------------
+
+    def pose_fix(self, tick: int, t_ns: int) -> PoseFix:
+        """The pose as the localisation system sees it now."""
+        state = self.state
+        return PoseFix(tick, t_ns, state.x, state.y, state.theta)
 
     def move(self, to_ns: int, zero_ns: int, step_ns: int) -> None:
         """Move on to a bus time, in steps of at most `step_ns`, and tell the drives where that is.
@@ -191,7 +225,14 @@ class RealisticRobot(EmulatedRobot):
             shafts = train.step(demands, (right_speed * gear_r, left_speed * gear_l), step)
             torques = shafts[0] * gear_r, shafts[1] * gear_l
             if self.divergence is None:
-                after = rk4(body, state, *torques, t_s + n * step, step)
+                after = rk4(
+                    body,
+                    state,
+                    torques[0] + self._push_right_wheel_N_m,
+                    torques[1] + self._push_left_wheel_N_m,
+                    t_s + n * step,
+                    step,
+                )
                 if after is None:
                     after = self._stop(state, Divergence(t_s, state.v, state.omega, *torques))
                 state = after

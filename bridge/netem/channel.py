@@ -5,7 +5,7 @@
 All in scenario time. Every message takes part in every draw, in the order of sending, whatever its
 fate, and each effect has a random stream of its own, named by seed, edge and effect: edges and
 directions are independent, and a change of one effect changes no draw of another. Second copies
-have their delays from a stream of their own.
+have their delays from a stream of their own. Faults lose and delay more while they act.
 """
 
 from collections import deque
@@ -66,6 +66,10 @@ class Channel(Generic[Message]):
         "_due",
         "_duplication",
         "_duplication_draw",
+        "_fault_cut",
+        "_fault_delay_ns",
+        "_fault_draw",
+        "_fault_loss",
         "_free_ns",
         "_in_order",
         "_last_due_ns",
@@ -102,24 +106,37 @@ class Channel(Generic[Message]):
         self._free_ns = 0
         self._last_due_ns = 0
         self._newest_ns: int | None = None
+        self._fault_cut = False
+        self._fault_delay_ns, self._fault_loss = 0, 0.0
+        self._fault_draw = Random(f"{seed} fault").random
         self.counts = Counts()
+
+    def disturb(self, delay_s: float, loss: float, *, cut: bool) -> None:
+        """Lose and delay more than the effects, from now on: in the end 0, 0 and no cut.
+
+        A cut loses what is sent or due while it lasts, as a partition does.
+        """
+        self._fault_delay_ns, self._fault_loss, self._fault_cut = round(delay_s * 1e9), loss, cut
 
     def send(self, now_ns: int, message: Message, distance_m: float = 0.0) -> None:
         """Take a message that its source sends now, from this far; times must not decrease."""
         counts = self.counts
         counts.sent += 1
         lost = self._loss() | self._distance_loss(distance_m)
+        if self._fault_loss:
+            lost |= self._fault_draw() < self._fault_loss
         delay_ns = self._delay()
         copied, copy_delay_ns = False, None
         if self._duplication:
             copied, copy_delay_ns = self._duplication_draw() < self._duplication, self._copy_delay()
-        if lost or delay_ns is None or self._is_cut(now_ns):
+        if lost or delay_ns is None or self._fault_cut or self._is_cut(now_ns):
             counts.lost += 1
             return
         left_ns = self._leaves(now_ns)
         if left_ns is None:
             counts.lost += 1
             return
+        left_ns += self._fault_delay_ns
         self._await(now_ns, left_ns + delay_ns, message)
         if copied:
             counts.duplicated += 1
@@ -137,7 +154,7 @@ class Channel(Generic[Message]):
         arrived: list[Delivery[Message]] = []
         while due and due[0][0] <= now_ns:
             _, _, sent_ns, message = heappop(due)
-            if not exists:
+            if not exists or self._fault_cut:
                 counts.lost += 1
                 continue
             counts.delivered += 1

@@ -8,6 +8,7 @@ from configs.brief import PlantBrief
 from plant.bus.ideal import IdealBus
 from plant.bus.port import Begin, Bus, Port
 from plant.bus.timed import TimedBus
+from plant.faults import BusFaults
 from plant.robot import EmulatedRobot
 
 Ports = Callable[[str, Sequence[EmulatedRobot]], Port]
@@ -40,7 +41,15 @@ def build_buses(
     for name, group in by_bus.items():
         port, begin, tap = ports(name, group), begins(group), taps.get(name, no_tap)
         if brief.wire is None or name in external:
-            buses[name] = IdealBus(group, brief.schedule, brief.substeps, port, begin, tap)
+            buses[name] = IdealBus(
+                group,
+                brief.schedule,
+                brief.substeps,
+                port,
+                begin,
+                tap,
+                BusFaults(brief.faults, group),
+            )
         else:
             buses[name] = timed_bus(brief, name, group, port, begin, tap)
     return buses
@@ -71,4 +80,5 @@ def timed_bus(
         begin=begin,
         tap=tap,
         random=random,
+        faults=BusFaults(brief.faults, robots),
     )

@@ -15,6 +15,7 @@ from bridge.frame import Frame
 from bridge.network.telemetry import FROM_DRIVE, Tap
 from configs.brief import Schedule
 from plant.bus.port import ALL, Begin, Port, Steps
+from plant.faults import BusFaults
 from plant.robot import EmulatedRobot
 
 MOST_A_TICK = 1024
@@ -31,8 +32,10 @@ class IdealBus:
         port: Port,
         begin: Begin,
         tap: Tap,
+        faults: BusFaults,
     ) -> None:
         self.robots = robots
+        self.faults = faults
         self.crossed = 0
         self._tap = tap
         self._port = port
@@ -57,11 +60,12 @@ class IdealBus:
         schedule, begin, substeps = self._schedule, self._begin, self._substeps
         tap, deliver, receive = self._tap, self._port.deliver, self._port.receive
         period_s, period_ns, last = schedule.period_s, schedule.period_ns, schedule.ticks
-        robots = self.robots
+        robots, begin_faults = self.robots, self.faults.begin
         (single,) = robots if len(robots) == 1 else (None,)
         late: list[Frame] = []  # replies that wait for the next tick
         for tick in range(-schedule.countdown_ticks, last + 1):
             bus_ns = schedule.bus_time_ns(tick)
+            begin_faults(tick)
             begin(tick)
             if single is not None:
                 frames = single.frames_due(bus_ns)

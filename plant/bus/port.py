@@ -11,6 +11,7 @@ from typing import Protocol
 
 from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.frame import Frame
+from plant.faults import BusFaults
 from plant.robot import EmulatedRobot
 
 ALL = ""
@@ -46,6 +47,7 @@ class Bus(Protocol):
     """One bus with the robots on it, in lockstep (`steps`) or in real time (the other methods)."""
 
     robots: Sequence[EmulatedRobot]
+    faults: BusFaults
     crossed: int
     """Frames that crossed the bus, drives' and clients'."""
     acts_between_ticks: bool

@@ -33,6 +33,7 @@ from bridge.wire.queues import Fifo, Mailboxes
 from bridge.wire.wire import Wire
 from configs.brief import Schedule, WireModel
 from plant.bus.port import Begin, Port, Steps
+from plant.faults import BusFaults
 from plant.robot import EmulatedRobot
 
 _NEVER = 1 << 62
@@ -66,7 +67,9 @@ class TimedBus:
         begin: Begin,
         tap: Tap,
         random: Random,
+        faults: BusFaults,
     ) -> None:
+        self.faults = faults
         self._tap = tap
         self._port = port
         self.robots = robots
@@ -115,6 +118,7 @@ class TimedBus:
             start_ns = schedule.bus_time_ns(tick)
             end_ns = start_ns + schedule.period_ns
             self._move(start_ns)
+            self.faults.begin(tick)
             self._begin(tick)
             waiting = [robot.brief.robot for robot in self.robots]
             self._step(start_ns)

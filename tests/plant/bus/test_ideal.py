@@ -9,6 +9,7 @@ from configs.connections import NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief
 from plant.bus.ideal import MOST_A_TICK, IdealBus
+from plant.faults import BusFaults
 from plant.robot import emulated_robot
 
 REQUEST = Frame(identifier(0, Command.GET_BUS_VOLTAGE_CURRENT) | RTR, bytes(8))
@@ -20,7 +21,9 @@ MS = 1_000_000
 def bus(port: ManualPort, scenario: str = "two_robots", *overrides: str) -> IdealBus:
     brief = plant_brief(load(scenario, overrides), network=NetworkLink("t", "", "", ""))
     robot = emulated_robot(brief.robots[0])
-    return IdealBus([robot], brief.schedule, brief.substeps, port, lambda _: None, no_tap)
+    return IdealBus(
+        [robot], brief.schedule, brief.substeps, port, lambda _: None, no_tap, BusFaults((), ())
+    )
 
 
 def test_who_never_stops_asking_cannot_stop_time_and_is_answered_with_the_next_tick() -> None:

@@ -1,0 +1,85 @@
+"""The faults of one bus or one controller on their way through the ticks. Pure.
+
+Planned faults come from the scenario, others are ordered during a run. At a tick faults end first,
+then others begin, each in the order in which they came.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from configs.edges import FOREVER
+from configs.faults.base import PlannedFault
+
+
+class Change(NamedTuple):
+    """A fault that begins or ends at a tick."""
+
+    tick: int
+    planned: PlannedFault
+    acts: bool
+    """Whether it acts from this tick on; of one that is an instant: it acts at this tick."""
+
+    def __str__(self) -> str:
+        planned = self.planned
+        what = "applied" if self.acts else "cleared"
+        kind = "" if planned.name == planned.fault.kind else f" ({planned.fault.kind})"
+        return f"{planned.target}: fault {planned.name}{kind} {what}"
+
+
+class FaultSchedule:
+    """Says at each tick which faults begin and end."""
+
+    __slots__ = ("_acting", "_waiting", "log", "next_tick")
+
+    def __init__(self, planned: Iterable[PlannedFault]) -> None:
+        self._waiting = list(planned)
+        self._acting: list[PlannedFault] = []
+        self.log: list[Change] = []
+        """All changes so far."""
+        self.next_tick = FOREVER
+        """Nothing changes before; loops compare it with their tick."""
+        self._look()
+
+    @property
+    def acting(self) -> tuple[PlannedFault, ...]:
+        """The faults that act, in the order in which they began; instants are over at once."""
+        return tuple(self._acting)
+
+    def add(self, planned: PlannedFault) -> None:
+        """Take a fault that was ordered; one whose tick has gone acts at the next."""
+        self._waiting.append(planned)
+        self._look()
+
+    def clear(self, name: str) -> bool:
+        """End a fault at the next tick, on all targets; whether there was one of this name."""
+        before = len(self._waiting)
+        self._waiting = [one for one in self._waiting if one.name != name]
+        found = len(self._waiting) < before
+        for n, one in enumerate(self._acting):
+            if one.name == name:
+                found = True
+                self._acting[n] = one._replace(to_tick=-FOREVER)
+        self._look()
+        return found
+
+    def due(self, tick: int) -> list[Change]:
+        """The changes at a tick; `acting` is then what acts from it on."""
+        if tick < self.next_tick:
+            return []
+        ended = [one for one in self._acting if one.to_tick is not None and one.to_tick <= tick]
+        begun = [one for one in self._waiting if one.from_tick <= tick]
+        self._acting = [one for one in self._acting if one not in ended]
+        self._waiting = [one for one in self._waiting if one not in begun]
+        # Of a controller that was started again some are over.
+        begun = [one for one in begun if one.to_tick is None or one.to_tick > tick]
+        self._acting += [one for one in begun if not one.fault.INSTANT]
+        changes = [Change(tick, one, False) for one in ended]
+        changes += [Change(tick, one, True) for one in begun]
+        self.log += changes
+        self._look()
+        return changes
+
+    def _look(self) -> None:
+        begins = [one.from_tick for one in self._waiting]
+        ends = [one.to_tick for one in self._acting if one.to_tick is not None]
+        self.next_tick = min((*begins, *ends), default=FOREVER)

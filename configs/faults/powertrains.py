@@ -1,0 +1,95 @@
+"""Faults of drives, motors, encoders and the supply."""
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+from annotated_types import Ge, Gt, Le
+
+from configs.faults.base import Model, RobotFault, WheelFault
+from configs.netem import Probability
+from configs.parameters import parameter
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveEvent(WheelFault):
+    """The drive stops by itself: emergency stop, watchdog, or a restart of its firmware."""
+
+    INSTANT: ClassVar[bool] = True
+    kind: Literal["drive_estop", "drive_watchdog", "drive_reboot"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveError(WheelFault):
+    """The drive disarms with an error of its protocol."""
+
+    INSTANT: ClassVar[bool] = True
+    kind: Literal["drive_error"]
+    error: str | None = parameter(
+        None, "by the protocol's name for it; its error of a power stage if not given"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotorTorque(WheelFault):
+    """The motor makes another torque than it is asked for."""
+
+    kind: Literal["torque_stuck", "torque_half", "torque_zero", "torque_reversed"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OverTemperature(WheelFault):
+    """A thermistor reads this much more."""
+
+    NEEDS: ClassVar[frozenset[Model]] = frozenset({"powertrain"})
+    kind: Literal["fet_over_temperature", "motor_over_temperature"]
+    rise_K: Annotated[float, Gt(0), Le(1000)] = 100.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnderVoltage(RobotFault):
+    """The supply sags to this open-circuit voltage."""
+
+    NEEDS: ClassVar[frozenset[Model]] = frozenset({"powertrain"})
+    kind: Literal["under_voltage"]
+    voltage_V: Annotated[float, Ge(0), Le(1000)] = 9.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OverVoltage(RobotFault):
+    """The supply rises to this open-circuit voltage."""
+
+    NEEDS: ClassVar[frozenset[Model]] = frozenset({"powertrain"})
+    kind: Literal["over_voltage"]
+    voltage_V: Annotated[float, Ge(0), Le(1000)] = 31.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EncoderState(WheelFault):
+    """The encoder says the same all the time, or counts backwards."""
+
+    kind: Literal["encoder_freeze", "encoder_sign_flip"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EncoderJump(WheelFault):
+    """The encoder's position jumps, once and for good."""
+
+    INSTANT: ClassVar[bool] = True
+    kind: Literal["encoder_jump"]
+    shaft_rev: Annotated[float, Ge(-1e6), Le(1e6)] = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EncoderNoise(WheelFault):
+    """Noise of the encoder's position."""
+
+    kind: Literal["encoder_noise"]
+    counts_rms: Annotated[float, Gt(0), Le(1e6)] = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EncoderSlip(WheelFault):
+    """The encoder loses this share of its counts, in either direction."""
+
+    kind: Literal["encoder_slip"]
+    share: Probability = 0.01

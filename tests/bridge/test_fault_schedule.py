@@ -1,0 +1,71 @@
+"""The faults of a run on their way through the ticks."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.fault_schedule import FaultSchedule
+from configs.edges import FOREVER
+from configs.faults.base import PlannedFault
+from configs.faults.bodies import Push
+from configs.faults.powertrains import DriveEvent
+
+PUSH = Push(kind="push", at_s=0.0)
+ESTOP = DriveEvent(kind="drive_estop", at_s=0.0)
+
+
+def pushes(name: str, first: int, last: int | None) -> PlannedFault:
+    return PlannedFault(name, "r1", PUSH, first, last)
+
+
+windows = st.tuples(st.integers(0, 50), st.none() | st.integers(1, 60))
+
+
+@given(st.lists(windows, max_size=8))
+def test_what_acts_at_a_tick_is_what_was_planned_for_it(planned: list[tuple[int, int | None]]):
+    faults = [
+        pushes(f"f{n}", first, None if length is None else first + length)
+        for n, (first, length) in enumerate(planned)
+    ]
+    schedule = FaultSchedule(faults)
+    for tick in range(120):
+        due = schedule.due(tick)
+        assert due == schedule.log[len(schedule.log) - len(due) :]
+        wanted = {
+            one.name
+            for one in faults
+            if one.from_tick <= tick and (one.to_tick is None or tick < one.to_tick)
+        }
+        assert {one.name for one in schedule.acting} == wanted
+        assert schedule.next_tick > tick
+
+
+def test_an_instant_strikes_once_and_acts_no_more() -> None:
+    schedule = FaultSchedule([PlannedFault("stop", "r1", ESTOP, 3, None)])
+    assert schedule.due(2) == []
+    (change,) = schedule.due(3)
+    assert change.acts
+    assert str(change) == "r1: fault stop (drive_estop) applied"
+    assert schedule.acting == ()
+    assert schedule.next_tick == FOREVER
+
+
+def test_an_ordered_fault_acts_at_the_next_tick_and_ends_when_it_is_cleared() -> None:
+    schedule = FaultSchedule([])
+    assert schedule.next_tick == FOREVER
+    schedule.add(pushes("push", 5, None))
+    assert [str(one) for one in schedule.due(9)] == ["r1: fault push applied"]
+    assert schedule.clear("push")
+    assert [str(one) for one in schedule.due(10)] == ["r1: fault push cleared"]
+    assert not schedule.clear("push")
+
+
+def test_a_fault_that_is_cleared_before_it_acts_never_does() -> None:
+    schedule = FaultSchedule([pushes("push", 5, 9)])
+    assert schedule.clear("push")
+    assert schedule.due(7) == []
+
+
+def test_of_a_controller_that_was_started_again_no_fault_acts_that_is_over() -> None:
+    schedule = FaultSchedule([pushes("gone", 5, 9), pushes("going", 5, 90)])
+    assert [one.planned.name for one in schedule.due(50)] == ["going"]
+    assert schedule.next_tick == 90

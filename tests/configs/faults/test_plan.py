@@ -1,0 +1,96 @@
+"""Section [[fault]]: names, targets, ticks, and faults that can't act."""
+
+import pytest
+from support.robot_bench import NOWHERE
+from support.scenario_text import SMALL, problems
+
+from configs.faults.kinds import CLASSES, KINDS
+from configs.faults.plan import fault_window, planned_faults
+from configs.loading import load
+from configs.resolve import agent_brief, plant_brief
+from configs.scenario import Scenario
+
+
+def with_faults(*faults: str) -> Scenario:
+    return load("two_robots", (f"fault=[{', '.join(faults)}]",))
+
+
+def test_every_kind_has_one_class_and_a_docstring() -> None:
+    assert len(set(CLASSES)) == len(CLASSES)
+    assert len(KINDS) >= 40
+    assert all(cls.__doc__ for cls in CLASSES)
+
+
+def test_a_fault_without_a_name_is_named_by_its_kind_and_a_number() -> None:
+    scenario = with_faults(
+        '{kind="push", at_s=1.0, name="push_2"}',
+        '{kind="push", at_s=1.0}',
+        '{kind="push", at_s=1.0}',
+        '{kind="drive_estop", at_s=1.0, robots=["r2"]}',
+    )
+    names = [one.name for one in planned_faults(scenario)]
+    assert names == ["push_2"] * 2 + ["push"] * 2 + ["push_3"] * 2 + ["drive_estop"]
+
+
+def test_a_fault_acts_from_the_first_tick_at_or_after_its_time_for_its_duration() -> None:
+    scenario = with_faults('{kind="push", at_s=1.0001, for_s=0.002, robots=["r1"]}')
+    (planned,) = planned_faults(scenario)
+    assert (planned.target, planned.from_tick, planned.to_tick) == ("r1", 501, 502)
+    assert fault_window(scenario, "push") == (1.0001, pytest.approx(1.0021))
+    assert fault_window(scenario, "pull") is None
+    assert fault_window(with_faults('{kind="push", at_s=1.0}'), "push") == (1.0, None)
+    assert fault_window(with_faults('{kind="drive_reboot", at_s=1.0}'), "drive_reboot") == (1, 1)
+
+
+def test_each_process_is_told_the_faults_that_act_in_it() -> None:
+    scenario = with_faults(
+        '{kind="push", at_s=1.0}',
+        '{kind="link_partition", at_s=1.0, edges=["* -> *", "leader -> r1"]}',
+        '{kind="localisation_outage", at_s=1.0, robots=["r1"]}',
+    )
+    of_plant = plant_brief(scenario, network=NOWHERE).faults
+    assert [one.target for one in of_plant] == ["r1", "r2"]
+    of_agents = {
+        robot: [
+            (one.fault.kind, one.target)
+            for one in agent_brief(scenario, robot, network=NOWHERE, bus=()).faults
+        ]
+        for robot in scenario.names
+    }
+    assert of_agents == {
+        "r1": [("link_partition", "leader -> r1"), ("localisation_outage", "r1")],
+        "r2": [("link_partition", "r1 -> r2")],
+    }
+    assert scenario.aged("r2") == ("r1",)
+    assert scenario.aged("r1") == ("leader", "localisation")
+
+
+@pytest.mark.parametrize(
+    ("fault", "key", "right"),
+    [
+        ('{kind="puhs", at_s=1.0}', "fault.0.kind", "'push'"),
+        ('{kind="push"}', "fault.0.at_s", "must be given"),
+        ('{kind="push", at_s=-1.0}', "fault.0.at_s", "0"),
+        ('{kind="push", at_s=30.0}', "fault.0.at_s", "the run ends before"),
+        ('{kind="push", at_s=1.0, for_s=0.0}', "fault.0.for_s", "greater than 0"),
+        ('{kind="push", at_s=1.0, force_N=1.0}', "fault.0.force_N", "did you mean force_body_N?"),
+        ('{kind="push", at_s=1.0, robots=["r9"]}', "fault.0.robots", "known: r1, r2"),
+        ('{kind="drive_estop", at_s=1.0, for_s=1.0}', "fault.0", "leave it out"),
+        ('{kind="torque_half", at_s=1.0, wheel="front"}', "fault.0.wheel", "'right'"),
+        ('{kind="link_loss", at_s=1.0, edges=["r1 > r2"]}', "fault.0.edges", "r1 -> r2"),
+        ('{kind="link_loss", at_s=1.0, edges=["r2 -> r1"]}', "fault.0.edges", "no such edge"),
+        ('{kind="under_voltage", at_s=1.0}', "fault.0.kind", "drive.preset = 'realistic'"),
+        ('{kind="can_corrupt", at_s=1.0}', "fault.0.kind", "bus.timing = 'wire'"),
+    ],
+)
+def test_a_fault_that_is_wrong_or_cannot_act_is_one_line(fault: str, key: str, right: str) -> None:
+    (line,) = problems(SMALL + '[graph]\nedges=["r1 -> r2"]\nleader=["r1"]\n', f"fault=[{fault}]")
+    assert key in line
+    assert right in line
+
+
+def test_two_faults_of_one_name_are_refused() -> None:
+    twice = 'fault=[{kind="push", at_s=1.0, name="a"}, {kind="payload", at_s=2.0, name="a"}]'
+    (line,) = problems(SMALL, twice)
+    assert "fault.1.name" in line
+    assert "another fault has this name" in line

@@ -1,0 +1,30 @@
+"""Faults of a scenario, over processes: the same record as in one process, bit for bit."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.processes import completed
+
+from fleetloop.results.run_folder import read_record
+
+pytestmark = pytest.mark.system
+
+FAULTS = """fault=[
+  {kind="push", at_s=0.2, for_s=0.1, robots=["r1"], force_body_N=8.0, torque_body_N_m=0.1},
+  {kind="link_partition", at_s=0.2, for_s=0.3, edges=["r1 -> r2"]},
+  {kind="link_delay", at_s=0.3, for_s=0.3, edges=["leader -> r1"], delay_s=0.05},
+  {kind="link_loss", at_s=0.6, edges=["* -> *"], probability=0.4},
+  {kind="localisation_outage", at_s=0.1, for_s=0.2, robots=["r2"]}]"""
+
+
+def test_faults_act_at_the_same_ticks_over_processes(tmp_path: Path) -> None:
+    args = ("two_robots", "--duration", "1.0", "--allow-unchecked", "--set", FAULTS)
+    assert completed(tmp_path / "a", *args)[0] == 0
+    assert completed(tmp_path / "b", *args, "--in-process")[0] == 0
+    records = [(tmp_path / name / "record.mcap").read_bytes() for name in "ab"]
+    assert records[0] == records[1]
+    rows = read_record(tmp_path / "a", partial=False).controller["r2"]
+    cut = (rows["t_s"] > 0.2) & (rows["t_s"] < 0.5)
+    assert rows["age_of_r1_s"][cut].max() == pytest.approx(0.298 + 0.02, abs=0.02)
+    assert np.nanmax(rows["age_of_localisation_s"][rows["t_s"] < 0.3]) > 0.19
