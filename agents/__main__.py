@@ -81,7 +81,7 @@ def _run(
     )
     agent = Agent(brief, rows)
     notice = link.publisher(keys.notice(name, AGENT.process(robot)))
-    agent.guard.announce = lambda text: notice.put(Notice(text).encode())
+    agent.guard.announce = lambda event: notice.put(Notice(event).encode())
     link.subscribe(keys.pose(name, robot), "pose")
     subscriptions = Subscriptions(link, brief)
     for other in brief.located:
@@ -154,7 +154,8 @@ class _Connections(NamedTuple):
             report = AgentReport(
                 failure=failure,
                 left_early="" if self.agent.closed else early,
-                notices=tuple(self.agent.notices()),
+                events=tuple(guard.events),
+                remarks=tuple(self.agent.remarks()),
                 flooders=tuple(self.agent.admission.refusals.floods()),
                 missing_privileges=tuple(missing_privileges),
                 cpu_ns=process_cpu_ns() - began_ns,

@@ -142,9 +142,9 @@ class Agent:
         """Refused messages, in words."""
         return self.admission.refusals.lines()
 
-    def notices(self) -> list[str]:
-        """Notices for the report, in words."""
-        return [*self._guard.notices(), *self.refusals()]
+    def remarks(self) -> list[str]:
+        """Remarks on the whole run for the report, in words."""
+        return [*self._guard.remarks(), *self.refusals()]
 
     # --- one period --------------------------------------------------------------------------
 
@@ -282,7 +282,7 @@ class Agent:
             self._guard.note_fault("path variable", trouble)
 
     def _note(self, text: str) -> None:
-        self._guard.note(self._tick, text)
+        self._guard.note(self._tick, "law", text)
 
     def shut_down(self) -> Sequence[Frame]:
         """Disarm for good, on a stop before the closing tick."""

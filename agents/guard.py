@@ -7,7 +7,6 @@ first tick. Torque is sent in one place only, in phase DRIVING and in a tick wit
 from collections.abc import Callable, Sequence
 from enum import Enum, auto
 from math import isfinite
-from typing import NamedTuple
 
 from agents.limits import TorqueLimiter
 from agents.rearming import Rearming
@@ -17,8 +16,7 @@ from bridge.drives.interface import DriveClient
 from bridge.frame import Frame
 from configs.brief import AgentBrief
 from configs.errors import InfrastructureError
-
-MAX_EVENTS = 64
+from configs.events import MAX_EVENTS, Event
 
 
 class Phase(Enum):
@@ -46,18 +44,6 @@ UNCHANGED = TorqueOutcome.UNCHANGED
 _DRIVING = Phase.DRIVING
 
 
-class Event(NamedTuple):
-    """An unplanned change of phase."""
-
-    when: str
-    phase: Phase
-    reason: str
-
-    def __str__(self) -> str:
-        """One line for people."""
-        return f"{self.when}: {self.phase.name}{': ' if self.reason else ''}{self.reason}"
-
-
 class Guard:
     """Supervises one robot's drives. Pure: no I/O, no clock."""
 
@@ -74,9 +60,9 @@ class Guard:
         self.stop_reason = ""
         """The reason for the present stop, "" while the robot is not stopped."""
         self.events: list[Event] = []
-        self.announce: Callable[[str], None] = lambda _: None
-        """Callback for each event, in words; set by the controller process."""
-        self._announced: list[str] = []
+        """Events of the robot as its controller saw them; the first `MAX_EVENTS`."""
+        self.announce: Callable[[Event], None] = lambda _: None
+        """Callback for each event; set by the controller process."""
         self.stalled = ""
         """The reason for late ticks at present, "" if ticks are on time; see `note_stall`."""
         self.bus_fault: str | None = None
@@ -111,12 +97,14 @@ class Guard:
     def note_stall(self, tick: int, reason: str) -> None:
         """Note the reason for late ticks from this one on; set `stalled` to "" afterwards."""
         self.stalled = reason
-        self.note(tick, reason)
+        self.note(tick, "stalled", reason)
 
-    def note(self, tick: int, text: str) -> None:
-        """Note what stops nothing, for people."""
-        if len(self._announced) < 2 * MAX_EVENTS:
-            self._announce(f"{self._when(tick)}: {text}")
+    def note(self, tick: int, kind: str, text: str = "") -> None:
+        """Record and announce an event."""
+        if len(self.events) < MAX_EVENTS:
+            event = Event(tick, self._brief.robot, kind, text)
+            self.events.append(event)
+            self.announce(event)
 
     def note_unsent(self, tick: int) -> None:
         """Note that the frames of this tick were not sent: arming has lost a step."""
@@ -128,8 +116,8 @@ class Guard:
 
     def note_joining(self, tick: int, s: float) -> None:
         """Note that the robot joins the formation at a tick, or again after a restart."""
-        joins = "re-joins" if self._brief.rejoins else "joins"
-        self._announce(f"{self._when(tick)}: {joins} the formation at s = {s:.4g} m")
+        kind = "rejoined" if self._brief.rejoins else "joined"
+        self.note(tick, kind, f"at s = {s:.4g} m")
 
     # --- before tick 0 ---------------------------------------------------------------------------
 
@@ -149,7 +137,8 @@ class Guard:
         if not drives.armed:
             return drives.arm(now_ns)
         if drives.fault(now_ns) is None:
-            self.phase = Phase.READY
+            if self.phase is not Phase.READY:
+                self._change(tick, Phase.READY, "armed")
             return drives.torque(0.0, 0.0)
         self.phase = Phase.ARMING
         self._refusal = drives.refusal()
@@ -187,7 +176,9 @@ class Guard:
         if self.phase is not _DRIVING:
             return self._recover(tick, now_ns)
         fault = drives.fault(now_ns)
-        if fault is None and (tick > self._pose_until or self._noted_faults or self.bus_fault):
+        if fault is not None:
+            self.note(tick, "drive_error", fault)
+        elif tick > self._pose_until or self._noted_faults or self.bus_fault:
             fault = self._own_fault(tick)
         if fault is None and not isfinite(right_wheel_N_m + left_wheel_N_m):
             fault = trouble or "the law asks for a torque that is not finite"
@@ -206,7 +197,7 @@ class Guard:
         self.outcome = TorqueOutcome.WITHHELD
         if self.phase is Phase.LEFT:
             return self.drives.rest(self._bus_time_ns(tick))
-        self._change(tick, Phase.LEFT, "left the formation")
+        self._change(tick, Phase.LEFT, "left")
         return self.drives.disarm()
 
     def shut_down(self) -> Sequence[Frame]:
@@ -217,10 +208,10 @@ class Guard:
             return [*frames, *self.drives.estop()]
         return frames
 
-    def notices(self) -> list[str]:
-        """Notices for the report, in words."""
+    def remarks(self) -> list[str]:
+        """Remarks on the whole run for the report, in words."""
         dry = ["dry run: nothing was sent to the drives"] if self._brief.host.dry_run else []
-        return [*dry, *self._announced, *self.drives.notices]
+        return [*dry, *self.drives.notices]
 
     def _own_fault(self, tick: int) -> str | None:
         """The first fault beside those of the drives, None if there is none."""
@@ -238,7 +229,7 @@ class Guard:
             reason = f"{self.stalled}: {reason}"
         self.stop_tick = tick
         self.stop_reason = f"{self._when(tick)}: {reason}"
-        self._change(tick, Phase.STOPPED, reason)
+        self._change(tick, Phase.STOPPED, "stopped", reason)
         return self.drives.disarm()
 
     def _recover(self, tick: int, now_ns: int) -> Sequence[Frame]:
@@ -247,7 +238,7 @@ class Guard:
         if self.phase is Phase.STOPPED:
             if rearming.exhausted or not rearming.may_begin(self._obstacle(tick, now_ns), now_ns):
                 return drives.rest(now_ns)
-            self._change(tick, Phase.REARMING, "")
+            self._change(tick, Phase.REARMING, "rearming")
             return drives.disarm()
         obstacle = self._obstacle(tick, now_ns)
         if obstacle is None and not drives.armed and rearming.timed_out(now_ns):
@@ -259,19 +250,12 @@ class Guard:
         self._limiter.reset()
         self.outcome = TorqueOutcome.RESTARTED
         self.stop_reason = ""
-        self._change(tick, _DRIVING, "armed again")
+        self._change(tick, _DRIVING, "rearmed")
         return drives.torque(0.0, 0.0)
 
     def _obstacle(self, tick: int, now_ns: int) -> str | None:
         return self.drives.obstacle(now_ns) or self._own_fault(tick)
 
-    def _change(self, tick: int, phase: Phase, reason: str) -> None:
+    def _change(self, tick: int, phase: Phase, kind: str, text: str = "") -> None:
         self.phase = phase
-        if len(self.events) < MAX_EVENTS:
-            event = Event(self._when(tick), phase, reason)
-            self.events.append(event)
-            self._announce(str(event))
-
-    def _announce(self, text: str) -> None:
-        self._announced.append(text)
-        self.announce(text)
+        self.note(tick, kind, text)

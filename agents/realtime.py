@@ -176,6 +176,7 @@ class RealtimeLoop:
             if self._watch is not None and self._watch.away is not self._away:
                 self._away = self._watch.away
                 agent.guard.note_fault("launcher", CUT_OFF if self._away else None)
+                agent.guard.note(tick, "cut_off" if self._away else "back", "the launcher")
             agent.admission.now_ns = now_ns - epoch_ns
             self._receive_messages()
             frames = agent.step(tick) if not stop.requested else agent.shut_down()

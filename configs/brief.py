@@ -18,6 +18,7 @@ from math import inf
 from configs.connections import NetworkLink, Settings
 from configs.curves import FormationOffset, ReferencePath
 from configs.edges import InEdge
+from configs.events import when
 from configs.faults.base import PlannedFault
 from configs.host import Host
 from configs.leader_speed import SpeedChange
@@ -43,11 +44,6 @@ class Wheels:
 
     radius_m: float
     half_track_m: float
-
-
-def when(tick: int, period_ns: int) -> str:
-    """A tick in words."""
-    return f"tick {tick} (t = {tick * period_ns * 1e-9:.3f} s)"
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,10 +17,11 @@ from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer, row_of
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, settled_memory
 from configs.brief import AgentBrief, LeaderBrief, PlantBrief
+from configs.events import Event
 from fleetloop.record.writer import Source
 from plant.bus.build import build_buses
 from plant.herald import Herald
-from plant.robot import EmulatedRobot, diverged_robots, emulated_robot
+from plant.robot import EmulatedRobot, diverged_robots, divergences, emulated_robot
 
 PROGRESS_EVERY_TICKS = 256
 
@@ -122,7 +123,7 @@ class InProcessRun:
         leader: LeaderBrief,
         writer: Keeper,
         on_progress: Callable[[Progress], None],
-        on_notice: Callable[[str, str], None] = lambda *_: None,
+        on_event: Callable[[Event], None] = lambda _: None,
         *,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
@@ -149,11 +150,9 @@ class InProcessRun:
             for edge in agent.brief.hears:
                 self._hearers[edge.speaker].append(agent)
         for agent in self._agents:
-            agent.guard.announce = partial(on_notice, agent.brief.robot)
+            agent.guard.announce = on_event
         period_ns = plant.schedule.period_ns
-        self._herald = Herald(
-            lambda: diverged_robots(self._robots, period_ns), partial(on_notice, "plant")
-        )
+        self._herald = Herald(lambda _: divergences(self._robots, period_ns), on_event)
         self._on_progress = on_progress
         ends = dict(zip(self._robots, zip(self._agents, self._truths, strict=True), strict=True))
 
@@ -201,10 +200,15 @@ class InProcessRun:
         return stopped | diverged_robots(self._robots, self._schedule.period_ns)
 
     @property
-    def notices(self) -> dict[str, list[str]]:
-        """What happened between robots and their drives, in words."""
-        notices = {agent.brief.robot: agent.notices() for agent in self._agents}
-        return {robot: said for robot, said in notices.items() if said}
+    def events(self) -> list[Event]:
+        """Events of the plant and of all controllers, each in its order."""
+        return self._herald.events + [it for agent in self._agents for it in agent.guard.events]
+
+    @property
+    def remarks(self) -> dict[str, list[str]]:
+        """Remarks of the controllers on the whole run, in words."""
+        remarks = {agent.brief.robot: agent.remarks() for agent in self._agents}
+        return {robot: said for robot, said in remarks.items() if said}
 
     @property
     def messages(self) -> dict[str, Mapping[str, Mapping[str, int]]]:
@@ -239,8 +243,9 @@ class InProcessRun:
             self.ticks = max(tick, 0)
             if tick % PROGRESS_EVERY_TICKS == 0:
                 wall_ns = self._clock.monotonic_ns() - start_ns
-                self._herald.look()
+                self._herald.look(tick)
                 self._on_progress(Progress(tick, tick * schedule.period_ns, wall_ns))
+        self._herald.look(self.ticks)
         self.wall_s = (self._clock.monotonic_ns() - start_ns) * 1e-9
 
     def _tick(self, tick: int) -> None:

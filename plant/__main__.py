@@ -33,12 +33,13 @@ from bridge.process.profile import Sampler
 from configs.brief import PlantBrief
 from configs.connections import Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError
+from configs.events import Event
 from configs.roles import PLANT
 from plant.herald import Herald
 from plant.lockstep import LockstepLoop, PlantCounters
 from plant.real_robot import RealRobot
 from plant.realtime import RealtimeLoop
-from plant.robot import bus_troubles, diverged_robots, emulated_robot
+from plant.robot import bus_troubles, diverged_robots, divergences, emulated_robot
 
 PLANT_PRIORITY = 45
 """SCHED_FIFO, above the controllers'."""
@@ -128,22 +129,29 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
 
     stalls: list[Stall] = []
 
-    def news() -> dict[str, str]:
+    def news(tick: int) -> dict[str, Event]:
         troubles = bus_troubles(end.troubles(), emulated)
-        buses = {f"bus {bus}": text for bus, text in troubles.items()}
+        buses = {
+            f"bus {bus}": Event(tick, f"bus/{bus}", "bus_trouble", text)
+            for bus, text in troubles.items()
+        }
         late = {
-            brief.schedule.when(stall.tick): "the plant, or its machine, stalled for"
-            f" {stall.lasted_s:.2f} s"
+            f"stall {stall.tick}": Event(
+                stall.tick,
+                PLANT.name,
+                "stalled",
+                f"the plant, or its machine, stalled for {stall.lasted_s:.2f} s",
+            )
             for stall in stalls
         }
-        return buses | late | diverged_robots(emulated, brief.schedule.period_ns)
+        return buses | late | divergences(emulated, brief.schedule.period_ns)
 
     notice = link.publisher(keys.notice(name, PLANT.name))
-    herald = Herald(news, lambda text: notice.put(Notice(text).encode()))
+    herald = Herald(news, lambda event: notice.put(Notice(event).encode()))
 
     def say(state: Progress) -> None:
         progress.put(state.encode())
-        herald.look()
+        herald.look(state.tick)
 
     missing_privileges: list[str] = []
     body: Callable[[Stop], None]
@@ -182,6 +190,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
             log.finish()
         say(progress_of())
         summary = PlantReport(
+            events=tuple(herald.events),
             left_early=stop.reason if counters.ticks < brief.schedule.ticks else "",
             missing_privileges=tuple(missing_privileges),
             cpu_ns=process_cpu_ns() - began_ns,

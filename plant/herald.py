@@ -1,26 +1,36 @@
-"""Announcement of events of robots and buses, each once."""
+"""The plant's events: kept in their order, and each announced once."""
 
 from collections.abc import Callable, Mapping
 
+from configs.events import MAX_EVENTS, Event
+
 
 class Herald:
-    """Announces new entries of a table of events, whenever `look` is called.
+    """Keeps and announces the events of a plant; the first `MAX_EVENTS` of them.
 
     Args:
-        look: all events so far, in words, by robot or bus.
-        announce: called with each new one.
+        look: all events so far of those that are looked for, each under a name of its own; asked
+            with the present tick.
+        announce: called with each new event.
     """
 
     def __init__(
-        self, look: Callable[[], Mapping[str, str]], announce: Callable[[str], None]
+        self, look: Callable[[int], Mapping[str, Event]], announce: Callable[[Event], None]
     ) -> None:
         self._look = look
         self._announce = announce
-        self._announced: set[str] = set()
+        self._seen: set[str] = set()
+        self.events: list[Event] = []
 
-    def look(self) -> None:
-        """Announce what is new."""
-        for name, event in self._look().items():
-            if name not in self._announced:
-                self._announced.add(name)
-                self._announce(f"{name}: {event}")
+    def look(self, tick: int) -> None:
+        """Note each event that is new."""
+        for name, event in self._look(tick).items():
+            if name not in self._seen:
+                self._seen.add(name)
+                self.note(event)
+
+    def note(self, event: Event) -> None:
+        """Keep and announce an event that has just happened."""
+        if len(self.events) < MAX_EVENTS:
+            self.events.append(event)
+            self._announce(event)

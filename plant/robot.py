@@ -17,7 +17,8 @@ from bridge.drives import protocol
 from bridge.drives.interface import DriveMeasurements, DriveNode
 from bridge.frame import Frame
 from bridge.network.messages import PoseFix
-from configs.brief import PowertrainModel, RobotBrief, when
+from configs.brief import PowertrainModel, RobotBrief
+from configs.events import Event, when
 from plant.body import RigidBody, State
 from plant.divergence import Divergence
 from plant.encoder import PER_RADIAN
@@ -283,10 +284,20 @@ def bus_troubles(troubles: Mapping[str, str], robots: Iterable[EmulatedRobot]) -
     return {bus: "; ".join(texts) for bus, texts in found.items()}
 
 
+def divergences(robots: Iterable[EmulatedRobot], period_ns: int) -> dict[str, Event]:
+    """The robots whose motion diverged, and the event, at the tick that did it."""
+    return {
+        robot.brief.robot: Event(
+            round(found.t_s * 1e9) // period_ns, robot.brief.robot, "diverged", str(found)
+        )
+        for robot in robots
+        if (found := robot.divergence) is not None
+    }
+
+
 def diverged_robots(robots: Iterable[EmulatedRobot], period_ns: int) -> dict[str, str]:
     """Robots whose motion diverged: the tick that did it, and how."""
     return {
-        robot.brief.robot: f"{when(round(found.t_s * 1e9) // period_ns, period_ns)}: {found}"
-        for robot in robots
-        if (found := robot.divergence) is not None
+        robot: f"{when(event.tick, period_ns)}: {event.text}"
+        for robot, event in divergences(robots, period_ns).items()
     }

@@ -12,15 +12,16 @@ still be impossible: readers that know the run check that.
     LeaderSpeed    [1, [[from_t_ns, speed_m_s, ramp_ns], ...]]   leader/speed
     Rows           [1, first_tick, length, rows, final]          robot/<name>/truth, telemetry
     Progress       [1, tick, t_ns, wall_ns]                      @progress/<process>
-    Notice         [1, text]                                     @notice/<process>
+    Notice         [1, tick, source, kind, text]                 @notice/<process>
     Go             [1, epoch_ns, ticks]                          @clock/go
     ClockPing      [1, sent_ns]                                  @clock/ping
     ClockPong      [1, sent_ns, received_ns, answered_ns]        @pong/<process>
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from bridge.network.packing import MAX_BYTES, finite, ints, pack, printable, unpack
+from configs.events import KINDS, MAX_EVENT_TEXT, Event
 from configs.leader_speed import SpeedChange, in_order
 
 MOST_BYTES = {
@@ -37,8 +38,6 @@ MOST_BYTES = {
 }
 """Of what others than the launcher say, by `bridge.network.keys.kind`: several times what they
 need."""
-MAX_NOTICE = 500
-"""Characters of a notice."""
 _MAX_CHANGES = 10_000
 
 
@@ -154,21 +153,32 @@ class Progress(NamedTuple):
 
 
 class Notice(NamedTuple):
-    """What has just happened, in one line for people."""
+    """An event that has just happened."""
 
-    text: str
+    event: Event
 
     def encode(self) -> bytes:
         """Bytes for the wire."""
-        return pack(self.text[:MAX_NOTICE])
+        return pack(*self.event._replace(text=self.event.text[:MAX_EVENT_TEXT]))
 
     @classmethod
     def decode(cls, payload: bytes) -> "Notice | None":
         """The message in the bytes, None if there is none."""
-        fields = unpack(payload, 2)
-        if fields is None or type(fields[1]) is not str or len(fields[1]) > MAX_NOTICE:
-            return None
-        return cls(printable(fields[1].replace("\n", " ")))
+        fields = unpack(payload, 5)
+        event = None if fields is None else event_of(fields[1:])
+        return None if event is None else cls(event)
+
+
+def event_of(fields: list[Any]) -> Event | None:
+    """The event in fields of a message, its texts in one line; None if there is none."""
+    if len(fields) != len(Event._fields) or not ints(fields[:1]):
+        return None
+    if any(type(text) is not str or len(text) > MAX_EVENT_TEXT for text in fields[1:]):
+        return None
+    tick, source, kind, text = fields
+    if kind not in KINDS:
+        return None
+    return Event(tick, *(printable(it.replace("\n", " ")) for it in (source, kind, text)))
 
 
 class Go(NamedTuple):

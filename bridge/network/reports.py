@@ -5,7 +5,7 @@ fields below, in this order. The process decides the layout, so that no process 
 of another role.
 
     process        layout
-    every role     [1, failure, left_early, notices, flooders, missing_privileges, cpu_ns,
+    every role     [1, failure, left_early, events, remarks, flooders, missing_privileges, cpu_ns,
                     durations_ns, profile_ns]
     plant          the same, then [overruns, frames, stopped_robots, bus_troubles, stalls,
                     nodes]
@@ -20,8 +20,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple, Self
 
+from bridge.network.messages import event_of
 from bridge.network.packing import finite, ints, pack, printable, unpack
 from bridge.process.awake import MAX_STALLS, Stall
+from configs.events import MAX_EVENT_TEXT, MAX_EVENTS, Event
 from configs.roles import AGENT, PLANT
 
 MAX_TEXT = 1 << 15
@@ -38,6 +40,7 @@ class Deadlines(NamedTuple):
     skipped: int  # computed after the next tick was due, and not sent
 
 
+Events = tuple[Event, ...]
 Texts = tuple[str, ...]
 TextByName = Mapping[str, str]
 NumberByName = Mapping[str, int]
@@ -53,8 +56,10 @@ class Report:
     """The error that ended it; empty if none did."""
     left_early: str = ""
     """Why it left before the end of the run; empty if it did not."""
-    notices: Texts = ()
-    """Events of its run, in words."""
+    events: Events = ()
+    """Events of its run, in their order."""
+    remarks: Texts = ()
+    """Remarks on its whole run, in words."""
     flooders: Texts = ()
     """Senders of so many refused messages that it had no time for others."""
     missing_privileges: Texts = ()
@@ -168,6 +173,16 @@ def _texts(value: Any) -> Texts:
     return texts
 
 
+def _events(value: Any) -> Events:
+    if type(value) is not list or len(value) > MAX_EVENTS:
+        raise _MalformedError
+    events = [event_of(it) if type(it) is list else None for it in value]
+    read = tuple(event for event in events if event is not None)
+    if len(read) < len(events) or sum(len(event.text) for event in read) > MAX_TEXT:
+        raise _MalformedError
+    return read
+
+
 def _by_name(value: Any, read: Callable[[Any], Any]) -> dict[str, Any]:
     if type(value) is not dict or len(value) > MAX_ENTRIES:
         raise _MalformedError
@@ -196,6 +211,7 @@ def _deadlines(value: Any) -> Deadlines | None:
 _READERS: Mapping[Any, Callable[[Any], Any]] = {
     str: _text,
     int: _number,
+    Events: _events,
     Texts: _texts,
     NumberByName: lambda value: _by_name(value, _number),
     CountsByName: lambda value: _by_name(value, lambda inner: _by_name(inner, _number)),
@@ -209,11 +225,23 @@ _READERS: Mapping[Any, Callable[[Any], Any]] = {
 def _cut(value: Any) -> Any:
     if isinstance(value, str):
         return value[:MAX_TEXT]
+    if isinstance(value, tuple) and value and isinstance(value[0], Event):
+        return _cut_events(value)
     if isinstance(value, tuple) and value and isinstance(value[0], str):
         return _cut_texts(value)
     if isinstance(value, Mapping):
         return {name[:MAX_NAME]: _cut(item) for name, item in [*value.items()][:MAX_ENTRIES]}
     return value
+
+
+def _cut_events(events: Events) -> Events:
+    """As many as there may be, their texts as long as there is room for."""
+    kept, left = [], MAX_TEXT
+    for event in events[:MAX_EVENTS]:
+        text = event.text[: min(left, MAX_EVENT_TEXT)]
+        kept.append(event._replace(text=text))
+        left -= len(text)
+    return tuple(kept)
 
 
 def _cut_texts(texts: Texts) -> Texts:

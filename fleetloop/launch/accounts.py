@@ -3,11 +3,12 @@
 from bridge.network.reports import AgentReport, PlantReport, Report
 from bridge.process.awake import AFTERMATH_S
 from configs.roles import AGENT, PLANT, short_name
+from fleetloop.launch.message_reader import of_process
 from fleetloop.launch.outcome import Outcome
 from fleetloop.results.summary import RunStats
 
-MOST_NOTICES = 200
-"""Notices kept of one process; further ones are dropped."""
+MOST_REMARKS = 200
+"""Remarks kept of one process; further ones are dropped."""
 
 
 def stats_of(outcome: Outcome, *, realtime: bool, period_s: float) -> RunStats:
@@ -26,12 +27,15 @@ def stats_of(outcome: Outcome, *, realtime: bool, period_s: float) -> RunStats:
         clocks=outcome.clocks,
     )
     stats.cpu_s["launcher"] = round(outcome.cpu_ns * 1e-9, 3)
-    for process, report in outcome.reports.items():
+    # The plant's first: what it does to a robot at a tick comes before what the controller says.
+    for process, report in sorted(outcome.reports.items(), key=lambda it: it[0] != PLANT.name):
         _add_report(stats, process, report)
     # What a process said on the way is in its report as well, if it lived to make one.
     lost = {name: said for name, said in outcome.said.items() if name not in outcome.reports}
-    for process, said in (*lost.items(), *outcome.notices.items()):
-        stats.notices.setdefault(short_name(process), []).extend(said)
+    for events in (*lost.values(), *outcome.events.values()):
+        stats.events += events
+    for process, remarks in outcome.remarks.items():
+        stats.remarks.setdefault(process, []).extend(remarks)
     plant = outcome.reports.get(PLANT.name)
     if isinstance(plant, PlantReport):
         _blame_stalls(outcome, stats, plant, period_s)
@@ -50,8 +54,9 @@ def _add_report(stats: RunStats, process: str, report: Report) -> None:
         stats.waits_s[process] = {wait: round(ns * 1e-9, 4) for wait, ns in waits}
     if report.left_early:
         stats.left_early[name] = report.left_early
-    if report.notices:
-        stats.notices[name] = list(report.notices[:MOST_NOTICES])
+    stats.events += [of_process(process, event) for event in report.events]
+    if report.remarks:
+        stats.remarks[name] = list(report.remarks[:MOST_REMARKS])
     match report:
         case PlantReport():
             stats.overruns = report.overruns

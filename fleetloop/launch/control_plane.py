@@ -11,7 +11,8 @@ from bridge.network import keys
 from bridge.network.link import Arrival, Link
 from bridge.network.messages import Progress
 from configs.brief import Schedule
-from configs.roles import PLANT, is_observer
+from configs.events import MAX_EVENTS, Event
+from configs.roles import PLANT, is_observer, short_name
 from fleetloop.launch.child import Child
 from fleetloop.launch.clock_offsets import ClockOffsets
 from fleetloop.launch.machine import WATCH_EVERY_S
@@ -19,9 +20,6 @@ from fleetloop.launch.message_reader import MessageReader
 from fleetloop.launch.outcome import Outcome
 from fleetloop.launch.remote_roles import RemoteRoles
 from fleetloop.launch.vitals import Vitals
-
-MAX_NOTICES = 100
-"""Of each process; more would bury the others'."""
 
 
 class ControlPlane:
@@ -32,7 +30,8 @@ class ControlPlane:
         remote: the roles on other machines.
         now: seconds on the launcher's clock of awake time.
         on_progress: called with the plant's progress.
-        on_notice: called with each process and notice, as they come.
+        on_event: called with each event, as they come.
+        on_notice: called with a process and what else is to be said of it at once.
     """
 
     def __init__(
@@ -41,6 +40,7 @@ class ControlPlane:
         remote: RemoteRoles,
         now: Callable[[], float],
         on_progress: Callable[[Progress], None],
+        on_event: Callable[[Event], None],
         on_notice: Callable[[str, str], None],
     ) -> None:
         self.outcome = Outcome()
@@ -55,6 +55,7 @@ class ControlPlane:
         """Whether the plant has begun to tick."""
         self.now = now
         self._on_progress = on_progress
+        self._on_event = on_event
         self.on_notice = on_notice
 
     def subscribe(self, link: Link, run: str, processes: Iterable[str]) -> None:
@@ -91,9 +92,10 @@ class ControlPlane:
         """The processes on this machine that take part in the run."""
         return [child for child in self.children if not is_observer(child.name)]
 
-    def note(self, process: str, text: str) -> None:
-        """Record what the launcher has noticed about a process."""
-        self._tell(self.outcome.notices.setdefault(process, []), process, text)
+    def note(self, process: str, kind: str, text: str) -> None:
+        """Record an event of a process that the launcher has observed."""
+        event = Event(self.outcome.ticks, short_name(process), kind, text)
+        self._take(self.outcome.events.setdefault(process, []), event)
 
     def process(self, arrival: Arrival) -> None:
         """Take one message."""
@@ -104,7 +106,7 @@ class ControlPlane:
                 (self.alive.add if there else self.alive.discard)(process)
                 away_s = self.remote.note_token(process, self.now(), there=there)
                 if away_s is not None:
-                    self.note(process, f"there again after {away_s:.1f} s")
+                    self.note(process, "back", f"there again after {away_s:.1f} s")
             case "progress":
                 if (progress := self.words.progress(process, arrival.payload)) is not None:
                     self._process_progress(process, progress)
@@ -112,15 +114,15 @@ class ControlPlane:
                 if not self.clocks.take(process, arrival.payload):
                     self.words.refusals.note("time", process, "not well formed")
             case "notice":
-                if (notice := self.words.notice(process, arrival.payload)) is not None:
-                    self._tell(self.outcome.said.setdefault(process, []), process, notice.text)
+                if (event := self.words.event(process, arrival.payload)) is not None:
+                    self._take(self.outcome.said.setdefault(process, []), event)
             case _:
                 self._process_report(process, arrival.payload)
 
     def _process_progress(self, process: str, progress: Progress) -> None:
         silence = self.vitals.beat(process, progress.tick, self.now())
         if silence is not None:
-            self.note(process, f"goes on after {silence.lasted_s:.1f} s")
+            self.note(process, "back", f"goes on after {silence.lasted_s:.1f} s")
         if process == PLANT.name:
             self.ticking = True
             self.outcome.ticks = progress.tick
@@ -137,7 +139,7 @@ class ControlPlane:
         if (child := self.child(process)) is not None:
             child.release()
 
-    def _tell(self, account: list[str], process: str, text: str) -> None:
-        if len(account) < MAX_NOTICES:
-            account.append(text)
-            self.on_notice(process, text)
+    def _take(self, account: list[Event], event: Event) -> None:
+        if len(account) < MAX_EVENTS:
+            account.append(event)
+            self._on_event(event)

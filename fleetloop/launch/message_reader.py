@@ -11,6 +11,14 @@ from bridge.network.messages import Notice, Progress
 from bridge.network.refused_messages import Refusals
 from bridge.network.reports import Report, decode_report
 from configs.brief import Schedule
+from configs.events import Event
+from configs.roles import AGENT
+
+
+def of_process(process: str, event: Event) -> Event:
+    """An event as this process may announce it: a controller speaks of its own robot only."""
+    role, _, robot = process.partition("/")
+    return event._replace(source=robot) if role == AGENT.name else event
 
 
 class MessageReader:
@@ -36,12 +44,13 @@ class MessageReader:
             self.refusals.note("report", process, "not well formed")
         return report
 
-    def notice(self, process: str, payload: bytes) -> Notice | None:
-        """What has just happened to a process, None if that is nothing to be read."""
+    def event(self, process: str, payload: bytes) -> Event | None:
+        """An event that a process has just announced, None if there is none; see `of_process`."""
         notice = Notice.decode(payload)
         if notice is None:
             self.refusals.note("notice", process, "not well formed")
-        return notice
+            return None
+        return of_process(process, notice.event)
 
     def note_dropped(self, dropped: Iterable[Dropped]) -> None:
         """Count what found no room."""

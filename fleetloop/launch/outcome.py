@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bridge.network.reports import Report
+from configs.events import Event
 
 
 @dataclass(slots=True)
@@ -19,8 +20,9 @@ class Outcome:
     teardown_s: float = 0.0
     cpu_ns: int = 0  # of the launcher, from the first tick on
     reports: dict[str, Report] = field(default_factory=dict)
-    said: dict[str, list[str]] = field(default_factory=dict)  # notices of a process, as they came
-    notices: dict[str, list[str]] = field(default_factory=dict)  # about a process, by the launcher
+    said: dict[str, list[Event]] = field(default_factory=dict)  # by a process, as they came
+    events: dict[str, list[Event]] = field(default_factory=dict)  # of a process, as observed here
+    remarks: dict[str, list[str]] = field(default_factory=dict)  # of launcher and router
     clocks: dict[str, dict[str, float]] = field(default_factory=dict)
     """Offsets of other machines' clocks, by process (`fleetloop.launch.clock_offsets`)."""
     refused: dict[str, dict[str, int]] = field(default_factory=dict)

@@ -27,6 +27,7 @@ from bridge.process.lifecycle import Stop
 from configs.connections import LEASE_S, LOCAL_LEASE_S, NetworkLink
 from configs.deployment import Deployment
 from configs.errors import InfrastructureError
+from configs.events import Event
 from configs.resolve import leader_brief, schedule
 from configs.roles import LAUNCHER, PLANT, identity_of, processes_of
 from configs.scenario import Scenario
@@ -69,6 +70,7 @@ class ProcessRun:
         speed: float,
         profile: bool,
         on_progress: Callable[[Progress], None],
+        on_event: Callable[[Event], None] = lambda _: None,
         on_notice: Callable[[str, str], None] = lambda *_: None,
         deployment: Deployment | None = None,
         clock: Clock = SYSTEM_CLOCK,
@@ -82,14 +84,16 @@ class ProcessRun:
         self._schedule = schedule(scenario, speed)
         self._machine = MachineWatch(
             lambda: self.outcome.ticks * self._schedule.period_s,
-            lambda text: self._plane.note(LAUNCHER.name, text),
+            lambda text: self._plane.note(LAUNCHER.name, "stalled", text),
             clock=clock,
         )
         self._now = self._machine.clock.now
         network = self._deployment.network
         rejoin_s = network.rejoin_s if network is not None else 0.0
         self._remote = RemoteRoles(self._deployment.elsewhere(scenario), rejoin_s)
-        self._plane = ControlPlane(self._schedule, self._remote, self._now, on_progress, on_notice)
+        self._plane = ControlPlane(
+            self._schedule, self._remote, self._now, on_progress, on_event, on_notice
+        )
         # A launcher that has lost a router of its own hears of nobody.
         patience_s = rejoin_s if placement.is_external(self._deployment) else 0.0
         self._supervision = Supervision(self._plane, self._schedule, patience_s)
@@ -299,12 +303,12 @@ class ProcessRun:
         outcome, words = self.outcome, self._plane.words
         outcome.machine = self._machine.report()
         if refusals := link.denials.notes():
-            outcome.notices["router"] = refusals
+            outcome.remarks["router"] = refusals
         outcome.clocks = self._plane.clocks.account()
         outcome.refused = link.denials.counts()
         words.note_dropped(link.dropped())
         if refusals := words.refusals.lines():
-            outcome.notices.setdefault(LAUNCHER.name, []).extend(refusals)
+            outcome.remarks[LAUNCHER.name] = refusals
         self._blame_floods(link.denials.flooders)
 
     def _blame_floods(self, cut_off: Iterable[str]) -> None:

@@ -70,7 +70,7 @@ class Restarts:
             return False
         self._left -= 1
         count = f"start {self._most - self._left} of {self._most}"
-        plane.note(failure.name, f"{failure.text}; started again, {count}")
+        plane.note(failure.name, "restarted", f"{failure.text}; started again, {count}")
         child.close()
         with fork_server:  # has to end, so that the launcher is the parent
             again = self._respawn(robot, fork_server)

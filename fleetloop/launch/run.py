@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from bridge.network.messages import Progress
 from bridge.process.clock import SYSTEM_CLOCK, local_date
@@ -10,6 +11,7 @@ from bridge.process.lifecycle import Stop, keep_to_itself
 from configs.connections import NetworkLink
 from configs.deployment import Deployment, load_deployment
 from configs.errors import ExitStatus, InfrastructureError, ScenarioError
+from configs.events import KINDS, Event, told
 from configs.loading import load, to_toml
 from configs.overrides import Overrides
 from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of
@@ -59,6 +61,26 @@ class RunOptions:
     """Run what `fleetloop check` calls an error."""
 
 
+class _Live(NamedTuple):
+    """Says what happens while a run goes on."""
+
+    progress: RunProgress
+    period_ns: int
+
+    def on_progress(self, state: Progress) -> None:
+        """Show how far it is."""
+        self.progress.show(state.t_ns * 1e-9, state.wall_ns * 1e-9)
+
+    def on_event(self, event: Event) -> None:
+        """Tell an event that is a notice."""
+        if KINDS[event.kind].told:
+            self.progress.notice(f"{event.source}: {told(event, self.period_ns)}")
+
+    def on_notice(self, process: str, text: str) -> None:
+        """Tell something else of a process."""
+        self.progress.notice(f"{short_name(process)}: {text}")
+
+
 def run_scenario(source: str, options: RunOptions) -> int:
     """Run a scenario, save and print its results; return the exit status.
 
@@ -96,17 +118,11 @@ def run_scenario(source: str, options: RunOptions) -> int:
         stop_on_signals() as stop,
         RunProgress(scenario.name, scenario.ends_at_s, quiet=options.as_json) as progress,
     ):
-
-        def on_progress(state: Progress) -> None:
-            progress.show(state.t_ns * 1e-9, state.wall_ns * 1e-9)
-
-        def on_notice(process: str, text: str) -> None:
-            progress.notice(f"{short_name(process)}: {text}")
-
+        live = _Live(progress, schedule(scenario).period_ns)
         try:
             run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
             if options.in_process:
-                stats = run_in_process(scenario, folder, on_progress, on_notice, stop)
+                stats = run_in_process(scenario, folder, live.on_progress, live.on_event, stop)
             else:
                 run = ProcessRun(
                     scenario,
@@ -114,8 +130,9 @@ def run_scenario(source: str, options: RunOptions) -> int:
                     record=folder / run_folder.RECORD,
                     speed=options.speed,
                     profile=options.profile,
-                    on_progress=on_progress,
-                    on_notice=on_notice,
+                    on_progress=live.on_progress,
+                    on_event=live.on_event,
+                    on_notice=live.on_notice,
                     deployment=deployment,
                 )
                 stats = stats_of(
@@ -169,7 +186,7 @@ def run_in_process(
     scenario: Scenario,
     folder: Path,
     on_progress: Callable[[Progress], None],
-    on_notice: Callable[[str, str], None],
+    on_event: Callable[[Event], None],
     stop: Stop,
 ) -> RunStats:
     """Run all roles in this process and write the record into the run's folder.
@@ -201,7 +218,7 @@ def run_in_process(
                 leader_brief(scenario),
                 writer,
                 on_progress,
-                on_notice,
+                on_event,
             )
             startup_s = SYSTEM_CLOCK.monotonic_s() - began
             run.run(stop)
@@ -221,7 +238,8 @@ def run_in_process(
         frames_per_bus=run.frames,
         nodes=run.nodes,
         stopped_robots=run.stopped_robots,
-        notices=run.notices,
+        events=run.events,
+        remarks=run.remarks,
         messages=run.messages,
     )
 

@@ -80,9 +80,8 @@ class Supervision:
     def name_the_cut_off(self) -> None:
         """Name the roles on other machines that are cut off, and go on."""
         plane = self._plane
-        when = self._schedule.when(plane.outcome.ticks)
         for process in plane.remote.newly_cut_off(plane.now()):
-            plane.note(process, f"{when}: cut off: its machine, or the network to it")
+            plane.note(process, "cut_off", "its machine, or the network to it")
 
     def name_the_frozen(self) -> None:
         """In real time, where no process waits for another: name a silent one at once."""
@@ -93,4 +92,5 @@ class Supervision:
             child = plane.child(process)
             state = child.state() if child is not None else ""
             since = self._schedule.when(tick)
-            plane.note(process, f"no sign of life for {lasted_s:.1f} s, since {since}{state}")
+            text = f"no sign of life for {lasted_s:.1f} s, since {since}{state}"
+            plane.note(process, "silent", text)

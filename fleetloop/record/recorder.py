@@ -235,7 +235,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         if lost:
             record.note_lost("; ".join(lost))
         summary = Report(
-            notices=(*recorder.gaps(), *refused),
+            remarks=(*recorder.gaps(), *refused),
             flooders=tuple(recorder.refusals.floods()),
             cpu_ns=process_cpu_ns() - began_ns,
         )

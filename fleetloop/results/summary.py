@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from configs.events import KINDS, Event, in_order, told
 from configs.leader_speed import speed_at
 from configs.membership import Membership
 from configs.resolve import leader_brief
@@ -43,7 +44,8 @@ class RunStats:
     nodes: Mapping[str, Mapping[str, int]] = field(default_factory=dict)  # of wires, by bus/node
     waits_s: dict[str, dict[str, float]] = field(default_factory=dict)
     stopped_robots: dict[str, str] = field(default_factory=dict)
-    notices: dict[str, list[str]] = field(default_factory=dict)
+    events: list[Event] = field(default_factory=list)  # of a source in their order
+    remarks: dict[str, list[str]] = field(default_factory=dict)  # on the whole run, by process
     clocks: dict[str, dict[str, float]] = field(default_factory=dict)  # offsets, by process
     refused: dict[str, dict[str, int]] = field(default_factory=dict)  # by kind, by identity
     messages: dict[str, Mapping[str, Mapping[str, int]]] = field(default_factory=dict)  # of edges
@@ -81,6 +83,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         if len(rows[scenario.members[robot].ticks])
     }
     simulated_s = round(ticks * scenario.clock.control_period_s, 9)
+    events = in_order(stats.events, scenario.names)
     return {
         "verdict": verdict,
         "reason": reason,
@@ -104,7 +107,12 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
             for robot in scenario.names
             if robot in stats.stopped_robots
         },
-        "notices": stats.notices,
+        "events": [
+            {"tick": it.tick, "t_s": _seconds(it.tick * scenario.clock.control_period_s)}
+            | {"source": it.source, "kind": it.kind, "text": it.text}
+            for it in events
+        ],
+        "notices": _notices(events, stats.remarks, round(scenario.clock.control_period_s * 1e9)),
         "refused": stats.refused,
         "clock_offsets": stats.clocks,
         "network": network(controllers, stats.messages),
@@ -135,6 +143,19 @@ def finite(value: Any) -> Any:
     if isinstance(value, list):
         return [finite(item) for item in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def _notices(
+    events: list[Event], remarks: Mapping[str, list[str]], period_ns: int
+) -> dict[str, list[str]]:
+    """What people are told of each source of events and of each process, in words."""
+    notices: dict[str, list[str]] = {}
+    for event in events:
+        if KINDS[event.kind].told:
+            notices.setdefault(event.source, []).append(told(event, period_ns))
+    for process, said in remarks.items():
+        notices.setdefault(process, []).extend(said)
+    return notices
 
 
 def _seconds(t_s: float) -> float:

@@ -134,6 +134,10 @@ def _early(summary: Summary, robot: dict[str, Any], word: str) -> str:
     return f"{word} {period_s * int(robot['ticks']):.6g} s" if left_s > EARLY_S else ""
 
 
+_ENDS = ("stopped", "diverged")
+"""Kinds of events whose text is the reason of a robot that ended stopped."""
+
+
 def trouble_lines(summary: Summary) -> Iterator[str]:
     """Robots that stopped themselves, what led to it, and buses that failed at times."""
     for robot, reason in summary["stopped_robots"].items():
@@ -141,7 +145,7 @@ def trouble_lines(summary: Summary) -> Iterator[str]:
     for robot, notices in summary["notices"].items():
         told = summary["stopped_robots"].get(robot)
         for notice in notices:
-            if notice.replace("STOPPED: ", "", 1) != told:
+            if told not in (notice.replace(f"{kind}: ", "", 1) for kind in _ENDS):
                 yield f"{robot}: {notice}"
     for bus, trouble in summary["bus_troubles"].items():
         yield f"BUS {bus}: {trouble}"

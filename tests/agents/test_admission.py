@@ -163,7 +163,7 @@ def test_states_of_far_ticks_are_not_kept() -> None:
     for tick in range(0, 100_000 * SHARE, SHARE):
         bench.agent.receive_path_state("r1", state(tick))
     assert sum(map(len, bench.agent._reception._path_states.values())) <= LEAD_TICKS // SHARE + 2
-    assert any("path states of r1" in line for line in bench.agent.notices())
+    assert any("path states of r1" in line for line in bench.agent.remarks())
 
 
 def test_a_wait_that_names_what_is_missing_says_what_was_refused_of_it() -> None:

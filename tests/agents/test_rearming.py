@@ -42,11 +42,9 @@ def test_once_the_fault_is_gone_the_whole_way_of_arming_leads_back_to_driving(fa
     assert bench.why == ""
     assert bench.closed() == [True, True]
     assert any(set_points(frames) != [ZERO, ZERO] for frames in bench.run(5))
-    assert [event.phase for event in bench.agent.guard.events] == [
-        Phase.STOPPED,
-        Phase.REARMING,
-        Phase.DRIVING,
-    ]
+    kinds = [event.kind for event in bench.agent.guard.events]
+    assert kinds[-3:] == ["stopped", "rearming", "rearmed"]
+    assert set(kinds[:-3]) <= {"armed", "drive_error"}
 
 
 def test_an_estop_is_not_cleared_by_the_host_but_by_somebody_else() -> None:

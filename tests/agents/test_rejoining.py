@@ -42,7 +42,8 @@ def test_it_says_nothing_until_it_hears_a_neighbour_and_takes_its_place() -> Non
     assert bench.agent.speaks(bench.tick_now)
     state = bench.agent.share(bench.tick_now)
     assert (state.s, state.v_hat) == (pytest.approx(1.8, abs=0.02), pytest.approx(0.6))
-    assert any("re-joins the formation at s = 1.8" in line for line in bench.agent.notices())
+    (joined,) = (it for it in bench.agent.guard.events if it.kind == "rejoined")
+    assert joined.text.startswith("at s = 1.8")
 
 
 def test_it_arms_its_drives_as_after_a_stop_though_robots_do_not_rearm() -> None:

@@ -85,8 +85,11 @@ def test_page_summary_and_terminal_say_the_same_of_what_went_wrong(
     assert reason.startswith("tick 0 (t = 0.000 s): its motion diverged")
     assert f"STOPPED r1: {reason}" in printed
     assert f"<li>STOPPED r1: {reason}</li>" in page
-    assert f"plant: r1: {reason}" in noted.splitlines()
+    told = reason.replace("): ", "): diverged: ", 1)
+    assert f"r1: {told}" in noted.splitlines()
     for notice in summary["notices"].get("r1", []):
+        if notice == told:
+            continue  # its reason is there
         assert f"r1: {notice}" in printed
         assert f"r1: {notice}" in page
     # Results come before the figures are made.

@@ -95,11 +95,14 @@ def test_a_robot_joins_and_leaves_at_the_same_ticks_over_processes(tmp_path: Pat
     assert rows["s"][there] == pytest.approx(record.controller["r1"]["s"][there], abs=1e-6)
     before = record.plant["r2"][rows["t_s"] < 0.2]
     assert np.ptp(before["x_m"]) == np.ptp(before["y_m"]) == 0.0
-    said = json.loads((tmp_path / "a" / "summary.json").read_text())["notices"]["r2"]
-    assert [line.partition("): ")[2][:20] for line in said] == [
-        "joins the formation ",
-        "LEFT: left the forma",
-    ]
+    summaries = [json.loads((tmp_path / name / "summary.json").read_text()) for name in "ab"]
+    events, in_process = (summary["events"] for summary in summaries)
+    assert events == in_process
+    assert [(it["source"], it["kind"]) for it in events[:2]] == [("r1", "armed"), ("r2", "armed")]
+    assert max(it["tick"] for it in events[:2]) < 0
+    assert [(it["t_s"], it["kind"]) for it in events[2:]] == [(0.2, "joined"), (0.5, "left")]
+    said = summaries[0]["notices"]["r2"]
+    assert [line.partition("): ")[2][:13] for line in said] == ["joined: at s ", "left"]
 
 
 def test_a_robot_that_diverges_is_named_and_the_other_goes_on_in_either_mode(

@@ -67,15 +67,16 @@ def test_a_controller_that_is_killed_is_started_again_and_rejoins(
     args = ("realtime_100hz", "--duration", "6", *RESTART, "--set", expect)
     with running(tmp_path / "a", *args, bus_time_s=1.5) as run:
         run.child(robot).kill()
-        run.await_line(rf"{robot}: tick \d+ .*: re-joins the formation at s = .*", WAIT_S)
+        run.await_line(rf"{robot}: tick \d+ .*: rejoined: at s = .*", WAIT_S)
         status, out = run.end()
         assert status == 0, out
         assert run.survivors() == []
     summary = run.summary()
     assert summary["verdict"] == "held"
     said = summary["notices"][robot]
-    assert f"agent/{robot} was killed by SIGKILL; started again, start 1 of 1" in said
-    assert any(line.endswith("DRIVING: armed again") for line in said)
+    again = f"restarted: agent/{robot} was killed by SIGKILL; started again, start 1 of 1"
+    assert any(line.endswith(again) for line in said)
+    assert any(line.endswith(": rearmed") for line in said)
     record = Record.open(tmp_path / "a" / "record.mcap")
     rows = record.controller
     assert all(len(part) == 600 for part in rows.values())
@@ -90,7 +91,7 @@ def test_a_controller_that_is_killed_is_started_again_and_rejoins(
 def test_one_end_too_many_ends_the_run(tmp_path: Path) -> None:
     with running(tmp_path / "a", "realtime_100hz", *RESTART, bus_time_s=1.5) as run:
         run.child("r3").kill()
-        run.await_line(r"r3: tick \d+ .*: re-joins the formation at s = .*", WAIT_S)
+        run.await_line(r"r3: tick \d+ .*: rejoined: at s = .*", WAIT_S)
         run.child("r2").kill()
         status, out = run.end()
         assert status == 3

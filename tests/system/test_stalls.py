@@ -39,7 +39,10 @@ def test_a_lockstep_run_that_was_stopped_goes_on_to_the_same_record(
     machine = run.summary()["machine"]
     assert machine["stopped_and_continued"] == 1, (machine, out)
     assert machine["longest_stall_s"] > LONGER_THAN_ANY_DEADLINE_S - 0.5
-    assert re.search(r"launcher: stopped for \d+\.\d+ s at t = .* \(Ctrl-Z\), and continued", out)
+    assert re.search(
+        r"launcher: tick \d+ .*: stopped for \d+\.\d+ s at t = .* \(Ctrl-Z\), and continued",
+        out,
+    )
 
 
 def test_a_controller_that_freezes_in_real_time_is_named_at_once_and_when_it_goes_on(
@@ -48,12 +51,14 @@ def test_a_controller_that_freezes_in_real_time_is_named_at_once_and_when_it_goe
     args = ("realtime_100hz", "--duration", "6", "--allow-unchecked", "--set", "host.rearm=true")
     with running(tmp_path / "a", *args, bus_time_s=1.0) as run:
         run.child("r3").suspend()
-        silence = run.await_line(r"r3: no sign of life for \d\.\d s, since tick \d+ .*", 30.0)
+        silence = run.await_line(
+            r"r3: tick \d+ .*: no sign of life for \d\.\d s, since tick \d+ .*", 30.0
+        )
         assert silence[0].endswith(", stopped by a signal")
         run.child("r3").resume()
-        run.await_line(r"r3: goes on after \d+\.\d s", 30.0)
+        run.await_line(r"r3: tick \d+ .*: back: goes on after \d+\.\d s", 30.0)
         stalled = run.await_line(
-            r"r3: tick \d+ .*: this controller, or its machine, stalled .*", 30.0
+            r"r3: tick \d+ .*: stalled: this controller, or its machine, stalled .*", 30.0
         )
         run.end()
     said = run.summary()["notices"]["r3"]
@@ -66,7 +71,7 @@ def test_what_happens_to_a_robot_is_said_when_it_happens(tmp_path: Path) -> None
     args = ("two_robots", "--set", "robot.r1.v_m_s=1e6", "--json")
     run = Run(tmp_path / "a", *args)
     try:
-        run.await_line(r"plant: r1: tick 0 \(t = 0\.000 s\): its motion diverged.*", 30.0)
+        run.await_line(r"r1: tick 0 \(t = 0\.000 s\): diverged: its motion diverged.*", 30.0)
         status, out = run.end()
     finally:
         run.kill()

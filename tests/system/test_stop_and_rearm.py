@@ -42,7 +42,7 @@ def test_an_estop_stops_both_wheels_until_somebody_clears_it(tmp_path: Path) -> 
         status, out = run.end()
     assert status in (0, 1), out
     notices = run.summary()["notices"]["r1"]
-    assert [notice.split(": ")[1] for notice in notices] == ["STOPPED", "REARMING", "DRIVING"]
+    assert [notice.split(": ")[1] for notice in notices] == ["stopped", "rearming", "rearmed"]
     assert "left drive (node 1) dropped out: ESTOP_REQUESTED" in notices[0]
     assert run.summary()["stopped_robots"] == {}
 

@@ -65,8 +65,8 @@ def test_a_signal_that_is_not_finite_is_told_once_and_recorded(
 ) -> None:
     driving = bench(tmp_path, f"odd = float('{value}') if count >= 5 else 0.0")
     assert driving.phase is Phase.DRIVING
-    said = [text for text in driving.agent.notices() if "odd" in text]
-    assert said == [f"{WHEN}: law own_law:Own: recorded as not finite: odd = {told}"]
+    (said,) = (it for it in driving.agent.guard.events if it.kind == "law")
+    assert said.text == f"law own_law:Own: recorded as not finite: odd = {told}"
     driving.agent._rows.finish()
     odd = [row[18] for row in driving.rows]  # behind 14 of the controller and (8), count
     assert odd[:5] == [0.0] * 5
@@ -74,4 +74,5 @@ def test_a_signal_that_is_not_finite_is_told_once_and_recorded(
 
 
 def test_signals_that_are_finite_give_no_notice(tmp_path: Path) -> None:
-    assert bench(tmp_path, "odd = 1.0").agent.notices() == []
+    events = bench(tmp_path, "odd = 1.0").agent.guard.events
+    assert {event.kind for event in events} <= {"armed"}

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.network.messages import (
-    MAX_NOTICE,
     Go,
     LeaderSpeed,
     Notice,
@@ -19,6 +18,7 @@ from bridge.network.messages import (
     Rows,
 )
 from bridge.network.packing import MAX_BYTES
+from configs.events import MAX_EVENT_TEXT, Event
 from configs.leader_speed import SpeedChange
 
 ints = st.integers(-(2**62), 2**62)
@@ -143,9 +143,22 @@ def test_changes_that_do_not_follow_each_other_are_no_leader_speed(changes) -> N
 
 @given(st.text(max_size=600))
 def test_a_notice_is_one_line_that_a_terminal_can_show(text: str) -> None:
-    notice = Notice.decode(Notice(text).encode())
+    notice = Notice.decode(Notice(Event(7, "r1", "stopped", text)).encode())
     assert notice is not None
-    assert notice.text.isprintable()
-    assert len(notice.text) == min(len(text), MAX_NOTICE)
-    assert Notice.decode(msgpack.packb([1, "x" * (MAX_NOTICE + 1)])) is None
-    assert Notice.decode(msgpack.packb([1, 7])) is None
+    assert notice.event[:3] == (7, "r1", "stopped")
+    assert notice.event.text.isprintable()
+    assert len(notice.event.text) == min(len(text), MAX_EVENT_TEXT)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        [7, "r1", "stopped", "x" * (MAX_EVENT_TEXT + 1)],
+        [7, "r1", "exploded", ""],
+        [7.0, "r1", "stopped", ""],
+        [7, 1, "stopped", ""],
+        [7, "r1", "stopped"],
+    ],
+)
+def test_what_is_no_event_of_the_vocabulary_is_no_notice(fields: list[object]) -> None:
+    assert Notice.decode(msgpack.packb([1, *fields])) is None

@@ -2,6 +2,7 @@
 
 from bridge.network.reports import AgentReport, PlantReport
 from bridge.process.awake import Stall
+from configs.events import Event
 from fleetloop.launch.accounts import stats_of
 from fleetloop.launch.outcome import Outcome
 
@@ -23,11 +24,21 @@ def test_a_robot_that_stops_soon_after_the_plant_stood_still_stopped_because_of_
 
 
 def test_what_a_process_said_is_kept_if_it_did_not_live_to_report_it() -> None:
-    ended = outcome(PlantReport(), AgentReport(notices=("a", "b")))
-    ended.said = {"agent/r1": ["a"], "agent/r2": ["c"]}
-    ended.notices = {"agent/r1": ["no sign of life"]}
+    a, b = Event(3, "r1", "stopped", "a"), Event(4, "r1", "rearming")
+    c, silent = Event(2, "r2", "stopped", "c"), Event(9, "r1", "silent")
+    ended = outcome(PlantReport(), AgentReport(events=(a, b), remarks=("odd",)))
+    ended.said = {"agent/r1": [a], "agent/r2": [c]}
+    ended.events = {"agent/r1": [silent]}
     stats = stats_of(ended, realtime=True, period_s=0.01)
-    assert stats.notices == {"r1": ["a", "b", "no sign of life"], "r2": ["c"]}
+    assert stats.events == [a, b, c, silent]
+    assert stats.remarks == {"r1": ["odd"]}
+
+
+def test_a_controller_speaks_of_its_own_robot_only_and_the_plant_of_any() -> None:
+    of_r2 = Event(3, "r2", "diverged", "far")
+    reports = outcome(PlantReport(events=(of_r2,)), AgentReport(events=(of_r2,)))
+    stats = stats_of(reports, realtime=False, period_s=0.01)
+    assert [event.source for event in stats.events] == ["r2", "r1"]
 
 
 def test_a_controller_that_was_told_to_stop_left_early() -> None:

@@ -18,6 +18,7 @@ from bridge.network.reports import (
     decode_report,
 )
 from bridge.process.awake import Stall
+from configs.events import KINDS, MAX_EVENTS, Event
 from configs.loading import load
 from configs.resolve import schedule
 from fleetloop.launch.accounts import stats_of
@@ -28,7 +29,7 @@ SCENARIO = load("two_robots")
 SCHEDULE = schedule(SCENARIO)
 
 
-HONEST = ["", "", [], [], [], 0, {}, {}]
+HONEST = ["", "", [], [], [], [], 0, {}, {}]
 OWN = {"plant": [0, {}, {}, {}, [], {}], "agent/r1": ["", 0, None, {}]}
 
 
@@ -45,26 +46,31 @@ def said(process: str, changes: dict[int, object]) -> bytes:
         ("agent/r1", {0: 2}),
         ("agent/r1", {1: b"bytes"}),
         ("agent/r1", {1: "x" * (MAX_TEXT + 1)}),
-        ("agent/r1", {3: ["x" * MAX_TEXT, "x"]}),
+        ("agent/r1", {4: ["x" * MAX_TEXT, "x"]}),
+        ("agent/r1", {4: "text"}),
         ("agent/r1", {3: "text"}),
-        ("agent/r1", {6: inf}),
-        ("agent/r1", {6: nan}),
-        ("agent/r1", {6: 2**63}),
-        ("agent/r1", {6: True}),
-        ("agent/r1", {6: None}),
-        ("agent/r1", {7: {"x" * 1000: 1}}),
-        ("agent/r1", {7: {1: 1}}),
-        ("agent/r1", {7: {"bus": 0.5}}),
-        ("agent/r1", {8: {f"name {n}": n for n in range(5000)}}),
-        ("agent/r1", {11: [1]}),
-        ("agent/r1", {12: 0}),
-        ("agent/r1", {12: {"r2": {"sent": 0.5}}}),
-        ("agent/r1", {12: {"r2": 5}}),
-        ("plant", {11: {"r1": 1}}),
-        ("plant", {13: [[200, inf]]}),
-        ("plant", {13: [[200]]}),
-        ("plant", {13: [[n, 0.1] for n in range(1000)]}),
-        ("recorder", {9: 0}),
+        ("agent/r1", {3: [[0, "r1", "exploded", ""]]}),
+        ("agent/r1", {3: [[0, "r1", "stopped"]]}),
+        ("agent/r1", {3: ["stopped"]}),
+        ("agent/r1", {3: [[0, "r1", "stopped", ""]] * (MAX_EVENTS + 1)}),
+        ("agent/r1", {7: inf}),
+        ("agent/r1", {7: nan}),
+        ("agent/r1", {7: 2**63}),
+        ("agent/r1", {7: True}),
+        ("agent/r1", {7: None}),
+        ("agent/r1", {8: {"x" * 1000: 1}}),
+        ("agent/r1", {8: {1: 1}}),
+        ("agent/r1", {8: {"bus": 0.5}}),
+        ("agent/r1", {9: {f"name {n}": n for n in range(5000)}}),
+        ("agent/r1", {12: [1]}),
+        ("agent/r1", {13: 0}),
+        ("agent/r1", {13: {"r2": {"sent": 0.5}}}),
+        ("agent/r1", {13: {"r2": 5}}),
+        ("plant", {12: {"r1": 1}}),
+        ("plant", {14: [[200, inf]]}),
+        ("plant", {14: [[200]]}),
+        ("plant", {14: [[n, 0.1] for n in range(1000)]}),
+        ("recorder", {10: 0}),
     ],
 )
 def test_a_report_that_is_none_is_refused_and_its_sender_named(process, changes) -> None:
@@ -81,26 +87,38 @@ def test_no_process_can_send_the_report_of_another_role() -> None:
 
 
 def test_what_a_terminal_would_obey_is_replaced_in_names_and_texts() -> None:
-    texts = {3: ["1st\n\x1b]0;owned\x07\x9b31m\u202e2nd\x7f"], 7: {"b\x1b[2Jus": 1}}
+    texts = {4: ["1st\n\x1b]0;owned\x07\x9b31m\u202e2nd\x7f"], 8: {"b\x1b[2Jus": 1}}
     report = MessageReader(SCHEDULE).report("agent/r1", said("agent/r1", texts))
     assert report is not None
-    assert report.notices == ("1st\n\ufffd]0;owned\ufffd\ufffd31m\ufffd2nd\ufffd",)
+    assert report.remarks == ("1st\n\ufffd]0;owned\ufffd\ufffd31m\ufffd2nd\ufffd",)
     assert report.durations_ns == {"b\ufffd[2Jus": 1}
 
 
 def test_an_honest_report_that_is_too_long_arrives_without_its_end() -> None:
-    notices = ("x" * (MAX_TEXT - 1), "yz", "nothing of this")
-    report = AgentReport.decode(AgentReport(notices=notices, failure="x" * 2 * MAX_TEXT).encode())
-    assert report == AgentReport(notices=("x" * (MAX_TEXT - 1), "y"), failure="x" * MAX_TEXT)
+    remarks = ("x" * (MAX_TEXT - 1), "yz", "nothing of this")
+    report = AgentReport.decode(AgentReport(remarks=remarks, failure="x" * 2 * MAX_TEXT).encode())
+    assert report == AgentReport(remarks=("x" * (MAX_TEXT - 1), "y"), failure="x" * MAX_TEXT)
+
+
+def test_of_too_many_or_too_long_events_the_first_arrive_and_what_their_texts_have_room_for() -> (
+    None
+):
+    events = tuple(Event(tick, "r1", "stopped", "x" * 300) for tick in range(MAX_EVENTS + 9))
+    report = AgentReport.decode(AgentReport(events=events).encode())
+    assert report is not None
+    assert [event.tick for event in report.events] == list(range(MAX_EVENTS))
+    assert sum(len(event.text) for event in report.events) == MAX_TEXT
 
 
 names = st.text(max_size=8)
 counts = st.dictionaries(names, st.integers(-(2**63), 2**63 - 1), max_size=4)
 texts = st.lists(names, max_size=4).map(tuple)
+events = st.builds(Event, st.integers(-9, 2**40), names, st.sampled_from(sorted(KINDS)), names)
 common = {
     "failure": names,
     "left_early": names,
-    "notices": texts,
+    "events": st.lists(events, max_size=4).map(tuple),
+    "remarks": texts,
     "flooders": texts,
     "missing_privileges": texts,
     "cpu_ns": st.integers(0, 2**62),

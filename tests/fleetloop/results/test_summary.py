@@ -143,7 +143,7 @@ def test_a_stop_is_told_once(finished_run: Path) -> None:
     summary["stopped_robots"] = {"r1": "tick 3 (t = 0.006 s): no encoder frames any more"}
     notices = [
         "tick 2 (t = 0.004 s): odd",
-        "tick 3 (t = 0.006 s): STOPPED: no encoder frames any more",
+        "tick 3 (t = 0.006 s): stopped: no encoder frames any more",
     ]
     summary["notices"] = {"r1": notices}
     assert list(trouble_lines(summary)) == [

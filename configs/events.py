@@ -1,0 +1,77 @@
+"""Events of a run: what happened at a tick, in a fixed vocabulary and in words.
+
+    source    a robot by its name, "bus/<name>", or a process ("plant", "launcher")
+    kind      a key of `KINDS`
+
+An event is exact if scenario and seed determine it: in lockstep its tick, text and place in the
+list are the same in every run. Others are about machines, processes and other programs.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+MAX_EVENTS = 512
+"""Of one process; later ones are dropped."""
+MAX_EVENT_TEXT = 500
+"""Characters."""
+
+
+class Event(NamedTuple):
+    """One event; ticks below 0 are the countdown."""
+
+    tick: int
+    source: str
+    kind: str
+    text: str = ""
+
+
+class EventKind(NamedTuple):
+    """A kind of event."""
+
+    meaning: str
+    exact: bool = True
+    told: bool = True
+    """It is a notice: said while the run goes on, and listed with the results."""
+
+
+KINDS: dict[str, EventKind] = {
+    "armed": EventKind("both drives of a robot are in closed loop, before tick 0", told=False),
+    "drive_error": EventKind(
+        "a drive dropped out or fell silent, as the robot's controller saw it", told=False
+    ),
+    "stopped": EventKind("a controller took the torque from both wheels"),
+    "rearming": EventKind("a robot that had stopped begins to arm"),
+    "rearmed": EventKind("a robot that had stopped drives again"),
+    "joined": EventKind("a robot joins the formation late"),
+    "rejoined": EventKind("a robot joins the formation again after a restart of its controller"),
+    "left": EventKind("a robot leaves the formation, as the scenario has it"),
+    "diverged": EventKind("the motion of a body left its bounds"),
+    "law": EventKind("a law recorded a number that isn't finite"),
+    "bus_trouble": EventKind("a bus failed, or drives ignored frames", exact=False),
+    "stalled": EventKind("a process, or its machine, stood still", exact=False),
+    "silent": EventKind("a process shows no sign of life", exact=False),
+    "cut_off": EventKind("the network to a process, or its machine, went", exact=False),
+    "back": EventKind("a process that was silent or cut off is there again", exact=False),
+    "restarted": EventKind("a controller's process ended and is started again", exact=False),
+}
+"""The vocabulary, by name."""
+
+
+def when(tick: int, period_ns: int) -> str:
+    """A tick in words."""
+    return f"tick {tick} (t = {tick * period_ns * 1e-9:.3f} s)"
+
+
+def told(event: Event, period_ns: int) -> str:
+    """An event in words, but for its source."""
+    text = f": {event.text}" if event.text else ""
+    return f"{when(event.tick, period_ns)}: {event.kind}{text}"
+
+
+def in_order(events: Iterable[Event], robots: Sequence[str]) -> list[Event]:
+    """Events by tick, then by source: robots in their order, then others by name.
+
+    Events of one source at one tick stay in their order.
+    """
+    ranks = {robot: rank for rank, robot in enumerate(robots)}
+    return sorted(events, key=lambda it: (it.tick, ranks.get(it.source, len(ranks)), it.source))
