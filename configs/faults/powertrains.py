@@ -12,7 +12,7 @@ from configs.parameters import parameter
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveEvent(WheelFault):
-    """The drive stops by itself: emergency stop, watchdog, or a restart of its firmware."""
+    """The drive disarms by itself: emergency stop, watchdog, or its firmware boots anew."""
 
     INSTANT: ClassVar[bool] = True
     kind: Literal["drive_estop", "drive_watchdog", "drive_reboot"]
@@ -31,7 +31,7 @@ class DriveError(WheelFault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorTorque(WheelFault):
-    """The motor makes another torque than it is asked for."""
+    """The motor makes its last torque (stuck), or half, none (zero) or the reverse of its demand."""
 
     kind: Literal["torque_stuck", "torque_half", "torque_zero", "torque_reversed"]
 
@@ -65,7 +65,7 @@ class OverVoltage(RobotFault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EncoderState(WheelFault):
-    """The encoder says the same all the time, or counts backwards."""
+    """The encoder stands still (freeze) or counts backwards; afterwards it counts on from there."""
 
     kind: Literal["encoder_freeze", "encoder_sign_flip"]
 
@@ -81,7 +81,7 @@ class EncoderJump(WheelFault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EncoderNoise(WheelFault):
-    """Noise of the encoder's position."""
+    """White noise of the shaft's angle where it is counted, beside the encoder's own."""
 
     kind: Literal["encoder_noise"]
     counts_rms: Annotated[float, Gt(0), Le(1e6)] = 2.0
@@ -89,7 +89,7 @@ class EncoderNoise(WheelFault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EncoderSlip(WheelFault):
-    """The encoder loses this share of its counts, in either direction."""
+    """The encoder loses this share of its counts in either direction; only an index finds them."""
 
     kind: Literal["encoder_slip"]
     share: Probability = 0.01
