@@ -31,7 +31,7 @@ class DriveError(WheelFault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorTorque(WheelFault):
-    """The motor makes its last torque (stuck), or half, none (zero) or the reverse of its demand."""
+    """The motor makes its last torque (stuck), or half, none (zero) or minus its demand."""
 
     kind: Literal["torque_stuck", "torque_half", "torque_zero", "torque_reversed"]
 
