@@ -13,6 +13,7 @@ import can
 
 from agents.agent import Agent
 from agents.guard import Phase
+from agents.inputs import LoggedAgent
 from agents.lockstep import LockstepCounters, LockstepLoop, deliver
 from agents.realtime import RealtimeCounters, RealtimeLoop
 from agents.subscriptions import Subscriptions
@@ -22,6 +23,7 @@ from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.client import StoppedError, open_polled
 from bridge.network.clock_exchange import answer_pings
+from bridge.network.inputs import InputBuffer
 from bridge.network.launcher import LauncherWatch
 from bridge.network.link import Arrival, Link, Publisher
 from bridge.network.messages import Notice, Rows
@@ -75,11 +77,12 @@ def _run(
     path = link.publisher(keys.path(name, robot))
     telemetry = link.publisher(keys.telemetry(name, robot))
     report = link.publisher(keys.report(name, AGENT.process(robot)))
-    rows = RowBuffer(
-        row_of(brief.signals),
-        lambda first, count, block, final: telemetry.put(Rows(first, count, block, final).encode()),
-    )
-    agent = Agent(brief, rows)
+    rows = RowBuffer(row_of(brief.signals), partial(_put, telemetry))
+    log = None
+    if brief.logs_inputs:
+        inputs = link.publisher(keys.inputs(name, robot))
+        log = InputBuffer(lambda first, block, final: _put(inputs, first, len(block), block, final))
+    agent = Agent(brief, rows) if log is None else LoggedAgent(brief, rows, log)
     notice = link.publisher(keys.notice(name, AGENT.process(robot)))
     agent.guard.announce = lambda event: notice.put(Notice(event).encode())
     link.subscribe(keys.pose(name, robot), "pose")
@@ -95,8 +98,14 @@ def _run(
         hellos.add(path, agent.share(-1).encode())
         hellos.add(telemetry, Rows(0, 0, b"", False).encode())
     run_loop = _realtime if brief.schedule.realtime else _lockstep
-    connections = _Connections(agent, bus, link, subscriptions, path, hellos, rows, report, watch)
+    connections = _Connections(
+        agent, bus, link, subscriptions, path, hellos, rows, report, watch, log
+    )
     return run_loop(connections, stop)
+
+
+def _put(publisher: Publisher, first: int, count: int, block: bytes, final: bool) -> None:
+    publisher.put(Rows(first, count, block, final).encode())
 
 
 class _Connections(NamedTuple):
@@ -111,6 +120,7 @@ class _Connections(NamedTuple):
     rows: RowBuffer
     report: Publisher
     watch: LauncherWatch | None = None
+    inputs: InputBuffer | None = None
 
     def await_peers(self, deliver: Callable[[Arrival], None], stop: Stop) -> None:
         """Wait for the first message of every peer, then declare this controller ready."""
@@ -150,6 +160,8 @@ class _Connections(NamedTuple):
             self.stop_wheels()
             early = stop.reason
             self.rows.finish()
+            if self.inputs is not None:
+                self.inputs.finish()
             guard = self.agent.guard
             report = AgentReport(
                 failure=failure,

@@ -31,6 +31,7 @@ goes through the same phases without a frame. Its only inputs are frames, messag
 """
 
 from collections.abc import Sequence
+from enum import StrEnum
 from math import hypot, inf, isfinite, nan
 from typing import Any
 
@@ -59,8 +60,19 @@ POSE_HISTORY_TICKS = 64
 """Longest age of a fix in real time [ticks]."""
 
 
+class Trouble(StrEnum):
+    """What a loop knows of the world around a controller that goes wrong for a while."""
+
+    BUS = "bus"  # sends fail
+    LAUNCHER = "launcher"  # the way to it is cut
+    MACHINE = "machine"  # ticks are late
+
+
 class Agent:
-    """The controller of one robot. Pure: frames, messages and ticks in, frames out."""
+    """The controller of one robot. Pure: frames, messages and ticks in, frames out.
+
+    What its methods are given is all that it depends on: `agents.inputs` logs and repeats it.
+    """
 
     def __init__(self, brief: AgentBrief, rows: RowBuffer) -> None:
         self.brief = brief
@@ -121,7 +133,7 @@ class Agent:
         self.closed = False
         """Whether the closing tick has come."""
         self.late_s = self.round_trip_s = 0.0
-        """Lateness and feedback round trip at this tick [s], set by the loop, for the record."""
+        """Lateness and feedback round trip at this tick [s], for the record."""
         self.on_frame = self._drives.on_frame
         """Process a frame from the bus: identifier, data, bus time of reception [ns]."""
 
@@ -145,6 +157,37 @@ class Agent:
     def remarks(self) -> list[str]:
         """Remarks on the whole run for the report, in words."""
         return [*self._guard.remarks(), *self.refusals()]
+
+    # --- notes of the loop in real time ------------------------------------------------------
+
+    def end_at(self, tick: int) -> None:
+        """Close a run at this tick that ends before its scenario."""
+        self.last_tick = tick
+
+    def keep_time(self, now_ns: int, late_s: float, round_trip_s: float) -> None:
+        """Take the wall clock before a tick.
+
+        Args:
+            now_ns: scenario time by the wall clock.
+            late_s: from the tick's due time to its computation.
+            round_trip_s: from the last torques sent to their feedback; NaN: it has not come.
+        """
+        self.admission.now_ns = now_ns
+        self.late_s, self.round_trip_s = late_s, round_trip_s
+
+    def note_trouble(self, source: Trouble, text: str | None) -> None:
+        """Note a trouble around the controller; None: it is over."""
+        match source:
+            case Trouble.BUS:
+                self._guard.bus_fault = text
+            case Trouble.LAUNCHER:
+                self._guard.note_fault("launcher", text)
+            case Trouble.MACHINE:
+                self._guard.stalled = text or ""
+
+    def note_unsent(self, tick: int) -> None:
+        """Note that the frames of this tick were not sent."""
+        self._guard.note_unsent(tick)
 
     # --- one period --------------------------------------------------------------------------
 

@@ -64,9 +64,9 @@ class Guard:
         self.announce: Callable[[Event], None] = lambda _: None
         """Callback for each event; set by the controller process."""
         self.stalled = ""
-        """The reason for late ticks at present, "" if ticks are on time; see `note_stall`."""
+        """The reason for late ticks at present, "" if ticks are on time; set by the agent."""
         self.bus_fault: str | None = None
-        """The fault of the bus, None if sends succeed; set by the loop."""
+        """The fault of the bus, None if sends succeed; set by the agent."""
         self._brief = brief
         self._bus_time_ns = schedule.bus_time_ns
         self._when = schedule.when
@@ -93,11 +93,6 @@ class Guard:
             self._noted_faults[source] = reason
         elif self._noted_faults:
             self._noted_faults.pop(source, None)
-
-    def note_stall(self, tick: int, reason: str) -> None:
-        """Note the reason for late ticks from this one on; set `stalled` to "" afterwards."""
-        self.stalled = reason
-        self.note(tick, "stalled", reason)
 
     def note(self, tick: int, kind: str, text: str = "") -> None:
         """Record and announce an event."""

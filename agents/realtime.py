@@ -18,7 +18,7 @@ from math import nan
 
 import can
 
-from agents.agent import Agent
+from agents.agent import Agent, Trouble
 from agents.bus_health import BusHealth
 from agents.guard import Phase
 from agents.lockstep import deliver, did_not_start
@@ -100,6 +100,7 @@ class RealtimeLoop:
         self._most_arrivals = ARRIVALS_PER_TICK + 2 * len(agent.brief.hears)
         self._power_up_ns = 0
         self._sent_ns = 0  # send time of torques without feedback; 0: none
+        self._round_trip_s = 0.0  # of the last torques whose feedback came; NaN: a miss since
         self.counters = RealtimeCounters()
 
     def await_go(self, stop: Stop) -> int | None:
@@ -141,7 +142,7 @@ class RealtimeLoop:
         if far := implausible_start(epoch_ns, within_s, self._clock):
             refusals.note("go", LAUNCHER.name, "clocks", far)
             return None
-        self._agent.last_tick = min(self._schedule.ticks, max(go.ticks, 0))
+        self._agent.end_at(min(self._schedule.ticks, max(go.ticks, 0)))
         return epoch_ns
 
     def run(self, epoch_ns: int, stop: Stop) -> None:
@@ -165,19 +166,19 @@ class RealtimeLoop:
             due_ns = epoch_ns + tick * period_ns + phase_ns
             self._read_until(due_ns)
             now_ns = self._clock.monotonic_ns()
-            agent.late_s = late_s = (now_ns - due_ns) * 1e-9
+            late_s = (now_ns - due_ns) * 1e-9
             if lateness.note(tick, late_s):
                 self._name_stall(tick, late_s)
             elif agent.guard.stalled and not lateness.late:
-                agent.guard.stalled = ""
+                agent.note_trouble(Trouble.MACHINE, None)
             if self._sent_ns and tick > 0:
                 self.counters.misses += 1
-                agent.round_trip_s = nan
+                self._round_trip_s = nan
             if self._watch is not None and self._watch.away is not self._away:
                 self._away = self._watch.away
-                agent.guard.note_fault("launcher", CUT_OFF if self._away else None)
+                agent.note_trouble(Trouble.LAUNCHER, CUT_OFF if self._away else None)
                 agent.guard.note(tick, "cut_off" if self._away else "back", "the launcher")
-            agent.admission.now_ns = now_ns - epoch_ns
+            agent.keep_time(now_ns - epoch_ns, late_s, self._round_trip_s)
             self._receive_messages()
             frames = agent.step(tick) if not stop.requested else agent.shut_down()
             overdue = now_ns >= due_ns + period_ns and agent.phase is Phase.DRIVING
@@ -199,10 +200,9 @@ class RealtimeLoop:
     def _name_stall(self, tick: int, late_s: float) -> None:
         """Note a stall: a fault soon after it may be its consequence."""
         text = f"this controller, or its machine, stalled for {late_s:.2f} s"
+        self._agent.note_trouble(Trouble.MACHINE, text)
         if late_s > STALL_S:
-            self._agent.guard.note_stall(tick, text)
-        else:
-            self._agent.guard.stalled = text
+            self._agent.guard.note(tick, "stalled", text)
 
     def _drop_backlog(self) -> None:
         """Drop queued frames: processed late, they would look like those of a second drive.
@@ -228,18 +228,18 @@ class RealtimeLoop:
                     self._echoes.sent(Frame(can_id, data), self._clock.monotonic_s())
         except (can.CanError, OSError) as error:
             self._on_bus_error(error)
-            self._agent.guard.note_unsent(tick)
+            self._agent.note_unsent(tick)
         else:
             self._sent_ns = self._clock.monotonic_ns()
             if health.since_ns is not None:
                 health.sent()
-                self._agent.guard.bus_fault = None
+                self._agent.note_trouble(Trouble.BUS, None)
 
     def _on_bus_error(self, error: Exception) -> None:
         """Count an error of the bus; stop the wheels if it lasts; raise if it is final."""
         health, now_ns = self._health, self._clock.monotonic_ns()
         health.failed(error, now_ns)
-        self._agent.guard.bus_fault = health.fault(now_ns)
+        self._agent.note_trouble(Trouble.BUS, health.fault(now_ns))
         self.counters.unsent = health.unsent
 
     def _read_until(self, due_ns: int) -> None:
@@ -270,5 +270,5 @@ class RealtimeLoop:
                 continue
             agent.on_frame(can_id, message.data, bus_ns)
             if self._sent_ns and agent.feedback_since(self._sent_ns - self._power_up_ns):
-                agent.round_trip_s = (came_ns - self._sent_ns) * 1e-9
+                self._round_trip_s = (came_ns - self._sent_ns) * 1e-9
                 self._sent_ns = 0

@@ -178,6 +178,7 @@ class AgentBrief:
     network: NetworkLink
     detached: bool = False  # no launcher is its parent: the run's end is when the launcher's
     # token on the network goes
+    logs_inputs: bool = False  # for a replay
     rejoins: bool = False  # in real time, a run that goes on; another process was its controller
 
     @property
@@ -304,3 +305,4 @@ class RecorderBrief:
     ticks: int  # of the run: no rows are of later ones
     last_frame_ns: int  # bus time after which no frame ends
     fills_gaps: bool = False  # sources may be cut off or start again: missing rows aren't numbers
+    inputs: bool = False  # controllers log theirs

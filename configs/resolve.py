@@ -98,6 +98,7 @@ def agent_brief(
         phase_ns=round(scenario.names.index(name) * ticks.period_ns / len(scenario.names)),
         bus=bus,
         network=network,
+        logs_inputs=scenario.records_inputs,
     )
 
 

@@ -27,6 +27,7 @@ class Topic(Enum):
     OWN_PATH = auto()
     OWN_POSE = auto()
     OWN_TELEMETRY = auto()
+    OWN_INPUTS = auto()
     PATHS_OF_IN_NEIGHBOURS = auto()
     POSES_OF_LOCATED_NEIGHBOURS = auto()  # whose distance changes the emulated network
     LEADER_SPEED = auto()  # of robots with h_i = 1
@@ -34,6 +35,7 @@ class Topic(Enum):
     MEASURED_POSES = auto()  # of the robots that it doesn't
     TRUTHS = auto()
     TELEMETRIES = auto()
+    INPUTS = auto()
     TRAFFIC = auto()
     GO = auto()
 
@@ -84,7 +86,7 @@ AGENT = Role(
     brief=AgentBrief,
     per_robot=True,
     forked=True,
-    puts=(Topic.OWN_PATH, Topic.OWN_TELEMETRY),
+    puts=(Topic.OWN_PATH, Topic.OWN_TELEMETRY, Topic.OWN_INPUTS),
     hears=(
         Topic.OWN_POSE,
         Topic.GO,
@@ -100,7 +102,7 @@ RECORDER = Role(
     brief=RecorderBrief,
     beside_launcher=True,
     observer=True,
-    hears=(Topic.TRUTHS, Topic.TRAFFIC, Topic.TELEMETRIES),
+    hears=(Topic.TRUTHS, Topic.TRAFFIC, Topic.TELEMETRIES, Topic.INPUTS),
 )
 LOCALISATION = Role(name="localisation", puts=(Topic.MEASURED_POSES,), hears=(Topic.GO,))
 

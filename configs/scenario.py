@@ -43,6 +43,7 @@ from configs.sections import (
     Localisation,
     Mounting,
     Network,
+    Recording,
     Robot,
 )
 from configs.switching import switched
@@ -84,6 +85,7 @@ class Scenario(BaseModel):
     host: Host = Host()
     disturbance: Disturbance = Disturbance()
     network: Network = Network()
+    record: Recording = Recording()
     robot_types: dict[Name, Body] = Field(default_factory=dict)
     robot: Annotated[tuple[Robot, ...], Len(1, 256)]
     fault: Annotated[tuple[AnyFault, ...], Len(0, 1000)] = ()
@@ -122,6 +124,12 @@ class Scenario(BaseModel):
             of_robots=False,
         )
         return (*(edge.speaker for edge in self.topology.hears[name]), *others)
+
+    @property
+    def records_inputs(self) -> bool:
+        """Whether the inputs of the controllers are recorded."""
+        chosen = self.record.inputs
+        return self.clock.mode == "realtime" if chosen is None else chosen
 
     @cached_property
     def ages_vary(self) -> bool:

@@ -214,6 +214,17 @@ class Bus(Parameters):
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recording(Parameters):
+    """What a run records beside all signals and the buses."""
+
+    inputs: bool | None = parameter(
+        None,
+        "all that reaches each controller, for `fleetloop replay`; if not given in real time only,"
+        " as a run in lockstep can be repeated",
+    )
+
+
 PROTOCOL = Chooser(Kind.DRIVE, "protocol", DRIVES, DEFAULT, Drive)
 DriveChoice = Annotated[Choice, PROTOCOL]
 """The drive protocol and its section, in one table."""

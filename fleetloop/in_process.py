@@ -10,8 +10,10 @@ from typing import NamedTuple, Protocol
 
 from agents.agent import Agent
 from agents.bus_clock import BusClock
+from agents.inputs import LoggedAgent
 from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.frame import Frame
+from bridge.network.inputs import InputBuffer
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix, Progress
 from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer, row_of
 from bridge.process.clock import SYSTEM_CLOCK, Clock
@@ -37,6 +39,9 @@ class Keeper(Protocol):
 
     def traffic(self, bus: str, frames: bytes) -> None:
         """Take what crossed a bus."""
+
+    def inputs(self, robot: str, first: int, block: bytes, final: bool) -> None:
+        """Take a block of a controller's input log."""
 
 
 class _Controller(NamedTuple):
@@ -138,8 +143,16 @@ class InProcessRun:
             RowBuffer(row_of(brief.signals), partial(_write, writer, brief.robot, "controller"))
             for brief in agents
         ]
+        self._inputs = {
+            brief.robot: InputBuffer(partial(writer.inputs, brief.robot))
+            for brief in agents
+            if brief.logs_inputs
+        }
         self._agents = [
-            Agent(brief, rows) for brief, rows in zip(agents, self._telemetry, strict=True)
+            LoggedAgent(brief, rows, self._inputs[brief.robot])
+            if brief.logs_inputs
+            else Agent(brief, rows)
+            for brief, rows in zip(agents, self._telemetry, strict=True)
         ]
         self._locators = {
             brief.robot: [agent for agent in self._agents if brief.robot in agent.brief.located]
@@ -228,6 +241,8 @@ class InProcessRun:
             self._run(stop)
         for rows in (*self._truths, *self._telemetry):
             rows.finish()
+        for inputs in self._inputs.values():
+            inputs.finish()
         for log in self._logs.values():
             log.finish()
 

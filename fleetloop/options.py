@@ -94,6 +94,7 @@ def overrides_of(
     clock: str | None = None,
     seed: int | None = None,
     duration: float | None = None,
+    record_inputs: bool = False,
 ) -> "Overrides":
     """Overrides from the options; errors in them name the option."""
     from configs.overrides import Override
@@ -108,6 +109,8 @@ def overrides_of(
         for flag, key, value in said
         if value is not None
     ]
+    if record_inputs:
+        named.append(Override("--record-inputs", "record.inputs", True))
     return (*(overrides or ()), *named)
 
 

@@ -2,7 +2,7 @@
 
 The graph *is* the network. The router refuses everything that isn't listed (default deny), and each
 process is bound to its identity by a random password that it alone is given. The rights of a role
-are in its row of `configs.roles`: of an agent its own path and telemetry to put, and to hear the
+are in its row of `configs.roles`: of an agent its own path, rows and inputs to put, and to hear the
 paths of exactly its in-neighbours, its own pose, and leader/speed iff h_i = 1. Every role that a
 run starts also puts progress, notices and its report. Besides the roles there are guests, clients
 of buses on other machines: they put their lines up and hear their lines down; which buses they may
@@ -199,12 +199,14 @@ class _Graph(NamedTuple):
             Topic.OWN_PATH: (keys.path, [robot]),
             Topic.OWN_POSE: (keys.pose, [robot]),
             Topic.OWN_TELEMETRY: (keys.telemetry, [robot]),
+            Topic.OWN_INPUTS: (keys.inputs, [robot]),
             Topic.PATHS_OF_IN_NEIGHBOURS: (keys.path, self.hears.get(robot, ())),
             Topic.POSES_OF_LOCATED_NEIGHBOURS: (keys.pose, self.located.get(robot, ())),
             Topic.EMULATED_POSES: (keys.pose, emulated),
             Topic.MEASURED_POSES: (keys.pose, measured),
             Topic.TRUTHS: (keys.truth, self.robots),
             Topic.TELEMETRIES: (keys.telemetry, self.robots),
+            Topic.INPUTS: (keys.inputs, self.robots),
             Topic.TRAFFIC: (keys.traffic, self.buses),
         }[topic]
         return [key_of(run, name) for name in names]

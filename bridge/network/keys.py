@@ -4,6 +4,7 @@
     fleetloop/<run>/robot/<name>/pose        from the localisation system to the robot
     fleetloop/<run>/robot/<name>/truth       the plant's rows, to the recorder
     fleetloop/<run>/robot/<name>/telemetry   the controller's rows, to the recorder
+    fleetloop/<run>/robot/<name>/inputs      the controller's input log, to the recorder
     fleetloop/<run>/can/<bus>/traffic        what crosses a bus, to the recorder
     fleetloop/<run>/leader/speed             v_r; heard by the robots with h_i = 1
     fleetloop/<run>/@live/<process>          liveliness token: "ready"
@@ -51,6 +52,11 @@ def traffic(run: str, bus: str) -> str:
 def telemetry(run: str, robot: str) -> str:
     """Key of a controller's record."""
     return f"{_run(run)}/robot/{_chunk(robot)}/telemetry"
+
+
+def inputs(run: str, robot: str) -> str:
+    """Key of a controller's input log."""
+    return f"{_run(run)}/robot/{_chunk(robot)}/inputs"
 
 
 def leader_speed(run: str) -> str:

@@ -10,7 +10,8 @@ still be impossible: readers that know the run check that.
     PathState      [1, tick, t_ns, s, v_hat]                     robot/<name>/path
     PoseFix        [1, tick, t_ns, x_m, y_m, theta_rad]          robot/<name>/pose
     LeaderSpeed    [1, [[from_t_ns, speed_m_s, ramp_ns], ...]]   leader/speed
-    Rows           [1, first_tick, length, rows, final]          robot/<name>/truth, telemetry
+    Rows           [1, first_tick, length, rows, final]          robot/<name>/truth, telemetry;
+                                                                 robot/<name>/inputs: bytes
     Progress       [1, tick, t_ns, wall_ns]                      @progress/<process>
     Notice         [1, tick, source, kind, text]                 @notice/<process>
     Go             [1, epoch_ns, ticks]                          @clock/go
@@ -32,6 +33,7 @@ MOST_BYTES = {
     "notice": 1 << 12,
     "truth": 1 << 16,
     "telemetry": 1 << 16,
+    "inputs": 1 << 16,
     "traffic": 1 << 16,
     "report": MAX_BYTES,
     "up": 1 << 16,

@@ -47,6 +47,9 @@ class _Notebook:
     def traffic(self, bus: str, frames: bytes) -> None:
         pass
 
+    def inputs(self, robot: str, first: int, block: bytes, final: bool) -> None:
+        pass
+
     def rows(self, robot: str, signals: Sequence[Signal]) -> np.ndarray:
         layout = np.dtype([(signal.name, "<f8") for signal in signals])
         return np.frombuffer(b"".join(self.blocks.get(robot, [])), layout)

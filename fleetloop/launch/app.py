@@ -60,6 +60,14 @@ def run(
             "--profile", help="Sample and print the processor time of each part of a tick."
         ),
     ] = False,
+    record_inputs: Annotated[
+        bool,
+        typer.Option(
+            "--record-inputs",
+            help="Record all that reaches each controller, for fleetloop replay; in real time that"
+            " is the default.",
+        ),
+    ] = False,
     figures: Annotated[
         bool, typer.Option("--report/--no-report", help="Make report.html and the figures.")
     ] = True,
@@ -82,7 +90,9 @@ def run(
     options = RunOptions(
         in_process=in_process,
         speed=speed,
-        overrides=overrides_of(overrides, clock=clock, seed=seed, duration=duration),
+        overrides=overrides_of(
+            overrides, clock=clock, seed=seed, duration=duration, record_inputs=record_inputs
+        ),
         out=out,
         as_json=as_json,
         figures=figures,

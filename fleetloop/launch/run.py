@@ -209,6 +209,7 @@ def run_in_process(
                 period_ns,
                 buses=scenario.buses,
                 formats=scenario.bus.record,
+                inputs=scenario.names if scenario.records_inputs else (),
             ) as file,
             BackgroundWriter(file) as writer,
         ):

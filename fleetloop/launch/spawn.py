@@ -153,6 +153,7 @@ def _recorder(place: Place) -> RecorderBrief:
         ticks.ticks,
         ticks.bus_time_ns(ticks.ticks) + AFTERWARDS_NS,
         fills_gaps=orders.deployment.may_rejoin or orders.scenario.host.restarts > 0,
+        inputs=orders.scenario.records_inputs,
     )
 
 

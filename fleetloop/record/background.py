@@ -44,6 +44,11 @@ class BackgroundWriter:
         self._raise()
         self._blocks.put(partial(self._record.traffic, bus, frames))
 
+    def inputs(self, robot: str, first: int, block: bytes, final: bool) -> None:
+        """As `RunRecord.inputs`; what failed earlier is raised here."""
+        self._raise()
+        self._blocks.put(partial(self._record.inputs, robot, first, block, final))
+
     def close(self) -> None:
         """Wait until everything is written."""
         self._blocks.put(None)

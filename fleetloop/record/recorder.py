@@ -39,7 +39,12 @@ ROOM_BYTES = 1 << 26
 """Of what waits of one source: a slow disk may take its time."""
 _TIME = struct.Struct("<d")
 """t_s, the first signal of every row."""
-_WHOSE = {"plant": "the plant for {}", "controller": "{}'s controller", "can": "bus {}"}
+_WHOSE = {
+    "plant": "the plant for {}",
+    "controller": "{}'s controller",
+    "can": "bus {}",
+    "inputs": "the inputs of {}'s controller",
+}
 
 
 class _Recorder:
@@ -54,18 +59,23 @@ class _Recorder:
         self._gaps: Counter[str] = Counter()  # blocks in a row that leave one, by source
         sources = {f"{kind}/{r}" for r in brief.robots for kind in ("plant", "controller")}
         sources |= {f"can/{bus}" for bus in brief.buses}
+        inputs = {f"inputs/{robot}" for robot in brief.robots if brief.inputs}
         sizes = zip(brief.robots, (row_of(one).size for one in brief.controllers), strict=True)
         self._row_sizes = {f"controller/{robot}": size for robot, size in sizes}
         self._row_sizes |= {f"plant/{robot}": PLANT_ROW.size for robot in brief.robots}
         self._row_sizes |= {f"can/{bus}": FRAME_ROW.size for bus in brief.buses}
+        self._row_sizes |= dict.fromkeys(inputs, 1)
+        self._lost_inputs: dict[str, int] = {}  # by tag, the byte from which on they are missing
         self.unheard = set(sources)
-        self.unfinished = set(sources)
+        self.unfinished = sources | inputs
         self.ticks = 0
 
     def process(self, arrival: Arrival) -> bool:
         """Store what may be stored; return whether the record has more now."""
         kind, _, robot = arrival.tag.partition("/")
         rows = Rows.decode(arrival.payload, self._row_sizes[arrival.tag])
+        if rows is not None and kind == "inputs":
+            return self._store_inputs(arrival.tag, robot, rows)
         if rows is not None and self._fills_gaps and kind != "can":
             self._fill_gap(arrival.tag, rows)
         wrong = "not well formed" if rows is None else self._wrong(kind, robot, rows)
@@ -119,10 +129,33 @@ class _Recorder:
 
     def gaps(self) -> list[str]:
         """The rows that did not come, in words."""
-        return [
+        rows = [
             f"{count} rows of {_whose(tag)} did not come: not a number"
             for tag, count in self._filled.items()
         ]
+        inputs = [
+            f"{_whose(tag)} are missing from byte {at} of their log on"
+            for tag, at in self._lost_inputs.items()
+        ]
+        return rows + inputs
+
+    def _store_inputs(self, tag: str, robot: str, rows: Rows) -> bool:
+        """Store a block of an input log; after one that did not come a log can't go on.
+
+        A controller that was started again begins a new one.
+        """
+        expected = self._record.next_input(robot)
+        again = rows.first_tick == 0 and rows.length > 0 and expected > 0
+        if rows.first_tick == expected or (again and self._fills_gaps):
+            self._record.inputs(robot, rows.first_tick, rows.rows, rows.final)
+        elif rows.first_tick > expected:
+            self._lost_inputs.setdefault(tag, expected)
+        else:
+            self._refuse(tag, f"begins at byte {rows.first_tick}, expected {expected}")
+            return False
+        if rows.final:
+            self.unfinished.discard(tag)
+        return True
 
     def note_dropped(self, dropped: Iterable[Dropped]) -> None:
         """Count what found no room."""
@@ -130,7 +163,8 @@ class _Recorder:
             self._refuse(tag, "more of it waited already than there is room for", count)
 
     def _refuse(self, tag: str, why: str, count: int = 1) -> None:
-        what = "frame block" if tag.startswith("can/") else "row block"
+        kind = tag.partition("/")[0]
+        what = {"can": "frame block", "inputs": "block"}.get(kind, "row block")
         self.refusals.note(what, _whose(tag), why.partition(" ")[0], why, count)
 
     def _wrong(self, kind: str, robot: str, rows: Rows) -> str | None:
@@ -188,10 +222,13 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
             brief.period_ns,
             buses=brief.buses,
             formats=brief.bus_formats,
+            inputs=brief.robots if brief.inputs else (),
         ) as record,
     ):
         name = brief.network.run
         recorder = _Recorder(brief, record)
+        for robot in brief.robots if brief.inputs else ():  # heard once its rows are
+            link.subscribe(keys.inputs(name, robot), f"inputs/{robot}", room_bytes=ROOM_BYTES)
         for robot in brief.robots:
             link.subscribe(keys.truth(name, robot), f"plant/{robot}", room_bytes=ROOM_BYTES)
             telemetry = keys.telemetry(name, robot)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from bridge.process.clock import local_date
 from configs.errors import ExitStatus, FleetloopError, InfrastructureError, ScenarioError
+from fleetloop.record import inputs_file
 from fleetloop.record.reader import Record
 from fleetloop.record.run_record import CAN_FOLDER
 from fleetloop.terminal import note
@@ -75,11 +76,12 @@ def write(path: Path, content: str | bytes) -> None:
 
 def discard(created: Created) -> None:
     """Remove the folder of a run that never began, and what was made for it."""
-    can = created.path / CAN_FOLDER
+    can, inputs = created.path / CAN_FOLDER, created.path / inputs_file.FOLDER
+    logs = (*can.glob("*.[bl][lo][fg]"), *inputs.glob("*.inputs"))
     with contextlib.suppress(OSError):
-        for file in (created.path / SCENARIO, created.path / RECORD, *can.glob("*.[bl][lo][fg]")):
+        for file in (created.path / SCENARIO, created.path / RECORD, *logs):
             file.unlink(missing_ok=True)
-    for folder in (can, *created.new):
+    for folder in (can, inputs, *created.new):
         with contextlib.suppress(OSError):
             folder.rmdir()
 

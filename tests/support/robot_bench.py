@@ -4,10 +4,12 @@ from dataclasses import replace
 
 from agents.agent import Agent
 from agents.guard import Phase
+from agents.inputs import LoggedAgent
 from bridge.drives.odrive.frames import AxisState, Command, identifier
 from bridge.drives.odrive.model import AxisModel
 from bridge.drives.odrive.node import OdriveNode
 from bridge.frame import Frame
+from bridge.network.inputs import InputBuffer
 from bridge.network.messages import PathState, PoseFix
 from bridge.network.telemetry import RowBuffer, row_of
 from configs.brief import AgentBrief
@@ -27,7 +29,9 @@ ZERO = bytes(4)
 class Bench:
     """An agent of two_robots with its two drives standing still, and its neighbour's voice."""
 
-    def __init__(self, robot: str = "r2", *overrides: str, **changes) -> None:
+    def __init__(
+        self, robot: str = "r2", *overrides: str, log: InputBuffer | None = None, **changes
+    ) -> None:
         scenario = load("two_robots", (*BARE, *overrides)) if overrides else SCENARIO
         brief: AgentBrief = agent_brief(scenario, robot, network=NOWHERE, bus=())
         brief = replace(brief, **changes)
@@ -35,7 +39,8 @@ class Bench:
         self.rows: list[tuple[float, ...]] = []
         signals = controller_signals(brief.law.load().SIGNALS, scenario.aged(robot))
         self._row = row_of(signals)
-        self.agent = Agent(brief, RowBuffer(self._row, self._keep))
+        rows = RowBuffer(self._row, self._keep)
+        self.agent = Agent(brief, rows) if log is None else LoggedAgent(brief, rows, log)
         self.axes = [OdriveNode(model, 0, 1), OdriveNode(model, 1, 2)]
         self.schedule = brief.schedule
         self.tick_now = -brief.schedule.countdown_ticks

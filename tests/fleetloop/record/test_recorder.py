@@ -11,6 +11,7 @@ from bridge.network.messages import Rows
 from bridge.network.telemetry import PLANT_ROW
 from configs.brief import RecorderBrief
 from configs.connections import NetworkLink
+from fleetloop.record.inputs_file import InputLog, path_of, read_inputs
 from fleetloop.record.reader import Record
 from fleetloop.record.recorder import _Recorder
 from fleetloop.record.run_record import RunRecord
@@ -22,7 +23,9 @@ def rows(tag: str, first: int, count: int, *, final: bool = False) -> Arrival:
     return Arrival(tag, "", Rows(first, count, block, final).encode())
 
 
-def record(path: Path, *arrivals: Arrival, fills_gaps: bool = False) -> tuple[_Recorder, Record]:
+def record(
+    path: Path, *arrivals: Arrival, fills_gaps: bool = False, inputs: bool = False
+) -> tuple[_Recorder, Record]:
     """What comes of these messages."""
     network = NetworkLink("x", "", "", "")
     brief = RecorderBrief(
@@ -40,8 +43,11 @@ def record(path: Path, *arrivals: Arrival, fills_gaps: bool = False) -> tuple[_R
         300,
         0,
         fills_gaps,
+        inputs,
     )
-    with RunRecord(path, dict.fromkeys(brief.robots, SIGNALS), "", brief.period_ns) as file:
+    logging = brief.robots if inputs else ()
+    tables = dict.fromkeys(brief.robots, SIGNALS)
+    with RunRecord(path, tables, "", brief.period_ns, inputs=logging) as file:
         recorder = _Recorder(brief, file)
         for arrival in arrivals:
             recorder.process(arrival)
@@ -130,3 +136,41 @@ def test_what_is_no_rows_is_counted(tmp_path: Path) -> None:
         "refused 2 row blocks of the plant for r1: not well formed"
     ]
     assert len(found.plant["r1"]) == 300
+
+
+def block(robot: str, first: int, content: bytes, *, final: bool = False) -> Arrival:
+    return Arrival(f"inputs/{robot}", "", Rows(first, len(content), content, final).encode())
+
+
+def test_input_logs_are_files_beside_the_record_and_waited_for(tmp_path: Path) -> None:
+    blocks = block("r1", 0, b"abc"), block("r1", 3, b"de", final=True), block("r2", 0, b"f")
+    recorder, _ = record(tmp_path / "a.mcap", *whole(*SOURCES), *blocks, inputs=True)
+    assert recorder.unfinished == {"inputs/r2"}
+    assert not recorder.refusals.lines()
+    assert read_inputs(path_of(tmp_path, "r1")) == [InputLog(b"abcde", True)]
+    assert read_inputs(path_of(tmp_path, "r2")) == [InputLog(b"f", False)]
+
+
+def test_an_input_log_ends_where_a_block_of_it_is_missing(tmp_path: Path) -> None:
+    blocks = block("r1", 0, b"abc"), block("r1", 4, b"e"), block("r1", 5, b"f", final=True)
+    recorder, _ = record(tmp_path / "a.mcap", *whole(*SOURCES), *blocks, inputs=True)
+    assert read_inputs(path_of(tmp_path, "r1")) == [InputLog(b"abc", False)]
+    assert recorder.gaps() == [
+        "the inputs of r1's controller are missing from byte 3 of their log on"
+    ]
+    assert recorder.unfinished == {"inputs/r2"}
+
+
+@pytest.mark.parametrize("may_restart", [True, False])
+def test_only_a_controller_that_may_start_again_begins_a_second_log(
+    tmp_path: Path, may_restart: bool
+) -> None:
+    blocks = block("r1", 0, b"abc"), block("r1", 0, b"again", final=True)
+    recorder, _ = record(
+        tmp_path / "a.mcap", *whole(*SOURCES), *blocks, inputs=True, fills_gaps=may_restart
+    )
+    first, *others = read_inputs(path_of(tmp_path, "r1"))
+    assert first == InputLog(b"abc", False)
+    assert others == ([InputLog(b"again", True)] if may_restart else [])
+    refused = "refused 1 block of the inputs of r1's controller: begins at byte 0, expected 3"
+    assert recorder.refusals.lines() == ([] if may_restart else [refused])

@@ -1,0 +1,153 @@
+"""A controller's input log, fed to another one, gives the same rows and frames bit for bit."""
+
+from collections.abc import Callable
+from math import nan
+
+import pytest
+from support.robot_bench import Bench
+
+from agents.agent import Trouble
+from agents.guard import Phase
+from agents.inputs import feed
+from bridge.frame import Frame
+from bridge.network.inputs import Input, InputBuffer, Kind, entries
+from bridge.network.messages import LeaderSpeed, PathState, PoseFix
+from configs.leader_speed import SpeedChange
+
+
+class Logged:
+    """A bench whose controller is logged, and a second one that is told what the log says."""
+
+    def __init__(self, *overrides: str, **changes) -> None:
+        self._blocks: list[bytes] = []
+        self._log = InputBuffer(lambda _first, block, _final: self._blocks.append(block))
+        self._made = (overrides, changes)
+        self.bench = Bench("r2", *overrides, log=self._log, **changes)
+        self.frames: list[list[Frame]] = []
+
+    def tick(self) -> None:
+        self.frames.append(self.bench.tick())
+
+    def drive(self, ticks: int) -> None:
+        for _ in range(self.bench.schedule.countdown_ticks + ticks):
+            self.tick()
+        assert self.bench.phase is Phase.DRIVING, self.bench.why
+
+    def hear(self, s: float) -> None:
+        tick, period_ns = self.bench.tick_now, self.bench.schedule.period_ns
+        tick -= tick % self.bench.schedule.share_every
+        self.bench.agent.receive_path_state("r1", PathState(tick, tick * period_ns, s, 0.5))
+
+    def entries(self) -> list[Input]:
+        self._log.finish()
+        return list(entries(b"".join(self._blocks)))
+
+    def assert_repeated(self) -> None:
+        """The fed controller says what the logged one said."""
+        overrides, changes = self._made
+        other = Bench("r2", *overrides, **changes)
+        log = self.entries()
+        answers = [(entry, list(feed(other.agent, entry))) for entry in log]
+        ends = (Kind.TICK, Kind.STOP)
+        assert [sent for entry, sent in answers if entry.kind in ends] == self.frames
+        assert [entry.sent() for entry in log if entry.kind in ends] == self.frames
+        for bench in (self.bench, other):
+            bench.agent._rows.finish()
+        assert repr(other.rows) == repr(self.bench.rows)  # NaN included
+        assert other.phase is self.bench.phase
+        assert other.why == self.bench.why
+
+
+def test_in_lockstep_with_neighbour_leader_and_a_fault_in_between() -> None:
+    logged = Logged("host.rearm=true", "graph.leader=['r1','r2']")
+    logged.bench.agent.receive_leader_speed(LeaderSpeed((SpeedChange(0, 0.5),)))
+    logged.drive(1)
+    for n in range(600):
+        if n % 20 == 0:
+            logged.hear(0.3 + 0.01 * n)
+        if n == 50:
+            logged.bench.reboot(0)
+        logged.tick()
+    assert any(event.kind == "stopped" for event in logged.bench.agent.guard.events)
+    assert len(logged.bench.rows) > 100
+    logged.assert_repeated()
+
+
+REALTIME = "clock.mode='realtime'", "host.rearm=true"
+
+
+def bus_fails(logged: Logged) -> None:
+    logged.bench.agent.note_trouble(Trouble.BUS, "bus error: network is down")
+
+
+def launcher_goes(logged: Logged) -> None:
+    logged.bench.agent.note_trouble(Trouble.LAUNCHER, "cut off")
+
+
+def machine_stalls(logged: Logged) -> None:
+    logged.bench.agent.note_trouble(Trouble.MACHINE, "stalled for 0.3 s")
+    logged.bench.silent.add(1)
+
+
+def frames_not_sent(logged: Logged) -> None:
+    logged.bench.silent.add(0)
+    for _ in range(60):
+        logged.tick()
+    assert logged.bench.phase is Phase.STOPPED
+    logged.bench.silent.clear()
+    while logged.bench.phase is not Phase.REARMING:
+        logged.tick()
+    logged.bench.agent.note_unsent(logged.bench.tick_now)
+    assert logged.bench.phase is Phase.STOPPED
+
+
+def run_ends(logged: Logged) -> None:
+    logged.bench.agent.end_at(logged.bench.tick_now + 3)
+
+
+@pytest.mark.parametrize(
+    "happens", [bus_fails, launcher_goes, machine_stalls, frames_not_sent, run_ends]
+)
+def test_in_real_time_with_all_that_its_loop_notes(happens: Callable[[Logged], None]) -> None:
+    logged = Logged(*REALTIME)
+    period_ns = logged.bench.schedule.period_ns
+
+    def ticks(count: int) -> None:
+        for n in range(count):
+            tick = logged.bench.tick_now
+            late_s = 1e-7 * (n % 13)
+            now_ns = tick * period_ns + 500
+            logged.bench.agent.keep_time(now_ns, late_s, nan if n % 7 == 0 else 3e-4 + late_s)
+            if n % 20 == 3:
+                logged.hear(0.001 * n)
+            logged.tick()
+
+    logged.drive(1)
+    ticks(40)
+    happens(logged)
+    ticks(80)
+    assert logged.bench.phase is not Phase.DRIVING
+    logged.assert_repeated()
+
+
+def test_a_stop_before_the_end_is_an_input_too() -> None:
+    logged = Logged()
+    logged.drive(30)
+    logged.frames.append(list(logged.bench.agent.shut_down()))
+    logged.assert_repeated()
+    assert logged.bench.phase is Phase.DONE
+
+
+def test_a_controller_that_was_started_again_says_so_first() -> None:
+    logged = Logged(*REALTIME, "host.restarts=1", rejoins=True)
+    first, *_ = logged.entries()
+    assert (first.kind, first.payload) == (Kind.BEGIN, b"\1")
+
+
+def test_start_messages_that_say_the_same_again_are_logged_once() -> None:
+    logged = Logged()
+    fix = PoseFix(-1, 0, 1.9, 0.1, 1.5)
+    for _ in range(5):
+        logged.bench.agent.receive_pose(fix)
+    kinds = [entry.kind for entry in logged.entries()]
+    assert kinds.count(Kind.POSE) == 2  # the bench's own, then this one
