@@ -15,15 +15,14 @@ found by its descriptor. Messages are counted as TCP segments with data: message
 together count once, and cost as little.
 """
 
-import contextlib
 import ctypes
-import os
 import socket
 import struct
-from collections.abc import Container, Iterator
+from collections.abc import Container
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
+
+from bridge.network.connections import connections
 
 MESSAGES_PER_TICK, BYTES_PER_TICK = 4, 1024
 """Three times a row and a path state."""
@@ -90,7 +89,7 @@ class FloodGuard:
         went_on, passed_s = max(ticks - before[0], 0), now_s - before[1]
         buckets, self._buckets = self._buckets, {}
         cut = []
-        for peer, connection in _connections(users):
+        for peer, connection in connections(users):
             with connection:
                 received = _received(connection)
                 bucket = buckets.get(peer) or Bucket(received)
@@ -104,7 +103,7 @@ class FloodGuard:
 
 def deafen(peer: str) -> None:
     """Take nothing more from this peer; after Zenoh's lease the router ends its session."""
-    for _, connection in _connections({peer}):
+    for _, connection in connections({peer}):
         with connection:
             _take_nothing(connection)
 
@@ -115,31 +114,6 @@ def _take_nothing(connection: socket.socket) -> None:
     kept = ctypes.create_string_buffer(code, len(code))
     program = struct.pack("HL", len(_NO_DATA), ctypes.addressof(kept))
     connection.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, program)
-
-
-def _connections(users: Container[str]) -> Iterator[tuple[str, socket.socket]]:
-    """This process's connections to these peers, each by a descriptor of its own."""
-    found = set()
-    for descriptor in Path("/proc/self/fd").iterdir():
-        with contextlib.suppress(OSError):
-            if not str(descriptor.readlink()).startswith("socket:"):
-                continue
-            connection = socket.socket(fileno=os.dup(int(descriptor.name)))
-            try:
-                inet = connection.family in (socket.AF_INET, socket.AF_INET6)
-                peer = _place(connection.getpeername()) if inet else ""
-            except OSError:
-                peer = ""
-            if peer in users and peer not in found:  # which Zenoh may have more descriptors of
-                found.add(peer)
-                yield peer, connection
-            else:
-                connection.close()
-
-
-def _place(address: tuple[str, int]) -> str:
-    host, port = address[:2]
-    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 def _received(connection: socket.socket) -> Received:

@@ -16,6 +16,7 @@ from typing import TypeVar
 import zenoh
 
 from bridge.network import zenoh_log
+from bridge.network.connections import never_linger
 from bridge.network.packing import MAX_BYTES
 from configs.tls import TlsFiles
 
@@ -96,7 +97,9 @@ def open_bounded(config: zenoh.Config, timeout_s: float) -> zenoh.Session | str:
 
     def open_session() -> None:
         try:
-            opened: zenoh.Session | str = keep(zenoh.open(config))
+            session = keep(zenoh.open(config))
+            keep(never_linger(session))
+            opened: zenoh.Session | str = session
         except zenoh.ZError as error:
             opened = str(error)
         with lock:

@@ -28,6 +28,8 @@ KEYS = ("expect=[]", "host.rearm=true", "duration_s=22.0")
 SCENARIO = ("two_robots_100hz", *(word for key in KEYS for word in ("--set", key)))
 PORT = 7447
 CUT_S, REJOINED_S = 5.0, 2.0
+LOSSY_REJOINED_S = 4.0
+"""With two of the words lost that TCP says again after a second only."""
 
 
 @pytest.fixture
@@ -76,12 +78,14 @@ def agent(host: Host, where: Path) -> "subprocess.Popen[str]":
     )
 
 
-def there_again_within(run: Run, since_s: float, already: int = 0) -> None:
+def there_again_within(
+    run: Run, since_s: float, already: int = 0, bound_s: float = REJOINED_S
+) -> None:
     """r2 is back, so soon after the network was."""
     back = "r2: .*: there again after .*"
     pattern = f"(?:{back}\n(?:.*\n)*?)" * already + back
     run.await_line(pattern, 20.0)
-    assert time.monotonic() - since_s < REJOINED_S
+    assert time.monotonic() - since_s < bound_s
 
 
 def test_a_robot_that_is_cut_off_and_a_router_that_is_restarted_are_back_within_two_seconds(
@@ -99,7 +103,7 @@ def test_a_robot_that_is_cut_off_and_a_router_that_is_restarted_are_back_within_
     far = agent(rob, where)
     try:
         run.await_bus_time(3.0)
-        rob.loss = 0.0  # a lost word of a handshake costs TCP a second
+        rob.loss = 0.0
         rob.cut = True
         run.wait(CUT_S)
         rob.cut = False
@@ -108,10 +112,12 @@ def test_a_robot_that_is_cut_off_and_a_router_that_is_restarted_are_back_within_
             r"r2: tick \d+ \(t = \S+ s\): cut_off: its machine, or the network to it", 1.0
         )
         there_again_within(run, since_s)
-        router.kill()
-        run.wait(1.0)
-        router = StockRouter(config, *hub.exec)
-        there_again_within(run, time.monotonic(), already=1)
+        for already, loss, bound_s in ((1, 0.0, REJOINED_S), (2, 0.05, LOSSY_REJOINED_S)):
+            rob.loss = loss
+            router.kill()
+            run.wait(1.0)
+            router = StockRouter(config, *hub.exec)
+            there_again_within(run, time.monotonic(), already, bound_s)
         status, out = run.end()
         assert status == 0, out
         _, said = far.communicate(timeout=20.0)
