@@ -1,8 +1,8 @@
 """The bus as the clock of a controller in lockstep: the tick that is due at each frame.
 
-A tick is due once both drives' encoder frames have arrived at its bus time or later, or when its
-period ends without them: a controller on a starved bus acts on its last feedback. Each tick is due
-once, in order.
+A tick is due once both drives' encoder frames have arrived at its bus time or later, or when the
+bus's question of that tick ends without one of them: the controller then acts on its last feedback.
+Each tick is due once, in order.
 """
 
 from collections.abc import Callable
@@ -31,9 +31,12 @@ class BusClock:
             return self._advance()
         return None
 
-    def due_without_frames(self) -> int:
-        """The tick to compute at the end of a period without its frames."""
-        return self._advance()
+    def due_at_end(self, asked_ns: int) -> int | None:
+        """The tick to compute at the end of the bus's question of bus time `asked_ns` [ns].
+
+        None if it was due before.
+        """
+        return self._advance() if asked_ns >= self._due_ns else None
 
     def _advance(self) -> int:
         tick = self._next

@@ -119,15 +119,16 @@ class LockstepLoop:
             BusClock(self._schedule, agent.feedback_since),
             self._schedule,
         )
-        subscriptions = self._subscriptions
+        subscriptions, bus = self._subscriptions, self._bus
         timeout_s = BUS_SHARE * schedule.tick_deadline_s
         while True:
-            if message is None:
-                tick: int | None = clock.due_without_frames()
-            else:
+            tick: int | None = None
+            if message is not None:
                 now_ns = round(message.timestamp * 1e9)
                 on_frame(can_id_of(message), message.data, now_ns)
                 tick = clock.due(now_ns)
+            if tick is None and (question_ns := bus.question_ns) is not None:
+                tick = clock.due_at_end(question_ns)
             if tick is not None:
                 came_ns = self._clock.monotonic_ns()
                 if schedule.owes(tick):
@@ -177,7 +178,7 @@ class LockstepLoop:
                 raise PeerSilentError(f"{self._robot}: tick {tick}: within {within_s:g} s {said}")
 
     def _await_frame(self, within_s: float) -> can.Message | None:
-        """The next frame of the bus; None at a tick of a starved bus."""
+        """The next frame of the bus; None at a question without a frame."""
         message = self._receive(LOOK_S)
         if message is not None or self._bus.asked:
             return message

@@ -55,8 +55,8 @@ class _Controller(NamedTuple):
         """A controller before its first tick."""
         return cls(agent, BusClock(agent.brief.schedule, agent.feedback_since))
 
-    def react(self, received: Sequence[tuple[int, Frame]]) -> list[Frame]:
-        """The answer to frames with their bus times; to none at all: a tick has passed."""
+    def react(self, received: Sequence[tuple[int, Frame]], asked_ns: int) -> list[Frame]:
+        """The answer to a question of a bus time: frames with their bus times."""
         agent, clock = self
         said: list[Frame] = []
         on_frame, due = agent.on_frame, clock.due
@@ -65,8 +65,9 @@ class _Controller(NamedTuple):
             tick = due(at_ns)
             if tick is not None:
                 said += agent.step(tick)
-        if not received:
-            said += agent.step(clock.due_without_frames())
+        tick = clock.due_at_end(asked_ns)
+        if tick is not None:
+            said += agent.step(tick)
         return said
 
 
@@ -97,19 +98,22 @@ class _Controllers:
                     tick = clock.due(stamp_ns)
                     if tick is not None:
                         answers += agent.step(tick)
-            if not frames:
-                answers += agent.step(clock.due_without_frames())
+            if tick is None:
+                tick = clock.due_at_end(stamp_ns)
+                if tick is not None:
+                    answers += agent.step(tick)
         return answers
 
-    def forward(self, stamp_ns: int, ended: Sequence[Transmitted], asked: str | None) -> None:  # noqa: ARG002
+    def forward(self, stamp_ns: int, ended: Sequence[Transmitted], asked: str | None) -> None:
         for robot, pending in self._pending.items():
             pending += [p.as_heard_by(robot) for p in ended if p.heard_by(robot)]
-        self._asked = asked or ""
+        self._stamp_ns, self._asked = stamp_ns, asked or ""
 
     def submitted(self) -> list[Submitted]:
         robot = self._asked
         received, self._pending[robot] = self._pending[robot], []
-        return [Submitted(robot, frame) for frame in self._controllers[robot].react(received)]
+        said = self._controllers[robot].react(received, self._stamp_ns)
+        return [Submitted(robot, frame) for frame in said]
 
     def departed(self) -> Sequence[Key]:
         return ()

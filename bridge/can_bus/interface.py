@@ -208,6 +208,14 @@ class FleetloopBus(can.BusABC):
         """Of a synchronous client: whether the bus waits for its answer, to a tick or to frames."""
         return self._reply_due
 
+    @property
+    def question_ns(self) -> int | None:
+        """Of a synchronous client: bus time of the question whose last frame was handed out [ns].
+
+        None: frames of it are left, or it was answered.
+        """
+        return self._stamp_ns if self._reply_due and not self._inbox else None
+
     def fileno(self) -> int:
         """The descriptor that becomes readable with the next frame."""
         return self._transport.fileno()

@@ -8,8 +8,8 @@
     firmware looks at it        a latency after its end  the drive acts; replies go to its mailboxes
     a robot's drives have sent  with their last frame    its controller is asked; its answer goes to
     all of the tick                                      its transmit queue then
-    the tick is over            start of the next one    controllers that were not asked yet hear
-                                                         what there is, and that the tick passed
+    the tick is over            start of the next one    controllers that were not asked yet are
+                                                         asked with what there is
 
 The last two are lockstep's alone. A client joins the wire with the first frame that it sends: one
 that only listens is no node, and changes nothing. An error frame from a client is an error flag on
@@ -125,13 +125,7 @@ class TimedBus:
             while waiting:
                 asked = self._run_to_question(end_ns, waiting)
                 if asked is None:
-                    for starved in waiting:
-                        if self._transmitted:
-                            yield self._ask(starved)
-                            self._process_answer()
-                        yield self._ask(starved)
-                        self._process_answer()
-                    break
+                    asked = waiting[0]
                 waiting.remove(asked)
                 yield self._ask(asked)
                 self._process_answer()

@@ -21,13 +21,16 @@ def test_a_tick_is_due_with_both_encoder_frames_and_not_before() -> None:
     assert clock.due(SCHEDULE.period_ns) == first + 1
 
 
-@given(st.lists(st.booleans(), max_size=50))
-def test_each_tick_is_due_once_whether_its_frames_came_or_its_period_passed(
-    came: list[bool],
-) -> None:
-    clock = BusClock(SCHEDULE, lambda _: True)
+@given(st.lists(st.sampled_from(["both", "one", "none"]), max_size=50))
+def test_each_tick_is_due_once_whatever_frames_its_question_has(came: list[str]) -> None:
+    both = False
+    clock = BusClock(SCHEDULE, lambda _: both)
     ticks = []
-    for k, here in enumerate(came):
-        ticks.append(clock.due(k * SCHEDULE.period_ns) if here else clock.due_without_frames())
+    for k, frames in enumerate(came):
+        now_ns, both = k * SCHEDULE.period_ns, frames == "both"
+        found = [] if frames == "none" else [clock.due(now_ns)]
+        found += [clock.due_at_end(now_ns), clock.due_at_end(now_ns)]
+        assert found.index(next(filter(lambda it: it is not None, found))) == (frames == "one")
+        ticks += [tick for tick in found if tick is not None]
     first = -SCHEDULE.countdown_ticks
     assert ticks == list(range(first, first + len(came)))
