@@ -31,7 +31,6 @@ class EmulatedNetwork:
     """The channels of one robot; sources without effects have none."""
 
     __slots__ = (
-        "_distances_m",
         "_fix_ns",
         "_fixes",
         "_leader",
@@ -43,6 +42,7 @@ class EmulatedNetwork:
         "_silence_ns",
         "_v_r",
         "_v_r_ns",
+        "distances_m",
     )
 
     def __init__(self, brief: AgentBrief) -> None:
@@ -65,7 +65,8 @@ class EmulatedNetwork:
         self._located = brief.located
         self._poses: dict[int, dict[str, PoseFix]] = {}  # by tick, until due
         self._places: dict[str, PoseFix] = {}  # the newest of each robot
-        self._distances_m = dict.fromkeys(brief.located, nan)
+        self.distances_m = dict.fromkeys(brief.located, nan)
+        """From this robot to in-neighbours, by their newest poses [m]; NaN: not known yet."""
 
     def channel(self, source: str) -> Channel[PathState] | Channel[float] | Channel[PoseFix]:
         """The channel of a source that has one.
@@ -86,7 +87,7 @@ class EmulatedNetwork:
 
     def send_path_state(self, robot: str, state: PathState) -> None:
         """Hand a path state to its channel, at its date."""
-        self._paths[robot].send(state.t_ns, state, self._distances_m.get(robot, 0.0))
+        self._paths[robot].send(state.t_ns, state, self.distances_m.get(robot, 0.0))
 
     def send_pose(self, fix: PoseFix) -> None:
         """Hand a pose to its channel, at its date."""
@@ -130,7 +131,7 @@ class EmulatedNetwork:
         for robot in self._located:
             if (there := self._places.get(robot)) is not None:
                 apart_m = hypot(there.x_m - here.x_m, there.y_m - here.y_m)
-                self._distances_m[robot] = apart_m
+                self.distances_m[robot] = apart_m
 
     def path_states(self, now_ns: int, heard: Collection[str]) -> list[tuple[str, PathState]]:
         """The path states that are due, in the order of names; `heard`: whose edges exist."""

@@ -161,6 +161,7 @@ class RealtimeLoop:
             gone = (self._clock.monotonic_ns() - epoch_ns - phase_ns) // period_ns + 1
             tick = min(max(tick, gone), agent.last_tick)
         lateness, subscriptions = self._lateness, self._subscriptions
+        distances_m = agent.network.distances_m if agent.network is not None else {}
         self._drop_backlog()
         while agent.phase is not Phase.DONE:
             due_ns = epoch_ns + tick * period_ns + phase_ns
@@ -189,8 +190,7 @@ class RealtimeLoop:
             self.counters.ticks += tick >= 0
             if tick % self._progress_ticks == 0:
                 self._progress.put(Progress(tick, tick * period_ns, 0).encode())
-            if tick >= subscriptions.next_change:
-                subscriptions.change(tick)
+            subscriptions.follow(tick, distances_m)
             tick += 1
             if schedule.shares(tick) and agent.speaks(tick):
                 self._path.put(agent.share(tick).encode())
