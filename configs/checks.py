@@ -1,24 +1,21 @@
 """Relations between the sections of a scenario; all problems at once, none raised."""
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
-from math import ceil, floor, inf
+from collections.abc import Iterator
 
 from pydantic import ValidationError
 
 from configs.drive_checks import drive_problems
-from configs.edge_checks import multiple_problem, no_such_robot
+from configs.edge_checks import multiple_problem
 from configs.edges import LEADER
 from configs.emulated_edges import emulation_problems
 from configs.errors import Problem
+from configs.expect_checks import expect_problems
 from configs.faults.plan import fault_problems
 from configs.graph_checks import edge_problems, graph_problems
 from configs.paths import Spline, Varying
-from configs.plugins import Recorded
 from configs.scenario import ETSRO, Scenario
-from configs.sections import Expect
-from configs.signals import AGE_PREFIX, PLANT_SIGNALS, SPREAD, controller_signals
-from configs.wording import MISSING, guess, remedy_of
+from configs.wording import MISSING, remedy_of
 
 
 def cross_problems(scenario: Scenario) -> list[Problem]:
@@ -32,7 +29,7 @@ def cross_problems(scenario: Scenario) -> list[Problem]:
         *drive_problems(scenario),
     ]
     edges = edge_problems(scenario)
-    problems += [*_host(scenario), *_expects(scenario, sound_edges=not edges)]
+    problems += [*_host(scenario), *expect_problems(scenario, sound_edges=not edges)]
     problems += fault_problems(scenario, sound_edges=not edges)
     if not edges:
         problems += emulation_problems(scenario.network, scenario.topology)
@@ -118,43 +115,6 @@ def _laws(scenario: Scenario) -> Iterator[Problem]:
                 yield Problem(key, value, remedy_of(item))
 
 
-_Table = tuple[str, set[str] | None]
-"""A robot and its controller's signals; None: its law isn't here, of a record."""
-
-
-def _tables(scenario: Scenario, *, sound_edges: bool) -> Iterator[_Table]:
-    """The signals of each robot whose law and gains are right."""
-    for robot in scenario.robot:
-        try:
-            control = scenario.control_of(robot)
-        except ValidationError:  # said already
-            continue
-        if isinstance(control.parameters, Recorded):
-            yield robot.name, None
-            continue
-        signals = controller_signals(
-            control.load().SIGNALS, scenario.aged(robot.name) if sound_edges else ()
-        )
-        yield robot.name, {signal.name for signal in signals}
-
-
-def _expectable(tables: Iterable[_Table], robots: Sequence[str]) -> list[str]:
-    """Signals that all of these robots have, or some robot if none is named.
-
-    Nothing if a law isn't here.
-    """
-    every = {SPREAD, *(signal.name for signal in PLANT_SIGNALS)}
-    named = []
-    for robot, table in tables:
-        if robots and robot not in robots:
-            continue
-        if table is None:
-            return []
-        named.append(table)
-    of_all = set.intersection if robots else set.union
-    return sorted(every | of_all(*named)) if named else []
-
-
 def _periods(scenario: Scenario) -> Iterator[Problem]:
     clock = scenario.clock
     period_ns = clock.control_period_s * 1e9
@@ -212,58 +172,3 @@ def _host(scenario: Scenario) -> Iterator[Problem]:
         if value is not None and value < limit:
             remedy = f"{what}, {limit:g} s, or more, or a healthy robot stops or never arms"
             yield Problem(f"host.{key}", value, remedy)
-
-
-def _expects(scenario: Scenario, *, sound_edges: bool) -> Iterator[Problem]:
-    tables = list(_tables(scenario, sound_edges=sound_edges)) if scenario.expect else []
-    for n, expect in enumerate(scenario.expect):
-        if expect.signal.startswith(AGE_PREFIX) and not sound_edges:
-            continue  # named after an edge
-        known = _expectable(tables, expect.robots or ())
-        where = f"expect.{n}"
-        if known and expect.signal not in known:
-            hint = guess(expect.signal, known, cutoff=0.5)
-            remedy = f"no such signal{hint} (known: {', '.join(known)})"
-            yield Problem(f"{where}.signal", expect.signal, remedy)
-        for robot in expect.robots or ():
-            if robot not in scenario.names:
-                yield Problem(f"{where}.robots", robot, no_such_robot(scenario.names))
-        yield from _bounds(where, expect)
-        yield from _window(where, expect, scenario)
-
-
-def _bounds(where: str, expect: Expect) -> Iterator[Problem]:
-    if expect.max_abs is None and expect.min is None and expect.max is None:
-        yield Problem(where, expect.signal, "give max_abs, min or max")
-    most = inf if expect.max is None else expect.max
-    least = -inf if expect.min is None else expect.min
-    widest = inf if expect.max_abs is None else expect.max_abs
-    if least > most:
-        yield Problem(f"{where}.min", least, f"must be at most max = {most:g}: nothing is both")
-    elif least > widest:
-        yield Problem(f"{where}.min", least, f"must be at most max_abs = {widest:g}")
-    elif most < -widest:
-        yield Problem(f"{where}.max", most, f"must be at least -max_abs = {-widest:g}")
-
-
-def _window(where: str, expect: Expect, scenario: Scenario) -> Iterator[Problem]:
-    """A window has a tick in it, and the scenario reaches it; a run may end before, on demand."""
-    end_s, period_s = max(scenario.duration_s, scenario.ends_at_s), scenario.clock.control_period_s
-    last_s = end_s - period_s if expect.to_s is None else expect.to_s
-    if expect.to_s is not None and expect.from_s >= expect.to_s:
-        yield Problem(f"{where}.from_s", expect.from_s, f"must be below to_s = {expect.to_s:g}")
-    elif expect.from_s >= end_s:
-        remedy = f"the run ends before: must be below duration_s = {end_s:g}"
-        yield Problem(f"{where}.from_s", expect.from_s, remedy)
-    elif ceil(expect.from_s / period_s - 1e-6) > floor(last_s / period_s + 1e-6):
-        remedy = f"no tick from there to {last_s:g} s: they are {period_s:g} s apart"
-        yield Problem(f"{where}.from_s", expect.from_s, remedy)
-    first, last = expect.from_s / period_s, last_s / period_s
-    absent = [r for r in expect.robots or () if r in scenario.names]
-    absent = [r for r in absent if not scenario.members[r].overlaps(first, last)]
-    if absent and expect.signal != SPREAD:
-        remedy = f"{', '.join(absent)} joins later or has left: nothing of it counts then"
-        yield Problem(f"{where}.robots", list(expect.robots or ()), remedy)
-    if expect.to_s is not None and expect.to_s > end_s:
-        remedy = f"the run ends before: at most duration_s = {end_s:g}, or leave it out: to the end"
-        yield Problem(f"{where}.to_s", expect.to_s, remedy)

@@ -15,6 +15,7 @@ from configs.choices import chosen_anew, shared_part
 from configs.drives import Drive
 from configs.edges import FOREVER, LEADER, Edge, parse_edge, presence
 from configs.emulated_edges import effects_to
+from configs.expect import Expect
 from configs.faults.kinds import AnyFault
 from configs.faults.messages import LinkFault, PoseOutage
 from configs.faults.plan import faulted_sources
@@ -38,7 +39,6 @@ from configs.sections import (
     Coordination,
     Disturbance,
     DriveChoice,
-    Expect,
     Leader,
     Localisation,
     Mounting,

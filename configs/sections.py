@@ -4,7 +4,7 @@ Defaults are the paper's (section 4), and where it is silent those that its numb
 with. What relates sections to each other is checked in `configs.checks`.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from annotated_types import Ge, Gt, Le, Len
@@ -253,16 +253,3 @@ class Network(Parameters):
     edge: Annotated[tuple[EdgeEffects, ...], Len(0, 1000)] = parameter(
         (), "of some edges, where they differ"
     )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Expect(Parameters):
-    """What has to hold at every tick of a window, or the run ends with exit status 1."""
-
-    signal: str = field(metadata={"description": "a recorded signal, or s_spread"})
-    robots: tuple[str, ...] | None = parameter(None, "all if not given")
-    from_s: SecondsOrZero = 0.0
-    to_s: Seconds | None = parameter(None, "the end if not given")
-    max_abs: NotNegative | None = None
-    min: Finite | None = None
-    max: Finite | None = None

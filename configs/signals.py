@@ -102,15 +102,24 @@ def age_signals(sources: Sequence[str]) -> tuple[Signal, ...]:
     )
 
 
-SPREAD = "s_spread"
-"""max_i s_i − min_i s_i over robots [m], of what is recorded of each."""
+SPREAD, DISTANCE, PATH_DISTANCE = "s_spread", "robot_distance_m", "path_distance_m"
+
+DERIVED_SIGNALS: tuple[Signal, ...] = (
+    Signal(SPREAD, "m", "max_i s_i − min_i s_i over the robots that are members"),
+    Signal(DISTANCE, "m", "between the wheel axles' centres of two robots, of every pair"),
+    Signal(
+        PATH_DISTANCE, "m", "from the nearest point of the robot's own path, its offset included"
+    ),
+)
+"""What expectations may be about besides recorded signals: made of the record."""
 
 _NAME = re.compile(r"[A-Za-z](?:_?[A-Za-z0-9])*")
 _PATH_ERROR_NAMES = frozenset(signal.name for signal in PATH_ERRORS)
 _TAKEN = frozenset(
     name.lower()
     for name in (
-        *("tick", "robot", SPREAD),
+        *("tick", "robot"),
+        *(signal.name for signal in DERIVED_SIGNALS),
         *(signal.name for signal in (*PLANT_SIGNALS, *USED_SIGNALS, *SENT_SIGNALS)),
     )
 )

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from agents.coordination import matrix_exponential
 from configs.graph import Graph
 from configs.scenario import Scenario
-from fleetloop.results.expectations import spread_of
+from fleetloop.results.derived import spread_of
 from fleetloop.results.summary import leader_speed
 
 Matrix = NDArray[np.float64]

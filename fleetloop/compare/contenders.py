@@ -22,12 +22,25 @@ from configs.overrides import Override
 from configs.plugins import LAWS, Kind, PluginError, find
 from configs.scenario import Scenario
 from configs.sections import LAW
-from configs.signals import PATH_ERRORS, PLANT_SIGNALS, SENT_SIGNALS, SPREAD, USED_SIGNALS
+from configs.signals import (
+    DERIVED_SIGNALS,
+    PATH_ERRORS,
+    PLANT_SIGNALS,
+    SENT_SIGNALS,
+    USED_SIGNALS,
+)
 
 _COMMA = re.compile(r",(?![^\[]*\])")
-_OF_ALL_LAWS = {SPREAD}.union(
-    signal.name for signal in (*PLANT_SIGNALS, *USED_SIGNALS, *PATH_ERRORS, *SENT_SIGNALS)
-)
+_OF_ALL_LAWS = {
+    signal.name
+    for signal in (
+        *PLANT_SIGNALS,
+        *USED_SIGNALS,
+        *PATH_ERRORS,
+        *SENT_SIGNALS,
+        *DERIVED_SIGNALS,
+    )
+}
 """Signals that are recorded under any law."""
 
 
@@ -91,7 +104,7 @@ def scenario_under(
     if seed is not None:
         overrides.append(Override(f"--seeds {seed}", "seed", seed))
     data = tomllib.loads(to_toml(scenario))
-    expect = [one for one in data.get("expect", ()) if one["signal"] in _OF_ALL_LAWS]
+    expect = [one for one in data.get("expect", ()) if one.get("signal") in {None, *_OF_ALL_LAWS}]
     overrides.append(Override(option, "expect", expect))
     return loads(scenario.name, to_toml(scenario), overrides, folder=folder)
 

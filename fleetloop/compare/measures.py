@@ -17,8 +17,8 @@ from configs.scenario import Scenario
 from fleetloop.check.body import robot_body
 from fleetloop.check.loop import true_theta
 from fleetloop.record.reader import Record
+from fleetloop.results.derived import spread
 from fleetloop.results.drawing import envelope
-from fleetloop.results.expectations import spread
 from fleetloop.results.summary import ERRORS, Summary
 from fleetloop.settling import FINAL_S
 

@@ -1,7 +1,7 @@
 """Expectations of a scenario against a record: one holds only if its whole window was recorded.
 
-held         the window was reached to its end by every robot that it is about, within the bounds
-FAILED       a bound was broken, or a value isn't finite; whatever the rest of the window held
+held         by every robot, or pair of robots, that it is about
+FAILED       by one of them not, whatever the rest of the window held; or a value isn't finite
 not reached  neither: some robot's rows end before the window does, or before it begins
 
 verdict      of a run that came to its end
@@ -10,84 +10,286 @@ not checked  else, if an expectation was not reached, a robot was cut short, or 
 held         else
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+from math import ceil, inf, isnan
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from configs.events import Event
+from configs.expect import BOUNDS, COUNTS, Expect, Window, claim, window_of
 from configs.membership import ALWAYS, Membership
 from configs.scenario import Scenario
-from configs.sections import Expect
-from configs.signals import PLANT_SIGNALS, SPREAD
+from configs.signals import DERIVED_SIGNALS, DISTANCE, PATH_DISTANCE, PLANT_SIGNALS, SPREAD
 from fleetloop.record.reader import Record
+from fleetloop.results import robustness
+from fleetloop.results.derived import counted, distance, mask, path_distance, spread
+from fleetloop.results.robustness import Finding
 
 _OF_PLANT = {signal.name for signal in PLANT_SIGNALS} - {"t_s"}
 
 Judged = dict[str, Any]
-"""An expectation with `held` (None: not reached), `found` and, if not reached, `seen_to_s`."""
+"""An expectation as in summary.json: its keys, and
+
+    claim       what it says, as a sentence
+    window      the ticks that it is about, as from_s and to_s in scenario time [s]
+    held        None: not reached
+    value       at the worst tick; of settle_within_s the time to settle [s], of events their number
+    worst       that tick: robots, tick, t_s; None if there is none
+    bound       the key of the bound that is nearest to the value, and the bound
+    margin      from the bound, negative if broken; of settle_within_s [s]
+    unit        of value, bound and margin
+    seen_to_s   if not reached: how far the window was recorded
+"""
 
 
-def spread(controllers: Mapping[str, np.ndarray], members: Mapping[str, Membership]) -> np.ndarray:
-    """max_i s_i − min_i s_i over the members at every tick at which all robots have a row."""
-    ticks = min(len(rows) for rows in controllers.values())
-    there = [counted(rows, members[robot])[:ticks] for robot, rows in controllers.items()]
-    s = [rows["s"][:ticks] for rows in controllers.values()]
-    return spread_of(np.stack(s, axis=1), np.stack(there, axis=1))
+class _Series(NamedTuple):
+    """Values by tick, from tick 0 on."""
+
+    robots: tuple[str, ...]
+    member: Membership  # when it counts
+    values: np.ndarray
+    known: np.ndarray
 
 
-def _mask(member: Membership, ticks: int) -> np.ndarray:
-    """By tick, whether a robot is a member."""
-    there = np.zeros(ticks, dtype=bool)
-    there[member.ticks] = True
-    return there
+class _Part(NamedTuple):
+    """A series and what was found of it."""
+
+    series: _Series
+    first: int  # tick of the first value that counts
+    finding: Finding
 
 
-def counted(rows: np.ndarray, member: Membership) -> np.ndarray:
-    """Rows of a controller at which its robot is a member; not those until it has re-joined."""
-    there: np.ndarray = _mask(member, len(rows)) & ~np.isnan(rows["s"])
-    return there
-
-
-def spread_of(s: np.ndarray, there: np.ndarray) -> np.ndarray:
-    """Max − min of each row over those that are there, 0 without any."""
-    most = np.where(there, s, -np.inf).max(axis=1)
-    least = np.where(there, s, np.inf).min(axis=1)
-    difference: np.ndarray = np.where(there.any(axis=1), most - least, 0.0)
-    return difference
-
-
-def judge(expect: Expect, record: Record, scenario: Scenario) -> Judged:
+def judge(
+    expect: Expect, record: Record, scenario: Scenario, events: Sequence[Event] = ()
+) -> Judged:
     """Compare an expectation with the record; a robot counts while it is a member.
 
     Where one has no rows of its controller, which was started again, the window isn't reached.
     """
+    window = window_of(expect, scenario, scenario.ends_at_s) or Window(0, -1)
     period_s = scenario.clock.control_period_s
-    end_s = scenario.ends_at_s if expect.to_s is None else expect.to_s
-    parts, seen_s, whole = [], [], True
-    for member, t, series, known in _series(expect, record, scenario):
-        to_s = min(end_s, member.leaves_tick * period_s)
-        if not member.overlaps(expect.from_s / period_s, end_s / period_s):
-            continue
-        window = _mask(member, len(t)) & (t >= expect.from_s) & (t <= end_s)
-        part = series[window & known]
-        seen_s.append(float(t[-1]) if len(t) else 0.0)
-        # The last tick of a window may be up to a period before its end.
-        whole &= 0 < len(part) == window.sum() and seen_s[-1] > to_s - 1.01 * period_s
-        parts.append(part)
-    values = np.concatenate(parts) if parts else np.empty(0)
-    judged: Judged = {k: v for k, v in asdict(expect).items() if v is not None}
-    judged |= {"held": None, "found": None}
-    if len(values):
-        found = {"max_abs": float(np.max(np.abs(values)))}
-        found |= {"min": float(values.min()), "max": float(values.max())}
-        held = _within(expect, values, found)
-        judged |= {"held": held if whole or not held else None, "found": found}
-    return (
-        judged
-        if judged["held"] is not None
-        else judged | {"seen_to_s": round(min(seen_s, default=0.0), 9)}
+    judged: Judged = {**expect.stated, "claim": claim(expect)}
+    judged["window"] = {
+        "from_s": round(window.first * period_s, 9),
+        "to_s": round(window.last * period_s, 9),
+    }
+    if expect.event is not None:
+        return judged | _judge_events(expect, record, window, period_s, events)
+    parts, seen = [], []
+    for series in _series(expect, record, scenario):
+        first = max(window.first, series.member.joins_tick)
+        behind = min(window.last + 1, series.member.leaves_tick)
+        if first < behind:
+            seen.append(len(series.values))
+            parts.append(_Part(series, first, _find(expect, series, first, behind, period_s)))
+    held = _all_held([part.finding.held for part in parts])
+    judged |= {"held": held, **_worst(expect, parts, record, period_s)}
+    judged["unit"] = _unit(expect, record)
+    if held is None:
+        judged["seen_to_s"] = _seen_to_s(seen, period_s)
+    return judged
+
+
+def _all_held(held: Sequence[bool | None]) -> bool | None:
+    if False in held:
+        return False
+    return None if None in held or not held else True
+
+
+# --- signals --------------------------------------------------------------------------------------
+
+
+def _find(expect: Expect, series: _Series, first: int, behind: int, period_s: float) -> Finding:
+    """What the ticks from `first` to before `behind` say."""
+    g = robustness.slack(
+        series.values[first:behind],
+        least=-inf if expect.min is None else expect.min,
+        most=inf if expect.max is None else expect.max,
+        widest=inf if expect.max_abs is None else expect.max_abs,
     )
+    g[~series.known[first:behind]] = np.nan
+    ticks = behind - first
+    if np.isneginf(g).any():  # no number, whatever was expected of it
+        return Finding(False, -inf, int(np.argmax(np.isneginf(g))))
+    piece = 1 if expect.for_s is None else ceil(expect.for_s / period_s - 1e-6) + 1
+    match expect.holds:
+        case "never":
+            return robustness.never(g, ticks, piece)
+        case "eventually":
+            return robustness.eventually(g, ticks, piece)
+    if expect.quantile is not None:
+        return robustness.share(g, ticks, expect.quantile)
+    if expect.settle_within_s is not None:
+        return robustness.settles(g, ticks, period_s, expect.settle_within_s)
+    return robustness.always(g, ticks)
+
+
+def _worst(expect: Expect, parts: Sequence[_Part], record: Record, period_s: float) -> Judged:
+    """Value, bound and margin of the series with the least margin; the failed ones first."""
+    found = [part for part in parts if part.finding.at is not None]
+    if not found:
+        return {"value": None, "worst": None, "bound": None, "margin": None}
+
+    def rank(part: _Part) -> tuple[bool, float]:
+        held, margin, *_ = part.finding
+        return held is not False, inf if isnan(margin) else margin
+
+    series, first, finding = min(found, key=rank)
+    tick = first + (finding.at or 0)
+    value = float(series.values[tick])
+    spread_out = expect.signal == SPREAD
+    robots = _farthest(series, tick, record) if spread_out else list(series.robots)
+    worst = _place(robots, tick, period_s)
+    margin = None if isnan(finding.margin) else finding.margin
+    if expect.settle_within_s is not None:
+        bound: Judged = {"settle_within_s": expect.settle_within_s}
+        return {"value": finding.settled_s, "worst": worst, "bound": bound, "margin": margin}
+    return {"value": value, "worst": worst, "bound": _bound(expect, value), "margin": margin}
+
+
+def _bound(expect: Expect, value: float) -> Judged:
+    """The bound that is nearest to a value, or farthest outside it."""
+    rooms = {"max_abs": lambda b: b - abs(value), "min": lambda b: value - b}
+    rooms["max"] = lambda b: b - value
+    given = {key: getattr(expect, key) for key in BOUNDS if getattr(expect, key) is not None}
+    key = min(given, key=lambda key: rooms[key](given[key]))
+    return {key: given[key]}
+
+
+def _place(robots: Sequence[str], tick: int, period_s: float) -> Judged:
+    return {"robots": list(robots), "tick": tick, "t_s": round(tick * period_s, 9)}
+
+
+def _seen_to_s(lengths: Sequence[int], period_s: float) -> float:
+    """Time of the last tick that all have."""
+    return round(max((min(lengths, default=0) - 1) * period_s, 0.0), 9)
+
+
+def _farthest(series: _Series, tick: int, record: Record) -> list[str]:
+    """The robots whose path variables are farthest apart."""
+    s = {robot: record.controller[robot]["s"][tick] for robot in series.robots}
+    known = {robot: value for robot, value in s.items() if not isnan(value)}
+    ends = [max(known, key=known.__getitem__), min(known, key=known.__getitem__)] if known else []
+    return list(dict.fromkeys(ends))
+
+
+def _unit(expect: Expect, record: Record) -> str:
+    if expect.settle_within_s is not None:
+        return "s"
+    tables = (PLANT_SIGNALS, DERIVED_SIGNALS, *record.signals.values())
+    units = {signal.name: signal.unit for table in tables for signal in table}
+    return units.get(expect.signal or "", "")
+
+
+def _series(expect: Expect, record: Record, scenario: Scenario) -> Iterator[_Series]:
+    """The series that an expectation is about."""
+    robots, members = expect.robots or record.robots, scenario.members
+    match expect.signal:
+        case None:
+            return
+        case _ if expect.signal == SPREAD:
+            yield _spread(robots, record, members)
+        case _ if expect.signal == DISTANCE:
+            for one, other in combinations(dict.fromkeys(robots), 2):
+                values = distance(record.plant[one], record.plant[other])
+                both = Membership(
+                    max(members[one].joins_tick, members[other].joins_tick),
+                    min(members[one].leaves_tick, members[other].leaves_tick),
+                )
+                yield _Series((one, other), both, values, np.ones(len(values), dtype=bool))
+        case signal:
+            for robot in robots:
+                if (found := _of_robot(signal, robot, record, scenario)) is not None:
+                    values, known = found
+                    yield _Series((robot,), members[robot], values, known)
+
+
+def _spread(robots: Sequence[str], record: Record, members: Mapping[str, Membership]) -> _Series:
+    rows = {robot: record.controller[robot] for robot in robots}
+    values = spread(rows, members)
+    known = np.ones(len(values), dtype=bool)
+    for robot, part in rows.items():
+        member = members[robot]
+        known &= (counted(part, member) | ~mask(member, len(part)))[: len(values)]
+    return _Series(tuple(robots), ALWAYS, values, known)
+
+
+def _of_robot(
+    signal: str, robot: str, record: Record, scenario: Scenario
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """A signal of one robot and where it is known; None if it has none of this name."""
+    plant, controller = record.plant[robot], record.controller[robot]
+    if signal == PATH_DISTANCE:
+        values = path_distance(scenario, robot, plant, controller["s"])
+        return values, np.ones(len(values), dtype=bool)
+    if signal in _OF_PLANT:
+        return plant[signal], np.ones(len(plant), dtype=bool)
+    if signal in (controller.dtype.names or ()):
+        return controller[signal], counted(controller, scenario.members[robot])
+    return None
+
+
+# --- events ---------------------------------------------------------------------------------------
+
+
+def _judge_events(
+    expect: Expect, record: Record, window: Window, period_s: float, events: Sequence[Event]
+) -> Judged:
+    """Count events of each robot that is named, or of all sources together."""
+    of_kind = [it for it in events if it.kind == expect.event and _in(window, it, expect)]
+    ends = {robot: len(record.controller[robot]) for robot in record.robots}
+    counts = []
+    for robot in expect.robots or ("",):
+        own = [event for event in of_kind if robot in ("", event.source)]
+        seen = ends.get(robot, max(ends.values(), default=0))
+        counts.append(_Count(robot, own, *_compared(expect, len(own), whole=seen > window.last)))
+    held = _all_held([count.held for count in counts])
+    worst = min(counts, key=lambda count: (count.held is not False, count.margin))
+    bounds = {key: value for key in COUNTS if (value := getattr(expect, key)) is not None}
+    key = min(bounds, key=lambda key: abs(bounds[key] - len(worst.events)))
+    judged: Judged = {"held": held, "value": len(worst.events), "worst": None}
+    if worst.events:
+        first = worst.events[0]
+        judged["worst"] = _place([first.source], first.tick, period_s)
+    elif worst.robot:
+        judged["worst"] = {"robots": [worst.robot], "tick": None, "t_s": None}
+    judged |= {"bound": {key: bounds[key]}, "margin": worst.margin, "unit": ""}
+    if held is None:
+        judged["seen_to_s"] = _seen_to_s([ends[r] for r in expect.robots or ends], period_s)
+    return judged
+
+
+class _Count(NamedTuple):
+    """Events of one robot, or of all sources."""
+
+    robot: str
+    events: list[Event]
+    held: bool | None
+    margin: int
+
+
+def _compared(expect: Expect, count: int, *, whole: bool) -> tuple[bool | None, int]:
+    """Whether a count of events holds, and the margin; `whole`: no more can come."""
+    least, most = expect.at_least, expect.at_most
+    margins = [] if least is None else [count - least]
+    margins += [] if most is None else [most - count]
+    margin = min(margins)
+    if most is not None and count > most:
+        return False, margin
+    if least is not None and count < least:
+        return False if whole else None, margin
+    return True if whole or most is None else None, margin
+
+
+def _in(window: Window, event: Event, expect: Expect) -> bool:
+    """Whether an event is in a window; one from the start on has the countdown in it."""
+    from_start = window.first == 0 and expect.reference is None
+    return (from_start or event.tick >= window.first) and event.tick <= window.last
+
+
+# --- the run --------------------------------------------------------------------------------------
 
 
 def verdict(expected: Sequence[Judged], *, stopped: bool, cut_short: bool) -> str:
@@ -112,42 +314,10 @@ def why_not_checked(expected: Sequence[Judged], cut_short: dict[str, str]) -> st
 def out_of_reach(scenario: Scenario) -> list[str]:
     """What a run can't check that ends before its scenario does, a line each."""
     end_s = scenario.ends_at_s
+    ticks = ceil(end_s / scenario.clock.control_period_s - 1e-6)
     lines = []
     for expect in scenario.expect:
-        if expect.from_s >= end_s or (expect.to_s is not None and expect.to_s > end_s):
-            until = f" to {expect.to_s:g} s" if expect.to_s is not None else ""
-            window = f"{expect.signal} from {expect.from_s:g} s{until}"
-            lines.append(f"not checked: {window}, the run ends at {end_s:g} s")
+        window = window_of(expect, scenario, end_s)
+        if window is None or not len(window) or window.last >= ticks:
+            lines.append(f"not checked: {claim(expect)}; the run ends at {end_s:g} s")
     return lines
-
-
-def _series(
-    expect: Expect, record: Record, scenario: Scenario
-) -> list[tuple[Membership, np.ndarray, np.ndarray, np.ndarray]]:
-    """When it counts, times, values, and whether they are known: of a spread one for all robots."""
-    robots = expect.robots or record.robots
-    if expect.signal == SPREAD:
-        rows = {robot: record.controller[robot] for robot in robots}
-        values = spread(rows, scenario.members)
-        known = np.ones(len(values), dtype=bool)
-        for robot, part in rows.items():
-            member = scenario.members[robot]
-            known &= (counted(part, member) | ~_mask(member, len(part)))[: len(values)]
-        return [(ALWAYS, rows[robots[0]]["t_s"][: len(values)], values, known)]
-    of_plant = expect.signal in _OF_PLANT
-    source = record.plant if of_plant else record.controller
-    found = []
-    for robot in robots:
-        own, member = source[robot], scenario.members[robot]
-        if expect.signal in (own.dtype.names or ()):
-            known = np.ones(len(own), dtype=bool) if of_plant else counted(own, member)
-            found.append((member, own["t_s"], own[expect.signal], known))
-    return found
-
-
-def _within(expect: Expect, values: np.ndarray, found: dict[str, float]) -> bool:
-    held = bool(np.isfinite(values).all())
-    held &= expect.max_abs is None or found["max_abs"] <= expect.max_abs
-    held &= expect.min is None or found["min"] >= expect.min
-    held &= expect.max is None or found["max"] <= expect.max
-    return held

@@ -18,7 +18,8 @@ from configs.roles import LAUNCHER, RECORDER
 from configs.scenario import Scenario
 from fleetloop.record.reader import Record
 from fleetloop.results import expectations
-from fleetloop.results.expectations import judge, spread, why_not_checked
+from fleetloop.results.derived import spread
+from fleetloop.results.expectations import judge, why_not_checked
 from fleetloop.results.network import network
 from fleetloop.settling import FINAL_S, settle_s
 
@@ -66,7 +67,8 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
     """The summary of a run, complete or not; of every robot all its own rows."""
     controllers = {robot: rows for robot, rows in record.controller.items() if len(rows)}
     ticks = max((len(rows) for rows in controllers.values()), default=0)
-    expected = [judge(expect, record, scenario) for expect in scenario.expect]
+    events = in_order(stats.events, scenario.names)
+    expected = [judge(expect, record, scenario, events) for expect in scenario.expect]
     cut_short = _cut_short(record, scenario, stats)
     verdict = stats.ended
     reason = stats.reason if stats.timed else f"{stats.reason}, after {ticks} ticks"
@@ -83,7 +85,6 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         if len(rows[scenario.members[robot].ticks])
     }
     simulated_s = round(ticks * scenario.clock.control_period_s, 9)
-    events = in_order(stats.events, scenario.names)
     return {
         "verdict": verdict,
         "reason": reason,

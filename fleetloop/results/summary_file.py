@@ -40,22 +40,20 @@ class _Spread(BaseModel):
     final: float | None
 
 
-class _Found(BaseModel):
-    max_abs: float | None
-    min: float | None
-    max: float | None
+class _Place(BaseModel):
+    robots: list[str]
+    t_s: float | None
 
 
 class _Expectation(BaseModel):
-    signal: str
-    from_s: float
-    to_s: float = 0.0
-    robots: list[str] = []
-    max_abs: float = 0.0
-    min: float = 0.0
-    max: float = 0.0
+    name: str | None = None
+    claim: str
     held: bool | None
-    found: _Found | None
+    value: float | None
+    worst: _Place | None
+    bound: dict[str, float] | None
+    margin: float | None
+    unit: str
     seen_to_s: float | None = None
 
     @model_validator(mode="after")

@@ -231,21 +231,36 @@ def mark(expect: dict[str, Any]) -> str:
 
 def claim(expect: dict[str, Any]) -> str:
     """An expectation and its result, in one line."""
-    bounds = [f"{k} {expect[k]:g}" for k in ("max_abs", "min", "max") if k in expect]
-    until = f" to {expect['to_s']:g} s" if "to_s" in expect else ""
-    found = expect["found"]
-    shown = "nothing"
-    if found is not None:
-        shown = ", ".join(
-            f"{k} {number(found[k], '.3g')}" for k in ("max_abs", "min", "max") if k in expect
-        )
+    return f"{label(expect)}: {finding(expect)}"
+
+
+def label(expect: dict[str, Any]) -> str:
+    """What an expectation says, behind its name if it has one."""
+    name = expect.get("name")
+    return f"{name}: {expect['claim']}" if name else str(expect["claim"])
+
+
+def finding(expect: dict[str, Any]) -> str:
+    """The result of an expectation: value, where and when, and the margin."""
+    unit = f" {expect['unit']}" if expect["unit"] not in ("", "1") else ""
+    if expect["worst"] is None and expect["value"] is None:
+        shown = "found nothing"
+    elif expect["value"] is None and "settle_within_s" in (expect["bound"] or ()):
+        shown = f"not settled{_at(expect['worst'])}"
+    else:
+        shown = f"found {number(expect['value'], '.3g')}{unit}{_at(expect['worst'])}"
+    if expect["margin"] is not None and isfinite(expect["margin"]):
+        shown += f", margin {number(expect['margin'], '+.2g')}{unit}"
     if expect["held"] is None:
         shown += f"; seen to {expect['seen_to_s']:.6g} s only"
-    robots = f" of {', '.join(expect['robots'])}" if "robots" in expect else ""
-    return (
-        f"{expect['signal']}{robots} from {expect['from_s']:g} s{until}:"
-        f" {', '.join(bounds)}; found {shown}"
-    )
+    return shown
+
+
+def _at(worst: dict[str, Any] | None) -> str:
+    if worst is None:
+        return ""
+    robots = f" ({', '.join(worst['robots'])})" if worst["robots"] else ""
+    return robots if worst["t_s"] is None else f"{robots} at {worst['t_s']:.6g} s"
 
 
 def _cells(values: dict[str, Any]) -> list[str]:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from agents.laws.adaptive_dsc import AdaptiveDsc
+from configs.expect import Expect
 from configs.loading import load
-from configs.sections import Expect
 from configs.signals import PATH_ERRORS
 from fleetloop.record.reader import Record
 from fleetloop.results.figures import all_figures, speed_estimates
@@ -172,12 +172,13 @@ def test_an_expectation_needs_rows_of_every_robot_that_it_is_about(uneven_run: P
             Expect(**late, **fine, robots=("r1",)),
             Expect(**late, **fine, robots=("r2",)),
             Expect(signal="x_e_m", from_s=2.0, **fine),
+            Expect(signal="x_e_m", from_s=2.0, to_s=2.398, **fine),
             Expect(signal="x_e_m", from_s=2.0, to_s=2.4, **fine),
             Expect(signal="x_m", from_s=3.0, **fine),
             Expect(signal="s_spread", from_s=3.0, **fine),
         )["expectations"]
     ]
-    assert held == [None, False, True, None, None, True, True, None]
+    assert held == [None, False, True, None, None, True, None, True, None]
 
 
 def test_figures_show_every_robot_up_to_its_own_end(uneven_run: Path) -> None:
