@@ -249,7 +249,8 @@ class RobotBrief:
     body: Body
     disturbance: WheelDisturbance
     drive: DriveModel
-    powertrain: PowertrainModel | None  # None: ideal motors and encoders
+    powertrain: PowertrainModel
+    ideal_powertrain: bool  # motors and encoders are ideal; what faults add has the model's values
     right_node: int
     left_node: int
     mounting: Mounting

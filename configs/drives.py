@@ -69,6 +69,18 @@ class Drive(Parameters):
         """Problems of the protocol's own keys with each other, with [clock] and with [host]."""
         return iter(())
 
+    def errors(self) -> tuple[str, ...]:
+        """Names of the errors with which an emulated drive can disarm; the first by default."""
+        return ()
+
+    def fault_problem(self, kind: str) -> str | None:
+        """The reason why an emulated drive can't have a fault of this kind, None if it can.
+
+        Of the kinds of `configs.faults.powertrains.DriveFault`: those that a protocol can have its
+        emulated drive has methods for.
+        """
+        return f"the emulated drives of this protocol have no {kind}"
+
     def velocity_limit(self) -> VelocityLimit | None:
         """The limit of speed in torque mode, None if there is none; not of the preset ideal."""
         return None

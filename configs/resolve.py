@@ -237,6 +237,7 @@ def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief
         ),
         drive=_drive_model(scenario, number),
         powertrain=_powertrain_model(scenario, number),
+        ideal_powertrain=scenario.drive.preset != "realistic",
         right_node=right_node,
         left_node=left_node,
         pose=robot.pose,
@@ -264,10 +265,8 @@ def _latency_ns(drive: Drive) -> tuple[int, int]:
     return _ns(least_s), _ns(most_s)
 
 
-def _powertrain_model(scenario: Scenario, number: int) -> PowertrainModel | None:
+def _powertrain_model(scenario: Scenario, number: int) -> PowertrainModel:
     drive, motor = scenario.drive, scenario.motor
-    if drive.preset != "realistic":
-        return None
     constant, limit = motor.torque_constant_N_m_A, motor.current_limit_A
     return PowertrainModel(
         motor=extended(

@@ -23,7 +23,8 @@ from configs.events import Event
 from fleetloop.record.writer import Source
 from plant.bus.build import build_buses
 from plant.herald import Herald
-from plant.robot import EmulatedRobot, diverged_robots, divergences, emulated_robot
+from plant.robot import EmulatedRobot, emulated_robot
+from plant.troubles import diverged_robots, divergences
 
 PROGRESS_EVERY_TICKS = 256
 

@@ -39,7 +39,8 @@ from plant.herald import Herald
 from plant.lockstep import LockstepLoop, PlantCounters
 from plant.real_robot import RealRobot
 from plant.realtime import RealtimeLoop
-from plant.robot import bus_troubles, diverged_robots, divergences, emulated_robot
+from plant.robot import emulated_robot
+from plant.troubles import bus_troubles, diverged_robots, divergences
 
 PLANT_PRIORITY = 45
 """SCHED_FIFO, above the controllers'."""

@@ -11,6 +11,22 @@ m̄_1 v' =  c b ω²      − D̄_11 v − D̄_12 ω + r/2 (τ_R + τ_L − Δ_R
 m̄_2 ω' = −(c/b) v ω   − D̄_21 v − D̄_22 ω + r/(2b) (τ_R − τ_L − Δ_R + Δ_L)
 ν_R = (v + b ω)/r,  ν_L = (v − b ω)/r                                        (3)
 
+Under a push (F along the body, T about the vertical) and with wheels that slip, i = R, L:
+
+u_R = v + b ω,  u_L = v − b ω        speeds of the rims over ground
+ν_i = u_i/ρ_i,  ρ_i = (1 − λ_i) r    λ slip ratio (r ν − u)/(r ν): the wheel turns faster       (3')
+n_i = τ_i − Δ_i − d_i ν_i            torque that the wheel passes on, but for its own inertia
+G_i = n_i/r if n_i ν_i > 0           it drives: the rim slides, and λ_i n_i ν_i turns to heat
+      n_i/ρ_i else                   it brakes, without slipping further: power as without heat
+j_i = I_w/ρ_i²,  m, I as above without I_w
+
+(m + j_R + j_L) v' +    b (j_R − j_L) ω'      =  m_c a ω²  + G_R + G_L + F                      (4')
+   b (j_R − j_L) v' + (I + b² (j_R + j_L)) ω' = −m_c a v ω + b (G_R − G_L) + T
+
+E = (m v² + I ω² + I_w (ν_R² + ν_L²))/2 has E' = F v + T ω + Σ η_i n_i ν_i with η_i = 1 − λ_i where
+a wheel drives, else 1: E' ≤ F v + T ω + Σ n_i ν_i, so slip creates no energy. Without push and slip
+(4') is (4), each line divided by r²/2 and r²/(2 b²).
+
 x, y [m]   θ [rad]   v [m/s]   ω [rad/s]   ν wheel speeds [rad/s]   τ, Δ [N·m] at the wheels
 """
 
@@ -22,6 +38,8 @@ from configs.brief import WheelDisturbance
 from configs.sections import Body
 from plant.divergence import FASTEST_WHEEL_RAD_S
 
+NO_SLIP = (1.0, 1.0)
+NO_PUSH = (0.0, 0.0)
 Accelerations = Callable[[float, float, float, float], tuple[float, float]]
 
 
@@ -38,9 +56,21 @@ class State(NamedTuple):
 
 
 class RigidBody:
-    """Constants of (4) for one robot."""
+    """Constants of (4), or of (4') where it slips or is pushed, for one robot.
 
-    def __init__(self, body: Body, disturbance: WheelDisturbance) -> None:
+    Args:
+        rolled: 1 − λ of the (right, left) wheel, above 0.
+        push: F [N] and T [N·m].
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        disturbance: WheelDisturbance,
+        *,
+        rolled: tuple[float, float] = NO_SLIP,
+        push: tuple[float, float] = NO_PUSH,
+    ) -> None:
         r, b, a = body.wheel_radius_m, body.half_track_m, body.com_offset_m
         mass = body.body_mass_kg + body.wheels_in_mass * body.wheel_mass_kg
         inertia = (
@@ -52,8 +82,9 @@ class RigidBody:
         scale = r * r / (4.0 * b * b)
         m11 = scale * (mass * b * b + inertia) + body.wheel_axle_inertia_kg_m2
         m12 = scale * (mass * b * b - inertia)
-        self.r, self.b, self.inv_r = r, b, 1.0 / r
-        self.fastest_m_s = r * FASTEST_WHEEL_RAD_S
+        self.r, self.b = r, b
+        self.inv_right, self.inv_left = 1.0 / (r * rolled[0]), 1.0 / (r * rolled[1])  # 1/ρ
+        self.fastest_m_s = r * min(rolled) * FASTEST_WHEEL_RAD_S
         """No wheel's rim moves faster."""
         self.c = r * r * body.body_mass_kg * a / (2.0 * b)
         self.mbar_1, self.mbar_2 = m11 + m12, m11 - m12
@@ -67,29 +98,38 @@ class RigidBody:
             0.5 * (right - left) / b / self.mbar_2,
             0.5 * (right + left) / self.mbar_2,
         )
-        self.accelerations = self._equations()
+        axle = body.wheel_axle_inertia_kg_m2
+        self.least_inertia_wheel_kg_m2 = axle + (min(self.mbar_1, self.mbar_2) - axle) * (
+            min(rolled) ** 2
+        )
+        """No wheel turns less than this, whatever the other one does."""
+        if rolled == NO_SLIP and push == NO_PUSH:
+            self.accelerations = self._equations()
+        else:
+            load = body.body_mass_kg * a
+            self.accelerations = self._general_equations((mass, inertia, axle, load), push)
         """(v, ω, right, left) ↦ (v', ω') under net wheel torques τ − Δ [N·m]."""
         self.disturbed = disturbance.amplitude_wheel_N_m != 0.0
         self._amplitude = disturbance.amplitude_wheel_N_m
         self._rate, self._phase = disturbance.rate_rad_s, disturbance.phase_rad
 
     def wheel_speeds(self, v: Any, omega: Any) -> tuple[Any, Any]:
-        """(right, left) wheel speeds ν [rad/s], equation (3)."""
+        """(right, left) wheel speeds ν [rad/s], equation (3) or (3')."""
         turn = self.b * omega
-        return (v + turn) * self.inv_r, (v - turn) * self.inv_r
+        return (v + turn) * self.inv_right, (v - turn) * self.inv_left
 
     def wheel_torques(self, v: Any, omega: Any, v_rate: Any, omega_rate: Any) -> tuple[Any, Any]:
         """(right, left) wheel torques τ − Δ [N·m] that give these accelerations: (4) inverted.
 
-        Of numbers, or of arrays of them.
+        Of numbers, or of arrays of them; of a body that neither slips nor is pushed.
         """
         nu_right, nu_left = self.wheel_speeds(v, omega)
         d_right, d_left = self.damping_wheel_N_m_s
         along = self.mbar_1 * v_rate - self.c * self.b * omega * omega
         turning = self.b * (self.mbar_2 * omega_rate + self.c / self.b * v * omega)
         return (
-            (along + turning) * self.inv_r + d_right * nu_right,
-            (along - turning) * self.inv_r + d_left * nu_left,
+            (along + turning) * self.inv_right + d_right * nu_right,
+            (along - turning) * self.inv_left + d_left * nu_left,
         )
 
     def disturbance(self, t_s: float) -> tuple[float, float]:
@@ -115,6 +155,35 @@ class RigidBody:
             return (
                 centrifugal * omega * omega - d11 * v - d12 * omega + g1 * (right + left),
                 -coriolis * v * omega - d21 * v - d22 * omega + g2 * (right - left),
+            )
+
+        return accelerations
+
+    def _general_equations(
+        self,
+        inertias: tuple[float, float, float, float],
+        push: tuple[float, float],
+    ) -> Accelerations:
+        """(v', ω') of (4'): `inertias` are m, I, I_w and m_c a."""
+        mass, inertia, axle, load = inertias
+        b, inv_r, inv_right, inv_left = self.b, 1.0 / self.r, self.inv_right, self.inv_left
+        j_right, j_left = axle * inv_right * inv_right, axle * inv_left * inv_left
+        along, across = mass + j_right + j_left, b * (j_right - j_left)
+        turning = inertia + b * b * (j_right + j_left)
+        determinant = along * turning - across * across
+        d_right, d_left = self.damping_wheel_N_m_s
+        force, torque = push
+
+        def accelerations(v: float, omega: float, right: float, left: float) -> tuple[float, float]:
+            nu_right, nu_left = (v + b * omega) * inv_right, (v - b * omega) * inv_left
+            net_right, net_left = right - d_right * nu_right, left - d_left * nu_left
+            drive_right = net_right * (inv_r if net_right * nu_right > 0.0 else inv_right)
+            drive_left = net_left * (inv_r if net_left * nu_left > 0.0 else inv_left)
+            f = load * omega * omega + drive_right + drive_left + force
+            t = b * (drive_right - drive_left) - load * v * omega + torque
+            return (
+                (turning * f - across * t) / determinant,
+                (along * t - across * f) / determinant,
             )
 
         return accelerations

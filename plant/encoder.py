@@ -14,41 +14,30 @@ The loop runs at its own rate whatever the step: within a step the shaft turns e
 samples it at its own instants. So noise and lag are those of the drive: for 8192 counts and 8 kHz
 about 0.01 rev/s rms at w = 1000 rad/s and 0.0003 at 200.
 
-    fault        from now on                                        amount (default)
-    FREEZE       the count stays
-    JUMP         once, the count jumps                              revolutions (0.1)
-    SIGN_FLIP    the count runs backwards
-    COUNT_LOSS   edges are lost at random, in either direction      fraction, 0 to 1 (0.01)
-    NOISE        angle noise before the count is taken              counts rms (2)
+Under effects of faults (`plant.effects`):
+
+    encoder_frozen         the count stays
+    encoder_flipped        the count runs backwards
+    encoder_kept           other edges are lost at random, in either direction
+    encoder_noise_counts   angle noise before the count is taken, beside the encoder's own
 
 An encoder with an index finds lost counts again, where the mark passes (to whole revolutions);
-without it they stay lost, also once the fault is cleared. An angle that isn't finite leaves the
+without it they stay lost, also once the fault is over. An angle that isn't finite leaves the
 count where it is.
 """
 
-from enum import Enum
-from math import copysign, isfinite, pi
+from math import copysign, hypot, isfinite, pi
 from random import Random
 
 from configs import powertrain
+from plant.effects import WheelEffects
 
 PER_RADIAN = 1.0 / (2.0 * pi)
 """Revolutions per radian; also rev/s per rad/s."""
 _LARGEST_COUNT = 2.0**52
 """Beyond it a float doesn't tell counts apart, so the count stays there."""
-_FARTHEST_JUMP = 1e6
 _EARLY = 1e-9
 """A sample that is due within this part of a loop period is taken: sums of steps are rounded."""
-
-
-class EncoderFault(Enum):
-    """A fault of an encoder; the value is its name."""
-
-    FREEZE = "encoder_freeze"
-    JUMP = "encoder_jump"
-    SIGN_FLIP = "encoder_sign_flip"
-    COUNT_LOSS = "encoder_count_loss"
-    NOISE = "encoder_noise"
 
 
 class Encoder:
@@ -84,8 +73,9 @@ class Encoder:
         self._gain_p = 2.0 * bandwidth  # T k_p
         self._gain_v = bandwidth * bandwidth  # T² k_i: velocities are counts per loop period
         self._offset = 0.0  # what the count has more than it should, whole
+        self._plain = True
         self.reset()
-        self.clear_faults()
+        self.apply(WheelEffects())
 
     @property
     def count(self) -> int:
@@ -123,48 +113,25 @@ class Encoder:
         counts = model.counts_per_shaft_rev
         return self._position / counts, self._velocity * model.pll_rate_Hz / counts
 
-    def inject(self, fault: EncoderFault, amount: float | None = None) -> None:
-        """Set a fault, beside those already there; `amount` as in the module's table.
-
-        Raises:
-            ValueError: the amount isn't finite or out of its range.
-        """
-        if amount is not None and not isfinite(amount):
-            raise ValueError(f"{fault.value} = {amount}: must be finite")
-        match fault:
-            case EncoderFault.FREEZE:
-                self._frozen = True
-            case EncoderFault.JUMP:
-                turns = 0.1 if amount is None else amount
-                if not abs(turns) <= _FARTHEST_JUMP:
-                    raise ValueError(f"{fault.value} = {turns}: must be within ±1e6 revolutions")
-                self._offset += float(round(turns * self._model.counts_per_shaft_rev))
-            case EncoderFault.SIGN_FLIP:
-                self._flipped = True
-            case EncoderFault.COUNT_LOSS:
-                loss = 0.01 if amount is None else amount
-                if not 0.0 <= loss <= 1.0:
-                    raise ValueError(f"{fault.value} = {loss}: must be a fraction, 0 to 1")
-                self._loss = loss
-            case EncoderFault.NOISE:
-                noise = 2.0 if amount is None else amount
-                if noise < 0.0:
-                    raise ValueError(f"{fault.value} = {noise}: must be counts rms, 0 or more")
-                self._noise = noise
+    def apply(self, effects: WheelEffects) -> None:
+        """Let these effects act from now on, and no others; what was lost stays lost."""
+        self._frozen, self._flipped = effects.encoder_frozen, effects.encoder_flipped
+        self._loss = 1.0 - effects.encoder_kept
+        self._noise = hypot(self._model.noise_counts, effects.encoder_noise_counts)
         self._choose_path()
 
-    def clear_faults(self) -> None:
-        """A sound encoder again; what was lost stays lost until an index passes."""
-        self._frozen = self._flipped = False
-        self._loss = 0.0
-        self._noise = self._model.noise_counts
+    def jump(self, shaft_rev: float) -> None:
+        """Let the count jump, once and for good."""
+        self._offset += float(round(shaft_rev * self._model.counts_per_shaft_rev))
         self._choose_path()
 
     def _choose_path(self) -> None:
         """The plain path is the fast one: nothing happens to counts on the way."""
         astray = self._model.index and self._offset % self._model.counts_per_shaft_rev != 0.0
-        self._plain = not (self._frozen or self._flipped or self._loss or self._noise or astray)
-        self._counted = self._angle // 1.0
+        plain = not (self._frozen or self._flipped or self._loss or self._noise or astray)
+        if plain or self._plain:
+            self._counted = self._angle // 1.0
+        self._plain = plain
 
     def _track(self, at: float, slope: float, samples: int) -> None:
         """Equations (1) and (2) at counts `at`, `at + slope`, …: the inner loop."""

@@ -1,27 +1,194 @@
 """Faults of the plant: what acts on the robots of one bus, tick by tick.
 
-At a tick at which something changes, the effects of a robot are made anew of all the faults that
-act on it, in the order in which they began; so one that ends leaves the others as they are. Faults
-that are an instant strike once.
+EFFECTS    of faults that last: their part of the robot's effects (`plant.effects`), which are
+           made anew of all that act on it when one begins or ends
+STRIKES    of faults that are an instant: what they do to the robot, once
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import hypot
 from typing import Any
 
 from bridge.fault_schedule import FaultSchedule
+from configs.brief import Schedule
 from configs.faults.base import PlannedFault
+from plant.effects import PoseDrift, RobotEffects, WheelEffects, of_side
 from plant.robot import EmulatedRobot
 
-Effect = Callable[[EmulatedRobot, Any], None]
-"""Lets a fault, of its kind's class, act on a robot."""
+Effect = Callable[[RobotEffects, Any, int], None]
+"""Adds a fault, of its kind's class, that began at a scenario time [ns]."""
+Strike = Callable[[EmulatedRobot, Any, int], None]
+"""Lets a fault, of its kind's class, strike a robot at a bus time [ns]."""
 
 
-def _push(robot: EmulatedRobot, fault: Any) -> None:
-    robot.push(fault.force_body_N, fault.torque_body_N_m)
+def _each_wheel(effect: Callable[[WheelEffects, Any], None]) -> Effect:
+    """The effect of a `WheelFault`, of its effect on one wheel."""
+
+    def of_robot(effects: RobotEffects, fault: Any, _: int) -> None:
+        for wheel in of_side((effects.right, effects.left), fault.wheel):
+            effect(wheel, fault)
+
+    return of_robot
+
+
+# --- powertrains ----------------------------------------------------------------------------------
+
+
+@_each_wheel
+def _torque_half(wheel: WheelEffects, _: Any) -> None:
+    wheel.torque_factor *= 0.5
+
+
+@_each_wheel
+def _torque_reversed(wheel: WheelEffects, _: Any) -> None:
+    wheel.torque_factor *= -1.0
+
+
+@_each_wheel
+def _torque_stuck(wheel: WheelEffects, _: Any) -> None:
+    wheel.torque_stuck = True
+
+
+@_each_wheel
+def _torque_zero(wheel: WheelEffects, _: Any) -> None:
+    wheel.torque_zero = True
+
+
+@_each_wheel
+def _fet_over_temperature(wheel: WheelEffects, fault: Any) -> None:
+    wheel.fet_rise_K += fault.rise_K
+
+
+@_each_wheel
+def _motor_over_temperature(wheel: WheelEffects, fault: Any) -> None:
+    wheel.motor_rise_K += fault.rise_K
+
+
+def _voltage(effects: RobotEffects, fault: Any, _: int) -> None:
+    effects.supply_V = fault.voltage_V
+
+
+@_each_wheel
+def _encoder_freeze(wheel: WheelEffects, _: Any) -> None:
+    wheel.encoder_frozen = True
+
+
+@_each_wheel
+def _encoder_sign_flip(wheel: WheelEffects, _: Any) -> None:
+    wheel.encoder_flipped = not wheel.encoder_flipped
+
+
+@_each_wheel
+def _encoder_noise(wheel: WheelEffects, fault: Any) -> None:
+    wheel.encoder_noise_counts = hypot(wheel.encoder_noise_counts, fault.counts_rms)
+
+
+@_each_wheel
+def _encoder_slip(wheel: WheelEffects, fault: Any) -> None:
+    wheel.encoder_kept *= 1.0 - fault.share
+
+
+def _encoder_jump(robot: EmulatedRobot, fault: Any, _: int) -> None:
+    for encoder in of_side(robot.encoders, fault.wheel):
+        encoder.jump(fault.shaft_rev)
+
+
+# --- drives ---------------------------------------------------------------------------------------
+
+
+def _drive_estop(robot: EmulatedRobot, fault: Any, _: int) -> None:
+    for drive in of_side(robot.drives, fault.wheel):
+        drive.estop()
+
+
+def _drive_watchdog(robot: EmulatedRobot, fault: Any, _: int) -> None:
+    for drive in of_side(robot.drives, fault.wheel):
+        drive.expire_watchdog()
+
+
+def _drive_reboot(robot: EmulatedRobot, fault: Any, bus_ns: int) -> None:
+    for drive in of_side(robot.drives, fault.wheel):
+        drive.reboot(bus_ns)
+
+
+def _drive_error(robot: EmulatedRobot, fault: Any, _: int) -> None:
+    for drive in of_side(robot.drives, fault.wheel):
+        drive.trip(fault.error)
+
+
+# --- bodies ---------------------------------------------------------------------------------------
+
+
+def _push(effects: RobotEffects, fault: Any, _: int) -> None:
+    effects.force_body_N += fault.force_body_N
+    effects.torque_body_N_m += fault.torque_body_N_m
+
+
+def _payload(effects: RobotEffects, fault: Any, _: int) -> None:
+    effects.mass_kg += fault.mass_kg
+    effects.inertia_kg_m2 += fault.inertia_kg_m2
+    effects.com_offset_m += fault.com_offset_m
+
+
+@_each_wheel
+def _friction(wheel: WheelEffects, fault: Any) -> None:
+    wheel.friction_factor *= fault.factor
+
+
+def _wheel_radius(effects: RobotEffects, fault: Any, _: int) -> None:
+    effects.radius_factor *= fault.factor
+
+
+@_each_wheel
+def _wheel_slip(wheel: WheelEffects, fault: Any) -> None:
+    wheel.rolled *= 1.0 - fault.ratio
+
+
+# --- localisation ---------------------------------------------------------------------------------
+
+
+def _localisation_bias(effects: RobotEffects, fault: Any, _: int) -> None:
+    x, y, theta = effects.pose
+    effects.pose = x + fault.x_m, y + fault.y_m, theta + fault.theta_rad
+
+
+def _localisation_drift(effects: RobotEffects, fault: Any, begun_ns: int) -> None:
+    effects.drifts.append(PoseDrift(begun_ns, fault.x_m_s, fault.y_m_s, fault.theta_rad_s))
+
+
+def _localisation_jump(robot: EmulatedRobot, fault: Any, _: int) -> None:
+    robot.jump_pose(fault.x_m, fault.y_m, fault.theta_rad)
 
 
 EFFECTS: Mapping[str, Effect] = {
+    "torque_stuck": _torque_stuck,
+    "torque_half": _torque_half,
+    "torque_zero": _torque_zero,
+    "torque_reversed": _torque_reversed,
+    "fet_over_temperature": _fet_over_temperature,
+    "motor_over_temperature": _motor_over_temperature,
+    "under_voltage": _voltage,
+    "over_voltage": _voltage,
+    "encoder_freeze": _encoder_freeze,
+    "encoder_sign_flip": _encoder_sign_flip,
+    "encoder_noise": _encoder_noise,
+    "encoder_slip": _encoder_slip,
     "push": _push,
+    "payload": _payload,
+    "friction": _friction,
+    "wheel_radius": _wheel_radius,
+    "wheel_slip": _wheel_slip,
+    "localisation_bias": _localisation_bias,
+    "localisation_drift": _localisation_drift,
+}
+"""By kind."""
+STRIKES: Mapping[str, Strike] = {
+    "drive_estop": _drive_estop,
+    "drive_watchdog": _drive_watchdog,
+    "drive_reboot": _drive_reboot,
+    "drive_error": _drive_error,
+    "encoder_jump": _encoder_jump,
+    "localisation_jump": _localisation_jump,
 }
 """By kind."""
 
@@ -29,10 +196,13 @@ EFFECTS: Mapping[str, Effect] = {
 class BusFaults:
     """The faults of the robots on one bus."""
 
-    __slots__ = ("_robots", "schedule")
+    __slots__ = ("_robots", "_ticks", "schedule")
 
-    def __init__(self, planned: Iterable[PlannedFault], robots: Sequence[EmulatedRobot]) -> None:
+    def __init__(
+        self, planned: Iterable[PlannedFault], robots: Sequence[EmulatedRobot], ticks: Schedule
+    ) -> None:
         self._robots = {robot.brief.robot: robot for robot in robots}
+        self._ticks = ticks
         self.schedule = FaultSchedule(one for one in planned if one.target in self._robots)
 
     def begin(self, tick: int) -> None:
@@ -42,14 +212,16 @@ class BusFaults:
 
     def _change(self, tick: int) -> None:
         changes = self.schedule.due(tick)
-        for name in dict.fromkeys(change.planned.target for change in changes):
-            robot = self._robots[name]
-            robot.clear_faults()
+        lasting = [change.planned.target for change in changes if not change.planned.fault.INSTANT]
+        for name in dict.fromkeys(lasting):
+            effects = RobotEffects()
             for planned in self.schedule.acting:
                 if planned.target == name:
-                    EFFECTS[planned.fault.kind](robot, planned.fault)
+                    begun_ns = planned.from_tick * self._ticks.period_ns
+                    EFFECTS[planned.fault.kind](effects, planned.fault, begun_ns)
+            self._robots[name].apply(effects)
+        bus_ns = self._ticks.bus_time_ns(tick)
         for change in changes:
-            if change.acts and change.planned.fault.INSTANT:
-                EFFECTS[change.planned.fault.kind](
-                    self._robots[change.planned.target], change.planned.fault
-                )
+            planned = change.planned
+            if planned.fault.INSTANT:
+                STRIKES[planned.fault.kind](self._robots[planned.target], planned.fault, bus_ns)

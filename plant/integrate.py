@@ -39,9 +39,9 @@ def rk4(
         a4, w4 = accelerations(v4, omega4, right_4, left_4)
 
         sixth = step_s / 6.0
-        travel = sixth * (v + 2.0 * (v2 + v3) + v4)
+        along = sixth * (v + 2.0 * (v2 + v3) + v4)
         turn = sixth * (omega + 2.0 * (omega2 + omega3) + omega4)
-        rolled, turned = travel * body.inv_r, turn * body.b * body.inv_r
+        across = turn * body.b
         x += sixth * (
             v * cos(theta) + 2.0 * (v2 * cos(theta2) + v3 * cos(theta3)) + v4 * cos(theta4)
         )
@@ -51,8 +51,8 @@ def rk4(
         theta += turn
         v += sixth * (a1 + 2.0 * (a2 + a3) + a4)
         omega += sixth * (w1 + 2.0 * (w2 + w3) + w4)
-        right_wheel_rad = right_wheel_rad + rolled + turned
-        left_wheel_rad = left_wheel_rad + rolled - turned
+        right_wheel_rad = right_wheel_rad + (along + across) * body.inv_right
+        left_wheel_rad = left_wheel_rad + (along - across) * body.inv_left
     except ValueError:  # the sine of infinity
         return None
     if not abs(v) + body.b * abs(omega) <= body.fastest_m_s:

@@ -20,41 +20,28 @@ seen at the shaft: give min(m̄_1, m̄_2) / gear ratio². Source: R. Kikuuwe, N.
 H. Mochiyama, H. Fujimoto, Admittance and impedance representations of friction based on implicit
 Euler integration, IEEE Transactions on Robotics 22(6), 2006.
 
-    fault                   drive measures    shaft                      amount (default)
-    TORQUE_STUCK            last current      last torque
-    TORQUE_HALF             i                 k i / 2
-    TORQUE_ZERO             0                 0
-    TORQUE_REVERSED         i                 −k i
-    FET_OVER_TEMPERATURE    θ_FET + amount    as without                 rise [K] (100)
-    MOTOR_OVER_TEMPERATURE  θ_motor + amount  as without                 rise [K] (100)
+Under effects of faults (`plant.effects`), together with what the motor does else:
+
+    effect               current                              shaft
+    torque_stuck         i* of the moment at which it began   k i
+    torque_zero          i* = 0, whatever else                0
+    torque_factor        by (2)                               factor × k i, back-EMF likewise
+    fet_rise_K           θ_FET measured, with the rise        as without
+    motor_rise_K         θ measured, with the rise            as without
 
 A demand or speed that isn't finite acts as the largest one, NaN as 0: what comes out is finite.
 """
 
-from enum import Enum
-from math import exp, expm1, inf, isfinite, sqrt
+from math import exp, expm1, inf, sqrt
 from random import Random
 
 from configs.brief import MotorModel
+from plant.effects import WheelEffects
 from plant.supply import Supply
 
 _MODULATION = sqrt(3.0) / 2.0
 FASTEST_SHAFT_RAD_S = 1e12
 """Behind the largest gear ratio, 10⁶, of a wheel at `plant.divergence.FASTEST_WHEEL_RAD_S`."""
-
-
-class MotorFault(Enum):
-    """A fault of a motor or its power stage; the value is its name."""
-
-    TORQUE_STUCK = "torque_stuck"
-    TORQUE_HALF = "torque_half"
-    TORQUE_ZERO = "torque_zero"
-    TORQUE_REVERSED = "torque_reversed"
-    FET_OVER_TEMPERATURE = "fet_over_temperature"
-    MOTOR_OVER_TEMPERATURE = "motor_over_temperature"
-
-
-_RISE_K = 100.0
 
 
 class Motor:
@@ -83,6 +70,7 @@ class Motor:
         "_pending",
         "_random",
         "_resistance",
+        "_stuck_A",
         "_supply",
         "_winding_K",
         "_winding_K_A2",
@@ -103,7 +91,8 @@ class Motor:
         self._random = random
         self._constant = model.torque_constant_N_m_A
         self._resistance = model.winding_resistance_ohm + model.fet_resistance_ohm
-        self._override_A: float | None = None
+        self._override_A: float | None = None  # of i*, by a fault
+        self._stuck_A: float | None = None
         self._asked_A = self._acting_A = 0.0
         self._pending: list[tuple[float, float]] = []  # seconds from now, current from then on
         self._dt_s = 0.0
@@ -165,38 +154,25 @@ class Motor:
         quantum = model.current_quantum_A
         return torque, quantum * round(current / quantum) if quantum else current
 
-    def inject(self, fault: MotorFault, amount: float | None = None) -> None:
-        """Set a fault; `amount` as in the module's table.
+    def apply(self, effects: WheelEffects, inertia_shaft_kg_m2: float) -> None:
+        """Let these effects act from now on, and no others; heat and current are continuous.
 
-        Raises:
-            ValueError: the amount isn't finite.
+        The inertia is that of the body under them.
         """
-        rise = _RISE_K if amount is None else amount
-        if not isfinite(rise):
-            raise ValueError(f"{fault.value} = {rise}: must be a finite rise in K")
-        constant = self._model.torque_constant_N_m_A
-        match fault:
-            case MotorFault.TORQUE_STUCK:
-                self._override_A = self.current_A
-            case MotorFault.TORQUE_ZERO:
-                self._override_A = 0.0
-            case MotorFault.TORQUE_HALF:
-                self._constant = 0.5 * constant
-            case MotorFault.TORQUE_REVERSED:
-                self._constant = -constant
-            case MotorFault.FET_OVER_TEMPERATURE:
-                self._fet_zero_C = self._model.ambient_C + rise
-                self.fet_C = self._fet_K + self._fet_zero_C
-            case MotorFault.MOTOR_OVER_TEMPERATURE:
-                self._motor_zero_C = self._model.ambient_C + rise
-                self.motor_C = self._winding_K + self._motor_zero_C
-
-    def clear_faults(self) -> None:
-        """A sound motor again; heat and current are those of this moment."""
-        self._constant = self._model.torque_constant_N_m_A
-        self._override_A = None
-        ambient = self._fet_zero_C = self._motor_zero_C = self._model.ambient_C
-        self.fet_C, self.motor_C = self._fet_K + ambient, self._winding_K + ambient
+        model = self._model
+        self._constant = model.torque_constant_N_m_A * effects.torque_factor
+        if not effects.torque_stuck:
+            self._stuck_A = None
+        elif self._stuck_A is None:
+            self._stuck_A = self.current_A
+        self._override_A = 0.0 if effects.torque_zero else self._stuck_A
+        self._fet_zero_C = model.ambient_C + effects.fet_rise_K
+        self._motor_zero_C = model.ambient_C + effects.motor_rise_K
+        self.fet_C = self._fet_K + self._fet_zero_C
+        self.motor_C = self._winding_K + self._motor_zero_C
+        self._inertia = inertia_shaft_kg_m2
+        if self._dt_s:
+            self._inertia_rate = inertia_shaft_kg_m2 / self._dt_s
 
     def _discretise(self, dt_s: float) -> None:
         model = self._model

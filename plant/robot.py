@@ -9,24 +9,33 @@ Drives, motors and encoders are at the motor shaft, the body and what is recorde
 
     EmulatedRobot     ideal motors and encoders: a drive's demand acts at once, its encoder is exact
     RealisticRobot    motors, supply and encoders of `plant.powertrain`
+
+Effects of faults are values (`plant.effects`), taken over as a whole when they change. Without any,
+nothing on the way is asked for them: what they need is made with them.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
+from math import ceil, inf
 
 from bridge.drives import protocol
 from bridge.drives.interface import DriveMeasurements, DriveNode
 from bridge.frame import Frame
 from bridge.network.messages import PoseFix
-from configs.brief import PowertrainModel, RobotBrief
-from configs.events import Event, when
+from configs.brief import RobotBrief
 from plant.body import RigidBody, State
 from plant.divergence import Divergence
-from plant.encoder import PER_RADIAN
+from plant.effects import RobotEffects
+from plant.encoder import PER_RADIAN, Encoder
+from plant.exact import ExactEncoder, ExactPowertrain
 from plant.integrate import rk4
+from plant.localisation import FaultyLocalisation
 from plant.powertrain import powertrain
 
 MEASURE_EVERY_S = 0.001
 """Shortest period at which a drive's firmware reads its thermistors and currents."""
+_SHORTEST_STEP_S = 1e-5
+_STABLE = 2.0
+"""Friction's rate by the step: explicit steps are stable below 2.78."""
 
 
 class EmulatedRobot:
@@ -37,11 +46,12 @@ class EmulatedRobot:
         "_body",
         "_demand_left_wheel_N_m",
         "_demand_right_wheel_N_m",
+        "_faulty",
         "_gear_left",
         "_gear_right",
         "_left",
-        "_push_left_wheel_N_m",
-        "_push_right_wheel_N_m",
+        "_localisation",
+        "_longest_step_s",
         "_right",
         "_torque_left_wheel_N_m",
         "_torque_right_wheel_N_m",
@@ -69,7 +79,9 @@ class EmulatedRobot:
         self._answered_ns = 0
         self._demand_right_wheel_N_m = self._demand_left_wheel_N_m = 0.0
         self._torque_right_wheel_N_m = self._torque_left_wheel_N_m = 0.0
-        self._push_right_wheel_N_m = self._push_left_wheel_N_m = 0.0
+        self._faulty: ExactPowertrain | None = None
+        self._localisation: FaultyLocalisation | None = None
+        self._longest_step_s = inf
         pose = brief.pose
         self.state = State(
             pose.x_m, pose.y_m, pose.theta_rad, brief.v_m_s, brief.omega_rad_s, 0.0, 0.0
@@ -80,8 +92,13 @@ class EmulatedRobot:
         state = self.state
         right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
         right, left = PER_RADIAN * self._gear_right, PER_RADIAN * self._gear_left
-        self._right.update_encoder(state.right_wheel_rad * right, right_speed * right)
-        self._left.update_encoder(state.left_wheel_rad * left, left_speed * left)
+        of_right = state.right_wheel_rad * right, right_speed * right
+        of_left = state.left_wheel_rad * left, left_speed * left
+        if self._faulty is not None:
+            right_encoder, left_encoder = self._faulty.encoders
+            of_right, of_left = right_encoder.read(*of_right), left_encoder.read(*of_left)
+        self._right.update_encoder(*of_right)
+        self._left.update_encoder(*of_left)
 
     def feedback(self, now_ns: int) -> Sequence[Frame]:
         """Both encoder frames, once both drives have taken a set-point since the last ones."""
@@ -114,20 +131,18 @@ class EmulatedRobot:
         state = self.state
         right = self._right.torque_demand_shaft(period_s) * self._gear_right
         left = self._left.torque_demand_shaft(period_s) * self._gear_left
-        self._torque_right_wheel_N_m = self._demand_right_wheel_N_m = right
-        self._torque_left_wheel_N_m = self._demand_left_wheel_N_m = left
+        self._demand_right_wheel_N_m, self._demand_left_wheel_N_m = right, left
+        if self._faulty is not None:
+            right, left = self._faulty.torques(right, left)
+        self._torque_right_wheel_N_m, self._torque_left_wheel_N_m = right, left
         if self.divergence is not None:
             return
         step = period_s / substeps
+        if step > self._longest_step_s:
+            substeps = ceil(period_s / self._longest_step_s)
+            step = period_s / substeps
         for n in range(substeps):
-            after = rk4(
-                self._body,
-                state,
-                right + self._push_right_wheel_N_m,
-                left + self._push_left_wheel_N_m,
-                t_s + n * step,
-                step,
-            )
+            after = rk4(self._body, state, right, left, t_s + n * step, step)
             if after is None:
                 state = self._stop(state, Divergence(t_s, state.v, state.omega, right, left))
                 break
@@ -136,26 +151,59 @@ class EmulatedRobot:
 
     # --- faults ------------------------------------------------------------------------------
 
-    def clear_faults(self) -> None:
-        """All faults of before end; what they did stays done."""
-        self._push_right_wheel_N_m = self._push_left_wheel_N_m = 0.0
+    def apply(self, effects: RobotEffects) -> None:
+        """Let these effects act from now on, and no others; what former ones did stays done.
 
-    def push(self, force_body_N: float, torque_body_N_m: float) -> None:
-        """From now on a force along the body's axis and a torque act on it, beside others.
-
-        They are as wheel torques r F/2 ± r T/(2 b): (4) multiplied by the body's inertia.
+        Speeds of the body are continuous, and so are poses, counts and charges.
         """
-        along = 0.5 * self._body.r * force_body_N
-        turning = 0.5 * self._body.r / self._body.b * torque_body_N_m
-        self._push_right_wheel_N_m += along + turning
-        self._push_left_wheel_N_m += along - turning
+        brief = self.brief
+        self._body = body = RigidBody(
+            effects.loaded(brief.body),
+            brief.disturbance,
+            rolled=effects.rolled,
+            push=(effects.force_body_N, effects.torque_body_N_m),
+        )
+        fastest = max(body.damping_wheel_N_m_s) / body.least_inertia_wheel_kg_m2
+        self._longest_step_s = max(_STABLE / fastest, _SHORTEST_STEP_S) if fastest else inf
+        if self._localisation is None and effects.of_poses:
+            self._localisation = FaultyLocalisation()
+        if self._localisation is not None:
+            self._localisation.apply(effects)
+        self._apply_to_powertrain(effects)
+
+    def _apply_to_powertrain(self, effects: RobotEffects) -> None:
+        if self._faulty or effects.right.of_powertrain or effects.left.of_powertrain:
+            torques = self._torque_right_wheel_N_m, self._torque_left_wheel_N_m
+            self._exact_powertrain().apply(effects, torques, self._shafts_rev())
+
+    def _exact_powertrain(self) -> ExactPowertrain:
+        if self._faulty is None:
+            self._faulty = ExactPowertrain(self.brief.powertrain, self._shafts_rev())
+        return self._faulty
+
+    def _shafts_rev(self) -> tuple[float, float]:
+        """Angle of the (right, left) shaft [rev]."""
+        right, left = PER_RADIAN * self._gear_right, PER_RADIAN * self._gear_left
+        return self.state.right_wheel_rad * right, self.state.left_wheel_rad * left
+
+    @property
+    def encoders(self) -> tuple[Encoder | ExactEncoder, Encoder | ExactEncoder]:
+        """The (right, left) encoder, for its count to jump."""
+        return self._exact_powertrain().encoders
+
+    def jump_pose(self, x_m: float, y_m: float, theta_rad: float) -> None:
+        """Let the next pose alone be off by this."""
+        if self._localisation is None:
+            self._localisation = FaultyLocalisation()
+        self._localisation.jump(x_m, y_m, theta_rad)
 
     # --- motion ------------------------------------------------------------------------------
 
     def pose_fix(self, tick: int, t_ns: int) -> PoseFix:
         """The pose as the localisation system sees it now."""
         state = self.state
-        return PoseFix(tick, t_ns, state.x, state.y, state.theta)
+        fix = PoseFix(tick, t_ns, state.x, state.y, state.theta)
+        return fix if self._localisation is None else self._localisation.seen(fix)
 
     def move(self, to_ns: int, zero_ns: int, step_ns: int) -> None:
         """Move on to a bus time, in steps of at most `step_ns`, and tell the drives where that is.
@@ -201,14 +249,28 @@ class RealisticRobot(EmulatedRobot):
 
     __slots__ = ("_train", "_unmeasured_s")
 
-    def __init__(self, brief: RobotBrief, model: PowertrainModel) -> None:
+    def __init__(self, brief: RobotBrief) -> None:
         super().__init__(brief)
-        self._train = powertrain(model, self._shaft_inertia(brief.mounting.gear_ratio))
+        self._train = powertrain(brief.powertrain, self._shaft_inertia())
         self._unmeasured_s = 0.0
 
-    def _shaft_inertia(self, gear_ratio: float) -> float:
+    def _shaft_inertia(self) -> float:
         """The least inertia that a motor turns, at its shaft [kg·m²]."""
-        return min(self._body.mbar_1, self._body.mbar_2) / (gear_ratio * gear_ratio)
+        gear_ratio = self.brief.mounting.gear_ratio
+        return self._body.least_inertia_wheel_kg_m2 / (gear_ratio * gear_ratio)
+
+    def _apply_to_powertrain(self, effects: RobotEffects) -> None:
+        train, inertia = self._train, self._shaft_inertia()
+        train.supply.apply(effects.supply_V)
+        train.right_motor.apply(effects.right, inertia)
+        train.left_motor.apply(effects.left, inertia)
+        train.right_encoder.apply(effects.right)
+        train.left_encoder.apply(effects.left)
+
+    @property
+    def encoders(self) -> tuple[Encoder | ExactEncoder, Encoder | ExactEncoder]:
+        """The (right, left) encoder, for its count to jump."""
+        return self._train.right_encoder, self._train.left_encoder
 
     def update_encoders(self) -> None:
         """The encoders have told their drives already, at every step."""
@@ -216,6 +278,9 @@ class RealisticRobot(EmulatedRobot):
     def advance(self, t_s: float, period_s: float, substeps: int) -> None:
         """Integrate one span from scenario time `t_s`; drives, motors and encoders step with it."""
         step = period_s / substeps
+        if step > self._longest_step_s:
+            substeps = ceil(period_s / self._longest_step_s)
+            step = period_s / substeps
         state, body, train = self.state, self._body, self._train
         right, left = self._right, self._left
         gear_r, gear_l = self._gear_right, self._gear_left
@@ -226,14 +291,7 @@ class RealisticRobot(EmulatedRobot):
             shafts = train.step(demands, (right_speed * gear_r, left_speed * gear_l), step)
             torques = shafts[0] * gear_r, shafts[1] * gear_l
             if self.divergence is None:
-                after = rk4(
-                    body,
-                    state,
-                    torques[0] + self._push_right_wheel_N_m,
-                    torques[1] + self._push_left_wheel_N_m,
-                    t_s + n * step,
-                    step,
-                )
+                after = rk4(body, state, *torques, t_s + n * step, step)
                 if after is None:
                     after = self._stop(state, Divergence(t_s, state.v, state.omega, *torques))
                 state = after
@@ -266,38 +324,4 @@ class RealisticRobot(EmulatedRobot):
 
 def emulated_robot(brief: RobotBrief) -> EmulatedRobot:
     """The emulation of a robot as its brief wants it."""
-    return (
-        EmulatedRobot(brief)
-        if brief.powertrain is None
-        else RealisticRobot(brief, brief.powertrain)
-    )
-
-
-def bus_troubles(troubles: Mapping[str, str], robots: Iterable[EmulatedRobot]) -> dict[str, str]:
-    """The troubles of buses, and the frames on them that drives ignored."""
-    found = {bus: [text] for bus, text in troubles.items()}
-    for robot in robots:
-        for side, drive in zip(("right", "left"), robot.drives, strict=True):
-            if count := drive.ignored:
-                text = f"{robot.brief.robot}'s {side} drive ignored {count} frames: no such command"
-                found.setdefault(robot.brief.bus, []).append(f"{text}, value or length")
-    return {bus: "; ".join(texts) for bus, texts in found.items()}
-
-
-def divergences(robots: Iterable[EmulatedRobot], period_ns: int) -> dict[str, Event]:
-    """The robots whose motion diverged, and the event, at the tick that did it."""
-    return {
-        robot.brief.robot: Event(
-            round(found.t_s * 1e9) // period_ns, robot.brief.robot, "diverged", str(found)
-        )
-        for robot in robots
-        if (found := robot.divergence) is not None
-    }
-
-
-def diverged_robots(robots: Iterable[EmulatedRobot], period_ns: int) -> dict[str, str]:
-    """Robots whose motion diverged: the tick that did it, and how."""
-    return {
-        robot: f"{when(event.tick, period_ns)}: {event.text}"
-        for robot, event in divergences(robots, period_ns).items()
-    }
+    return EmulatedRobot(brief) if brief.ideal_powertrain else RealisticRobot(brief)

@@ -18,26 +18,11 @@
 
 The voltage is the one that holds to the end of the last step; the time constant R C of a source
 that is in contact is far below a substep and left out.
-
-    fault           amount                                 default
-    UNDER_VOLTAGE   open-circuit voltage [V] from now on   9
-    OVER_VOLTAGE    same                                   31
 """
 
-from enum import Enum
 from math import sqrt
 
 from configs import powertrain
-
-
-class SupplyFault(Enum):
-    """A fault of a supply; the value is its name."""
-
-    UNDER_VOLTAGE = "under_voltage"
-    OVER_VOLTAGE = "over_voltage"
-
-
-_DEFAULTS = {SupplyFault.UNDER_VOLTAGE: 9.0, SupplyFault.OVER_VOLTAGE: 31.0}
 
 
 class Supply:
@@ -74,20 +59,9 @@ class Supply:
         else:
             self.right_A = self.left_A = 0.0
 
-    def inject(self, fault: SupplyFault, amount: float | None = None) -> None:
-        """Set a fault; `amount` as in the module's table, in volts.
-
-        Raises:
-            ValueError: the amount is negative or not finite.
-        """
-        volts = _DEFAULTS[fault] if amount is None else amount
-        if not 0.0 <= volts < float("inf"):
-            raise ValueError(f"{fault.value} = {volts}: must be volts, 0 or more")
-        self._open_circuit_V = volts
-
-    def clear_faults(self) -> None:
-        """A sound supply again."""
-        self._open_circuit_V = self._model.voltage_V
+    def apply(self, open_circuit_V: float | None) -> None:
+        """Let the source have this open-circuit voltage from now on; None: its own."""
+        self._open_circuit_V = self._model.voltage_V if open_circuit_V is None else open_circuit_V
 
     def _float(self, power: float, dt_s: float) -> float:
         """Voltage of the capacitor alone, no lower than where the source takes over."""

@@ -113,6 +113,20 @@ class DriveNode(Protocol):
     def torque_demand_shaft(self, dt_s: float) -> float:
         """Torque asked of the motor for the next `dt_s`, at its shaft [N·m]; always finite."""
 
+    # Faults of the drive itself: those that its section has no `Drive.fault_problem` with.
+
+    def estop(self) -> None:
+        """Its emergency stop is pressed."""
+
+    def expire_watchdog(self) -> None:
+        """Its watchdog expires, whatever was fed."""
+
+    def reboot(self, now_ns: int) -> None:
+        """Its firmware boots anew, whatever it is doing."""
+
+    def trip(self, error: str | None) -> None:
+        """It disarms with one of its section's `Drive.errors`; None: with the first one."""
+
 
 class CyclicMessage(NamedTuple):
     """A message that is sent every period, for the load of a bus."""

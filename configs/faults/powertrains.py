@@ -11,21 +11,26 @@ from configs.parameters import parameter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DriveEvent(WheelFault):
-    """The drive disarms by itself: emergency stop, watchdog, or its firmware boots anew."""
+class DriveFault(WheelFault):
+    """A fault of the drive itself, by its protocol."""
 
     INSTANT: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveEvent(DriveFault):
+    """The drive disarms by itself: emergency stop, watchdog, or its firmware boots anew."""
+
     kind: Literal["drive_estop", "drive_watchdog", "drive_reboot"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DriveError(WheelFault):
+class DriveError(DriveFault):
     """The drive disarms with an error of its protocol."""
 
-    INSTANT: ClassVar[bool] = True
     kind: Literal["drive_error"]
     error: str | None = parameter(
-        None, "by the protocol's name for it; its error of a power stage if not given"
+        None, "by the protocol's name for it; ODrives' DRV_FAULT, of the gate driver, if not given"
     )
 
 

@@ -42,7 +42,8 @@ from fleetloop.terminal import note, say
 from plant.__main__ import PLANT_PRIORITY, join
 from plant.__main__ import run as plant_of_a_run
 from plant.realtime import RealtimeLoop
-from plant.robot import EmulatedRobot, bus_troubles, diverged_robots, emulated_robot
+from plant.robot import EmulatedRobot, emulated_robot
+from plant.troubles import bus_troubles, diverged_robots
 
 FOREVER_TICKS = 1 << 53
 GO_AHEAD_NS = 1_000_000

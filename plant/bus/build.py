@@ -48,7 +48,7 @@ def build_buses(
                 port,
                 begin,
                 tap,
-                BusFaults(brief.faults, group),
+                BusFaults(brief.faults, group, brief.schedule),
             )
         else:
             buses[name] = timed_bus(brief, name, group, port, begin, tap)
@@ -80,5 +80,5 @@ def timed_bus(
         begin=begin,
         tap=tap,
         random=random,
-        faults=BusFaults(brief.faults, robots),
+        faults=BusFaults(brief.faults, robots, brief.schedule),
     )

@@ -21,9 +21,9 @@ def robots(scenario: str, *overrides: str) -> tuple[RobotBrief, ...]:
 
 
 def model(*overrides: str) -> PowertrainModel:
-    powertrain = robots("two_robots", REALISTIC, *overrides)[0].powertrain
-    assert powertrain is not None
-    return powertrain
+    robot = robots("two_robots", REALISTIC, *overrides)[0]
+    assert not robot.ideal_powertrain
+    return robot.powertrain
 
 
 def test_the_defaults_are_those_of_a_small_robot_on_odrives() -> None:
@@ -41,7 +41,7 @@ def test_the_defaults_are_those_of_a_small_robot_on_odrives() -> None:
 
 @pytest.mark.parametrize("preset", ["ideal", "limited"])
 def test_the_simpler_presets_have_ideal_motors_and_encoders(preset: str) -> None:
-    assert all(robot.powertrain is None for robot in robots("paper", f"drive.preset='{preset}'"))
+    assert all(robot.ideal_powertrain for robot in robots("paper", f"drive.preset='{preset}'"))
 
 
 def test_the_realistic_preset_has_the_limits_of_the_limited_one() -> None:
@@ -69,7 +69,6 @@ def test_every_robot_of_every_seed_has_a_noise_of_its_own() -> None:
         robot.powertrain.seed
         for seed in range(4)
         for robot in robots("twelve", REALISTIC, f"seed={seed}")
-        if robot.powertrain is not None
     ]
     assert len(set(seeds)) == len(seeds) == 48
 

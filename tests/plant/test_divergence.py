@@ -12,7 +12,8 @@ from bridge.frame import Frame
 from configs.connections import NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief
-from plant.robot import EmulatedRobot, diverged_robots, emulated_robot
+from plant.robot import EmulatedRobot, emulated_robot
+from plant.troubles import diverged_robots
 
 FLT_MAX = 3.4028234663852886e38
 ABSURD = (FLT_MAX, -FLT_MAX, 1e6, 1e30, inf, -inf, nan, -0.0, 1e-45, 0.1)

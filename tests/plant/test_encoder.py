@@ -9,13 +9,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.powertrain_parts import encoder
 
-from plant.encoder import Encoder, EncoderFault
+from plant.effects import WheelEffects
+from plant.encoder import Encoder
 
 TURN = 2.0 * pi
 LOOP_S = 1.0 / 8000.0
 STEPS_S = [0.00005, 0.0001, 0.000125, 0.0003, 0.0005, 0.001, 0.0033, 0.01]
 SPEEDS = (0.05, 0.3, 0.5, 1.0, 1.5, 2.37, 3.18, 3.98, 5.0, 7.3)
 COUNT = 1.0 / 8192.0
+FROZEN, FLIPPED = WheelEffects(encoder_frozen=True), WheelEffects(encoder_flipped=True)
+EFFECTS = {
+    "encoder_frozen": True,
+    "encoder_flipped": True,
+    "encoder_kept": 0.99,
+    "encoder_noise_counts": 2.0,
+}
 
 
 def turn_to(made: Encoder, angle: Callable[[float], float], seconds: float, step_s: float) -> None:
@@ -179,15 +187,14 @@ def test_the_same_seed_gives_the_same_estimates_under_noise() -> None:
         ),
         max_size=20,
     ),
-    st.sets(st.sampled_from(EncoderFault)),
+    st.sets(st.sampled_from(list(EFFECTS))),
     st.booleans(),
 )
 def test_no_angle_makes_the_estimate_anything_but_finite(
-    steps: list[tuple[float, float]], faults: set[EncoderFault], index: bool
+    steps: list[tuple[float, float]], faults: set[str], index: bool
 ) -> None:
     made = encoder(index=index)
-    for fault in sorted(faults, key=lambda fault: fault.value):
-        made.inject(fault)
+    made.apply(WheelEffects(**{name: EFFECTS[name] for name in faults}))
     for angle, step_s in steps:
         assert all(map(isfinite, made.step(angle, step_s)))
 
@@ -210,7 +217,7 @@ def on(made: Encoder, rev_s: float, seconds: float, since: float = 0.1) -> tuple
 def test_a_frozen_encoder_stays_where_it_was_and_reads_no_speed() -> None:
     made = at_speed()
     count = made.count
-    made.inject(EncoderFault.FREEZE)
+    made.apply(FROZEN)
     position, speed = on(made, 2.0, 0.1)
     assert made.count == count
     assert (position, speed) == (pytest.approx(0.2, abs=2.0 * COUNT), 0.0)
@@ -218,9 +225,9 @@ def test_a_frozen_encoder_stays_where_it_was_and_reads_no_speed() -> None:
 
 def test_a_frozen_encoder_that_recovers_goes_on_from_where_it_froze() -> None:
     made = at_speed()
-    made.inject(EncoderFault.FREEZE)
+    made.apply(FROZEN)
     on(made, 2.0, 0.1)
-    made.clear_faults()
+    made.apply(WheelEffects())
     position, speed = on(made, 2.0, 0.1, since=0.2005)
     assert speed == pytest.approx(2.0, abs=0.05)
     assert position == pytest.approx(0.4, abs=0.005)
@@ -228,7 +235,7 @@ def test_a_frozen_encoder_that_recovers_goes_on_from_where_it_froze() -> None:
 
 def test_a_jump_moves_the_position_once_and_kicks_the_speed() -> None:
     made = at_speed()
-    made.inject(EncoderFault.JUMP, 0.25)
+    made.jump(0.25)
     _, kicked = made.step(TURN * 2.0 * 0.1005, 0.0005)
     assert kicked > 50.0
     position, speed = on(made, 2.0, 0.1, since=0.1005)
@@ -238,7 +245,7 @@ def test_a_jump_moves_the_position_once_and_kicks_the_speed() -> None:
 
 def test_a_flipped_sign_runs_back_from_where_it_happened() -> None:
     made = at_speed()
-    made.inject(EncoderFault.SIGN_FLIP)
+    made.apply(FLIPPED)
     position, speed = on(made, 2.0, 0.1)
     assert speed == pytest.approx(-2.0, abs=0.05)
     assert position == pytest.approx(0.2 - 2.0 * 0.1005, abs=3.0 * COUNT)
@@ -247,28 +254,27 @@ def test_a_flipped_sign_runs_back_from_where_it_happened() -> None:
 @pytest.mark.parametrize("rev_s", [2.0, -2.0])
 def test_lost_counts_make_position_and_speed_fall_short_by_their_fraction(rev_s: float) -> None:
     made = at_speed(rev_s)
-    made.inject(EncoderFault.COUNT_LOSS, 0.1)
+    made.apply(WheelEffects(encoder_kept=0.9))
     position, _ = on(made, rev_s, 1.0)
     assert position == pytest.approx(rev_s * (0.1 + 0.9 * 1.0005), abs=0.01)
 
 
 def test_counts_lost_by_a_flipped_encoder_make_it_fall_short_the_other_way() -> None:
     made = at_speed()
-    made.inject(EncoderFault.SIGN_FLIP)
-    made.inject(EncoderFault.COUNT_LOSS, 0.1)
+    made.apply(WheelEffects(encoder_flipped=True, encoder_kept=0.9))
     position, _ = on(made, 2.0, 1.0)
     assert position == pytest.approx(0.2 - 0.9 * 2.0 * 1.0005, abs=0.01)
 
 
 def test_all_counts_lost_is_a_frozen_encoder() -> None:
     made = at_speed()
-    made.inject(EncoderFault.COUNT_LOSS, 1.0)
+    made.apply(WheelEffects(encoder_kept=0.0))
     assert on(made, 2.0, 0.2)[1] == 0.0
 
 
 def test_noise_disturbs_the_speed_and_keeps_the_position() -> None:
     made = at_speed()
-    made.inject(EncoderFault.NOISE, 5.0)
+    made.apply(WheelEffects(encoder_noise_counts=5.0))
     speeds = []
     for n in range(1, 2000):
         position, speed = made.step(TURN * 2.0 * (0.1 + n * 0.0005), 0.0005)
@@ -281,9 +287,9 @@ def test_noise_disturbs_the_speed_and_keeps_the_position() -> None:
 def test_an_index_finds_lost_counts_again_where_its_mark_passes() -> None:
     blind, indexed = at_speed(), at_speed(index=True)
     for made in (blind, indexed):
-        made.inject(EncoderFault.COUNT_LOSS, 0.05)
+        made.apply(WheelEffects(encoder_kept=0.95))
         on(made, 2.0, 0.38)
-        made.clear_faults()
+        made.apply(WheelEffects())
         on(made, 2.0, 0.2, since=0.4805)
     assert abs(indexed.count - floor(2.0 * 0.681 * 8192)) <= 1
     assert blind.count < indexed.count - 200
@@ -291,30 +297,14 @@ def test_an_index_finds_lost_counts_again_where_its_mark_passes() -> None:
 
 def test_an_index_does_not_see_whole_turns() -> None:
     made = at_speed(index=True)
-    made.inject(EncoderFault.JUMP, 1.05)
+    made.jump(1.05)
     position, _ = on(made, 2.0, 0.5)
     assert position == pytest.approx(1.0 + 2.0 * 0.6005, abs=3.0 * COUNT)
 
 
 def test_a_flipped_encoder_with_an_index_counts_back_from_its_mark() -> None:
     made = encoder(index=True)
-    made.inject(EncoderFault.SIGN_FLIP)
-    made.inject(EncoderFault.JUMP, 0.05)
+    made.apply(FLIPPED)
+    made.jump(0.05)
     turn_to(made, lambda t: 0.2 * TURN * sin(100.0 * t), 2.0, 0.0005)
     assert made.count == pytest.approx(-0.2 * sin(200.0) * 8192, abs=2.0)
-
-
-@pytest.mark.parametrize(
-    ("fault", "amount", "right"),
-    [
-        (EncoderFault.COUNT_LOSS, 1.5, "fraction, 0 to 1"),
-        (EncoderFault.COUNT_LOSS, float("nan"), "finite"),
-        (EncoderFault.NOISE, -1.0, "counts rms"),
-        (EncoderFault.JUMP, 1e300, "within ±1e6 revolutions"),
-    ],
-)
-def test_an_amount_out_of_its_range_is_refused(
-    fault: EncoderFault, amount: float, right: str
-) -> None:
-    with pytest.raises(ValueError, match=rf"{fault.value} = .*{right}"):
-        encoder().inject(fault, amount)

@@ -26,7 +26,7 @@ class Bench:
         scenario = load("two_robots", (f"fault=[{', '.join(faults)}]", *still, *overrides))
         brief: PlantBrief = plant_brief(scenario, network=NOWHERE)
         self.robot: EmulatedRobot = emulated_robot(brief.robots[0])
-        self.faults = BusFaults(brief.faults, [self.robot])
+        self.faults = BusFaults(brief.faults, [self.robot], brief.schedule)
         self.h = brief.schedule.period_s
         self.body = self.robot._body
         self.ticks = count()

@@ -13,13 +13,20 @@ from support.powertrain_parts import INERTIA, MODEL, motor, motor_model, supply
 from configs.brief import WheelDisturbance
 from configs.sections import Body
 from plant.body import RigidBody, State
+from plant.effects import WheelEffects
 from plant.integrate import rk4
-from plant.motor import Motor, MotorFault
-from plant.supply import SupplyFault
+from plant.motor import Motor
 
 FREE = {"viscous_friction_shaft_N_m_s": 0.0, "coulomb_friction_shaft_N_m": 0.0}
 TAU_S, DELAY_S = 1e-3, 1.25e-4
 STEPS_S = [0.00005, 0.0001, 0.000125, 0.0003, 0.0005, 0.001, 0.01]
+EFFECTS = [
+    WheelEffects(torque_stuck=True),
+    WheelEffects(torque_factor=0.5),
+    WheelEffects(torque_zero=True),
+    WheelEffects(torque_factor=-1.0),
+    WheelEffects(fet_rise_K=100.0, motor_rise_K=100.0),
+]
 ANY = st.floats(allow_nan=True, allow_infinity=True) | st.sampled_from([3e38, -3e38, 1e308])
 
 
@@ -88,7 +95,7 @@ def test_above_its_no_load_speed_a_motor_can_not_push() -> None:
 
 def test_a_bus_without_voltage_gives_no_current() -> None:
     source = supply()
-    source.inject(SupplyFault.UNDER_VOLTAGE, 0.0)
+    source.apply(0.0)
     source.step(0.0, 0.0, 0.001)
     made = motor(supply=source, **FREE)
     assert settled(made, 0.5) == 0.0
@@ -270,7 +277,7 @@ def test_nothing_that_is_asked_of_a_motor_makes_it_anything_but_finite(
 ) -> None:
     source = supply(absorbs=data.draw(st.booleans()))
     made = motor(supply=source)
-    made.inject(data.draw(st.sampled_from(MotorFault)))
+    made.apply(data.draw(st.sampled_from(EFFECTS)), INERTIA)
     for demand, speed, step_s in steps:
         torque = made.step(demand, speed, step_s)
         source.step(made.power_W, made.power_W, step_s)
@@ -284,25 +291,25 @@ def test_nothing_that_is_asked_of_a_motor_makes_it_anything_but_finite(
 
 
 @pytest.mark.parametrize(
-    ("fault", "torque", "current"),
+    ("effects", "torque", "current"),
     [
-        (MotorFault.TORQUE_STUCK, 0.1, 2.0),
-        (MotorFault.TORQUE_HALF, 0.1, 4.0),
-        (MotorFault.TORQUE_ZERO, 0.0, 0.0),
-        (MotorFault.TORQUE_REVERSED, -0.2, 4.0),
-        (MotorFault.FET_OVER_TEMPERATURE, 0.2, 4.0),
-        (MotorFault.MOTOR_OVER_TEMPERATURE, 0.2, 4.0),
+        (WheelEffects(torque_stuck=True), 0.1, 2.0),
+        (WheelEffects(torque_factor=0.5), 0.1, 4.0),
+        (WheelEffects(torque_zero=True), 0.0, 0.0),
+        (WheelEffects(torque_factor=-1.0), -0.2, 4.0),
+        (WheelEffects(fet_rise_K=100.0), 0.2, 4.0),
+        (WheelEffects(motor_rise_K=100.0), 0.2, 4.0),
     ],
 )
 def test_a_fault_changes_what_the_wheel_feels_until_it_is_cleared(
-    fault: MotorFault, torque: float, current: float
+    effects: WheelEffects, torque: float, current: float
 ) -> None:
     made = motor(**FREE)
     settled(made, 0.1)
-    made.inject(fault)
+    made.apply(effects, INERTIA)
     assert settled(made, 0.2) == pytest.approx(torque)
     assert made.current_A == pytest.approx(current)
-    made.clear_faults()
+    made.apply(WheelEffects(), INERTIA)
     assert settled(made, 0.2) == pytest.approx(0.2)
     assert made.current_A == pytest.approx(4.0)
 
@@ -310,33 +317,27 @@ def test_a_fault_changes_what_the_wheel_feels_until_it_is_cleared(
 def test_a_stuck_torque_stays_whatever_is_asked() -> None:
     made = motor(**FREE)
     settled(made, -0.3)
-    made.inject(MotorFault.TORQUE_STUCK)
+    made.apply(WheelEffects(torque_stuck=True), INERTIA)
     for demand in (0.0, 0.5, 3e38):
         assert settled(made, demand) == pytest.approx(-0.3)
 
 
 def test_a_motor_under_a_fault_still_balances_its_power() -> None:
-    for fault in (MotorFault.TORQUE_HALF, MotorFault.TORQUE_REVERSED):
+    for factor in (0.5, -1.0):
         made = motor(**FREE)
-        made.inject(fault)
+        made.apply(WheelEffects(torque_factor=factor), INERTIA)
         torque = settled(made, 0.2, 30.0)
         assert made.power_W == pytest.approx(torque * 30.0 + 0.22 * 16.0)
 
 
 def test_an_over_temperature_is_felt_at_once_and_heats_nothing() -> None:
     made = motor()
-    made.inject(MotorFault.FET_OVER_TEMPERATURE)
-    made.inject(MotorFault.MOTOR_OVER_TEMPERATURE, 85.0)
+    made.apply(WheelEffects(fet_rise_K=100.0, motor_rise_K=85.0), INERTIA)
     assert (made.fet_C, made.motor_C) == (125.0, 110.0)
     made.step(0.0, 0.0, 0.001)
     assert (made.fet_C, made.motor_C) == (125.0, 110.0)
-    made.clear_faults()
+    made.apply(WheelEffects(), INERTIA)
     assert (made.fet_C, made.motor_C) == (25.0, 25.0)
-
-
-def test_a_rise_that_is_no_number_is_refused() -> None:
-    with pytest.raises(ValueError, match="fet_over_temperature = nan: must be a finite rise"):
-        motor().inject(MotorFault.FET_OVER_TEMPERATURE, float("nan"))
 
 
 def test_a_shaft_behind_a_gear_is_faster_than_any_wheel() -> None:

@@ -11,7 +11,8 @@ from configs.connections import NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief
 from configs.signals import PLANT_SIGNALS
-from plant.robot import EmulatedRobot, bus_troubles, emulated_robot
+from plant.robot import EmulatedRobot, emulated_robot
+from plant.troubles import bus_troubles
 
 COLUMNS = [signal.name for signal in PLANT_SIGNALS]
 

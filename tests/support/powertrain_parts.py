@@ -17,9 +17,7 @@ INERTIA = 6e-3  # kg m²
 
 def _defaults() -> PowertrainModel:
     scenario = load("two_robots", ("drive.preset='realistic'",))
-    model = plant_brief(scenario, network=NetworkLink("t", "", "", "")).robots[0].powertrain
-    assert model is not None
-    return model
+    return plant_brief(scenario, network=NetworkLink("t", "", "", "")).robots[0].powertrain
 
 
 MODEL = _defaults()

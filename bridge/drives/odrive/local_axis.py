@@ -190,6 +190,14 @@ class LocalAxis:
             self.result = Result.DISARMED
             self._to_idle()
 
+    def expire_watchdog(self) -> None:
+        """Disarm as when the watchdog wasn't fed."""
+        self.disarm(AxisError.WATCHDOG_TIMER_EXPIRED)
+
+    def trip(self, error: str | None) -> None:
+        """Disarm with an error of this name; None: the first of the section's."""
+        self.disarm(AxisError[error or self.model.errors()[0]])
+
     def clear_errors(self) -> None:
         """Clear errors but those whose cause is still measured."""
         self.errors = AxisError(self._conditions) | self._lasting

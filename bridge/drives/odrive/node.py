@@ -252,12 +252,22 @@ class OdriveNode(LocalAxis):
                 self._saved = self.parameters.copy()
             case RebootAction.ERASE_CONFIGURATION:
                 self._saved = Parameters.of(self.model, self._saved.node_id)
-        silent = action == RebootAction.ENTER_DFU_MODE
-        self._boots_ns = 2 * NEVER if silent else now_ns + self.model.boot_ns
-        self._answers_ns = NEVER
+        if action == RebootAction.ENTER_DFU_MODE:
+            self._go_silent(2 * NEVER)
+        else:
+            self.reboot(now_ns)
+        return True
+
+    def reboot(self, now_ns: int) -> None:
+        """Boot anew, whatever the axis is doing: idle and silent for a while, then powered up."""
+        self._to_idle()
+        self._go_silent(now_ns + self.model.boot_ns)
         if self._boots_ns <= now_ns:
             self._boot(now_ns)
-        return True
+
+    def _go_silent(self, until_ns: int) -> None:
+        self._boots_ns, self._answers_ns = until_ns, NEVER
+        self._replan()
 
     def _on_address(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         data = frame.data

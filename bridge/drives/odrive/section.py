@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from annotated_types import Ge
 
+from bridge.drives.odrive.frames import AxisError
 from configs import patterns
 from configs.drives import Derating, Drive, VelocityLimit
 from configs.errors import Problem
@@ -25,6 +26,13 @@ if TYPE_CHECKING:
 
 UNLIMITED = 1e6
 """A limit that nothing reaches: [A], [rev/s]."""
+_ERRORS = tuple(
+    dict.fromkeys(
+        str(error.name)
+        for error in (AxisError.DRV_FAULT, *AxisError)
+        if error is not AxisError.INITIALIZING
+    )
+)
 _WHOLE_MILLISECONDS = (
     "heartbeat_period_s",
     "encoder_period_s",
@@ -89,6 +97,16 @@ class OdriveSection(Drive):
     def derating(self) -> Derating:
         """Of both thermistors."""
         return Derating(self.derate_from_C, self.derate_to_C)
+
+    def errors(self) -> tuple[str, ...]:
+        """Names of `AxisError`, that of the gate driver first."""
+        return _ERRORS
+
+    def fault_problem(self, kind: str) -> str | None:
+        """A watchdog that is off never expires."""
+        if kind == "drive_watchdog" and not self.watchdog_s:
+            return "drives have no watchdog: needs drive.watchdog_s above 0"
+        return None
 
     def problems(self, clock: "Clock", host: "Host") -> Iterator[Problem]:
         """Problems of these keys with each other, with [clock] and with [host]."""

@@ -21,9 +21,8 @@ MS = 1_000_000
 def bus(port: ManualPort, scenario: str = "two_robots", *overrides: str) -> IdealBus:
     brief = plant_brief(load(scenario, overrides), network=NetworkLink("t", "", "", ""))
     robot = emulated_robot(brief.robots[0])
-    return IdealBus(
-        [robot], brief.schedule, brief.substeps, port, lambda _: None, no_tap, BusFaults((), ())
-    )
+    none = BusFaults((), (), brief.schedule)
+    return IdealBus([robot], brief.schedule, brief.substeps, port, lambda _: None, no_tap, none)
 
 
 def test_who_never_stops_asking_cannot_stop_time_and_is_answered_with_the_next_tick() -> None:

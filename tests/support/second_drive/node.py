@@ -2,7 +2,16 @@
 
 from collections.abc import Sequence
 
-from support.second_drive.tools import ENCODER, MOTION, REV, REV_S, SET_POINT, TORQUE, PlainSection
+from support.second_drive.tools import (
+    ENCODER,
+    ERRORS,
+    MOTION,
+    REV,
+    REV_S,
+    SET_POINT,
+    TORQUE,
+    PlainSection,
+)
 
 from bridge.drives.interface import DriveMeasurements
 from bridge.frame import Frame
@@ -22,6 +31,8 @@ class PlainNode:
         self.fed_ns = self.ignored = 0
         self.input_torque_shaft = 0.0
         self._motion = (0.0, 0.0)
+        self.off = ""
+        """The reason why it makes no torque until it boots anew, "" if it does."""
 
     def update_encoder(self, revolutions: float, rev_s: float) -> None:
         self._motion = (revolutions, rev_s)
@@ -52,4 +63,17 @@ class PlainNode:
         pass
 
     def torque_demand_shaft(self, dt_s: float) -> float:  # noqa: ARG002
-        return self.input_torque_shaft
+        return 0.0 if self.off else self.input_torque_shaft
+
+    def estop(self) -> None:
+        self.off = "stopped"
+
+    def expire_watchdog(self) -> None:
+        raise AssertionError("it has none, and its section says so")
+
+    def reboot(self, now_ns: int) -> None:  # noqa: ARG002
+        self.off = ""
+        self.input_torque_shaft = 0.0
+
+    def trip(self, error: str | None) -> None:
+        self.off = error or ERRORS[0]

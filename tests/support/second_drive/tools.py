@@ -13,6 +13,7 @@ MOTION, TORQUE = 0x100, 0x200
 ENCODER = struct.Struct("<ii")
 SET_POINT = struct.Struct("<h")
 REV, REV_S = 1e-6, 1e-5
+ERRORS = ("OVER_LOAD", "LOST_PHASE")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,6 +21,12 @@ class PlainSection(Drive):
     """The shared keys of [drive] and one more."""
 
     torque_unit_shaft_N_m: Positive = parameter(1e-3, "one step of a set-point")
+
+    def errors(self) -> tuple[str, ...]:
+        return ERRORS
+
+    def fault_problem(self, kind: str) -> str | None:
+        return "these drives have no watchdog" if kind == "drive_watchdog" else None
 
 
 def cyclic_messages(
