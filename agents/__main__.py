@@ -23,13 +23,14 @@ from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.client import StoppedError, open_polled
 from bridge.network.clock_exchange import answer_pings
+from bridge.network.fault_orders import OrderInbox
 from bridge.network.inputs import InputBuffer
 from bridge.network.launcher import LauncherWatch
 from bridge.network.link import Arrival, Link, Publisher
 from bridge.network.messages import Notice, Rows
 from bridge.network.reports import AgentReport
 from bridge.network.telemetry import RowBuffer, row_of
-from bridge.network.zenoh_link import POLLED_DEPTH
+from bridge.network.zenoh_link import POLLED_DEPTH, ZenohLink
 from bridge.process.clock import process_cpu_ns
 from bridge.process.lifecycle import (
     Stop,
@@ -71,7 +72,7 @@ def run(brief: AgentBrief, stop: Stop) -> str:
 
 
 def _run(
-    brief: AgentBrief, stop: Stop, link: Link, bus: can.BusABC, watch: LauncherWatch | None
+    brief: AgentBrief, stop: Stop, link: ZenohLink, bus: can.BusABC, watch: LauncherWatch | None
 ) -> str:
     name, robot = brief.network.run, brief.robot
     path = link.publisher(keys.path(name, robot))
@@ -97,9 +98,11 @@ def _run(
     if not brief.rejoins:
         hellos.add(path, agent.share(-1).encode())
         hellos.add(telemetry, Rows(0, 0, b"", False).encode())
+    process, refusals = AGENT.process(robot), agent.admission.refusals
+    orders = OrderInbox(link, name, process, refusals)
     run_loop = _realtime if brief.schedule.realtime else _lockstep
     connections = _Connections(
-        agent, bus, link, subscriptions, path, hellos, rows, report, watch, log
+        agent, bus, link, subscriptions, path, hellos, rows, report, orders, watch, log
     )
     return run_loop(connections, stop)
 
@@ -119,6 +122,7 @@ class _Connections(NamedTuple):
     hellos: Hellos
     rows: RowBuffer
     report: Publisher
+    orders: OrderInbox | None = None
     watch: LauncherWatch | None = None
     inputs: InputBuffer | None = None
 
@@ -207,6 +211,7 @@ def _lockstep(connections: _Connections, stop: Stop) -> str:
         connections.subscriptions,
         connections.path,
         connections.hellos,
+        connections.orders,
     )
     connections.await_peers(loop.on_arrival, stop)
     first = loop.await_first_frame(stop)
@@ -229,6 +234,7 @@ def _realtime(connections: _Connections, stop: Stop) -> str:
         connections.path,
         connections.hellos,
         progress,
+        connections.orders,
         watch=connections.watch,
     )
     connections.await_peers(partial(deliver, connections.agent), stop)

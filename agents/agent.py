@@ -36,6 +36,7 @@ from math import hypot, inf, isfinite, nan
 from typing import Any
 
 from agents.coordination import CoordinationState, Coordinator
+from agents.emulated_network import EmulatedNetwork
 from agents.faults import MessageFaults
 from agents.guard import UNCHANGED, Guard, Phase, TorqueOutcome
 from agents.joining import Joining
@@ -47,10 +48,12 @@ from agents.localisation import Localiser
 from agents.paths import robot_path
 from agents.reception import Reception
 from bridge.frame import Frame
+from bridge.netem.channel import Channel
+from bridge.network.fault_orders import FaultOrder
 from bridge.network.messages import PathState, PoseFix
 from bridge.network.telemetry import RowBuffer
 from configs.brief import AgentBrief
-from configs.netem import MOST_DELAY_NS
+from configs.netem import LOCALISATION, MOST_DELAY_NS
 from configs.signals import AGE_PREFIX
 
 _new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
@@ -93,8 +96,6 @@ class Agent:
         self._advance = reception.advance
         self.admission = reception.admission
         """Plausibility of received messages, and the count of refused ones."""
-        self.network = reception.network
-        """The emulated edges to this robot; None if none has effects."""
         self.receive_pose = reception.receive_pose
         """Store a pose from the localisation system."""
         self.receive_place = reception.receive_place
@@ -107,7 +108,7 @@ class Agent:
         """Senders whose first message is required for the start and has not arrived."""
         self.missing = reception.missing
         """Messages that are due at a tick and have not arrived."""
-        self.faults = MessageFaults(brief.faults, self.network)
+        self.faults = MessageFaults(brief, self._channel_of)
         """Faults of the messages to this robot."""
         self._neighbours, self._edges = reception.neighbours, reception.edges
         self._history = self._pose_history(brief)
@@ -144,6 +145,19 @@ class Agent:
             oldest = oldest_ns // brief.schedule.period_ns
             return max(oldest, POSE_HISTORY_TICKS, brief.schedule.pose_delay_ticks)
         return POSE_HISTORY_TICKS if brief.schedule.realtime else brief.schedule.pose_delay_ticks
+
+    def _channel_of(self, source: str, tick: int) -> Channel[Any]:
+        """The emulated edge from a source, made now for a fault that wasn't foreseen."""
+        channel = self._reception.channel_of(source, tick)
+        if source == LOCALISATION:
+            self._history = self._pose_history(self.brief)
+            self._localiser.remember(self._history)
+        return channel
+
+    @property
+    def network(self) -> EmulatedNetwork | None:
+        """The emulated edges to this robot; None if none has effects."""
+        return self._reception.network
 
     @property
     def phase(self) -> Phase:
@@ -188,6 +202,10 @@ class Agent:
     def note_unsent(self, tick: int) -> None:
         """Note that the frames of this tick were not sent."""
         self._guard.note_unsent(tick)
+
+    def take_order(self, order: FaultOrder, tick: int) -> int | str:
+        """Take an order before a tick; return the tick at which it acts, or why it can't."""
+        return self.faults.take(order, order.tick(tick, self.last_tick))
 
     # --- one period --------------------------------------------------------------------------
 

@@ -8,6 +8,9 @@ when it really arrives, if that is later.
 The leader's speed profile is one message. Its emulated edge carries v_r at every share instead, and
 the last speed that arrived is held.
 
+A source without effects gets a channel as soon as a fault that was ordered during the run concerns
+its edge.
+
 Where effects depend on the distance between two robots, the poses of the other one come here as
 well, from the localisation system, and nowhere else: the controller doesn't know them. A message is
 sent from as far as the robots were apart at the last poses that both have.
@@ -15,10 +18,11 @@ sent from as far as the robots were apart at the last poses that both have.
 
 from collections.abc import Collection, Mapping
 from math import hypot, nan
+from typing import Any
 
 from bridge.netem.channel import Channel
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
-from configs.brief import AgentBrief
+from configs.brief import AgentBrief, ChannelModel
 from configs.edges import LEADER
 from configs.leader_speed import speed_at
 from configs.netem import LOCALISATION
@@ -31,6 +35,8 @@ class EmulatedNetwork:
     """The channels of one robot; sources without effects have none."""
 
     __slots__ = (
+        "_age_limit_ns",
+        "_aged",
         "_fix_ns",
         "_fixes",
         "_leader",
@@ -39,6 +45,7 @@ class EmulatedNetwork:
         "_places",
         "_poses",
         "_schedule",
+        "_seed_of",
         "_silence_ns",
         "_v_r",
         "_v_r_ns",
@@ -46,18 +53,14 @@ class EmulatedNetwork:
     )
 
     def __init__(self, brief: AgentBrief) -> None:
-        age_limit_ns = round(brief.coordination.age_limit_s * 1e9)
+        self._age_limit_ns = round(brief.coordination.age_limit_s * 1e9)
+        self._seed_of = brief.channel_seed
         self._paths: dict[str, Channel[PathState]] = {}
         self._leader: Channel[float] | None = None
         self._fixes: Channel[PoseFix] | None = None
         for model in sorted(brief.channels, key=lambda model: model.source):
-            match model.source:
-                case source if source == LEADER:
-                    self._leader = Channel(model, model.seed, age_limit_ns)
-                case source if source == LOCALISATION:
-                    self._fixes = Channel(model, model.seed, age_limit_ns)
-                case robot:
-                    self._paths[robot] = Channel(model, model.seed, age_limit_ns)
+            self._add(model)
+        self._aged = frozenset(model.source for model in brief.channels)
         self._schedule = brief.schedule
         self._silence_ns = round(brief.coordination.silence_limit_s * 1e9)
         self._v_r, self._v_r_ns = nan, 0
@@ -68,13 +71,33 @@ class EmulatedNetwork:
         self.distances_m = dict.fromkeys(brief.located, nan)
         """From this robot to in-neighbours, by their newest poses [m]; NaN: not known yet."""
 
-    def channel(self, source: str) -> Channel[PathState] | Channel[float] | Channel[PoseFix]:
-        """The channel of a source that has one.
+    def _add(self, model: ChannelModel) -> Channel[Any]:
+        channel: Channel[Any] = Channel(model, model.seed, self._age_limit_ns)
+        match model.source:
+            case source if source == LEADER:
+                self._leader = channel
+            case source if source == LOCALISATION:
+                self._fixes = channel
+            case robot:
+                self._paths = dict(sorted((self._paths | {robot: channel}).items()))
+        return channel
 
-        Raises:
-            KeyError: it has none.
+    def channel(self, source: str) -> Channel[Any] | None:
+        """The channel of a source, None if it has none."""
+        return self._channels().get(source)
+
+    def open(self, source: str, tick: int, leader: LeaderSpeed | None) -> Channel[Any]:
+        """Give a source a channel without effects from a tick on.
+
+        The leader's last speed over it is that of the last share, as if it had been there before.
+        Its ages aren't recorded.
         """
-        return self._channels()[source]
+        channel = self._add(ChannelModel(source=source, seed=self._seed_of(source)))
+        if source == LEADER and leader is not None:
+            every = self._schedule.share_every
+            self._v_r_ns = max((tick - 1) // every * every, 0) * self._schedule.period_ns
+            self._v_r = speed_at(leader.changes, self._v_r_ns)
+        return channel
 
     def carries_path_of(self, robot: str) -> bool:
         """Whether the path states of a robot go through a channel."""
@@ -177,12 +200,12 @@ class EmulatedNetwork:
     def ages_s(self, now_ns: int) -> list[float]:
         """Ages of the newest speed of the leader and the newest pose that arrived [s].
 
-        Of those of the two that go through a channel; NaN: none has arrived.
+        Of those of the two that the scenario has a channel for; NaN: none has arrived.
         """
         ages = []
-        if self._leader is not None:
+        if LEADER in self._aged:
             ages.append((now_ns - self._v_r_ns) * 1e-9 if self._v_r == self._v_r else nan)
-        if self._fixes is not None:
+        if LOCALISATION in self._aged:
             ages.append((now_ns - self._fix_ns) * 1e-9 if self._fix_ns is not None else nan)
         return ages
 
@@ -190,10 +213,8 @@ class EmulatedNetwork:
         """Messages by source."""
         return {source: channel.counts.as_dict() for source, channel in self._channels().items()}
 
-    def _channels(self) -> dict[str, Channel[PathState] | Channel[float] | Channel[PoseFix]]:
-        channels: dict[str, Channel[PathState] | Channel[float] | Channel[PoseFix]] = {
-            **self._paths
-        }
+    def _channels(self) -> dict[str, Channel[Any]]:
+        channels: dict[str, Channel[Any]] = {**self._paths}
         if self._leader is not None:
             channels[LEADER] = self._leader
         if self._fixes is not None:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 from agents.agent import Agent, Trouble
 from bridge.frame import Frame
+from bridge.network.fault_orders import FaultOrder
 from bridge.network.inputs import Input, InputBuffer, Kind
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.network.telemetry import RowBuffer
@@ -76,6 +77,13 @@ class LoggedAgent(Agent):
         self._log.about(Kind.UNSENT, tick)
         super().note_unsent(tick)
 
+    def take_order(self, order: FaultOrder, tick: int) -> int | str:
+        """As `Agent.take_order`."""
+        at = super().take_order(order, tick)
+        if isinstance(at, int):
+            self._log.named(Kind.ORDER, "", order._replace(from_tick=at, exact=True).encode())
+        return at
+
     def _take_path_state(self, robot: str, state: PathState) -> None:
         self._log_message(Kind.PATH, robot, state.encode(), start=state.tick < 0)
         self._receive_path_state(robot, state)
@@ -124,7 +132,7 @@ def feed(agent: Agent, entry: Input) -> Sequence[Frame]:
         case Kind.TROUBLE:
             source, text = entry.named()
             agent.note_trouble(Trouble(source), text.decode() or None)
-        case Kind.PATH | Kind.POSE | Kind.PLACE | Kind.LEADER:
+        case Kind.PATH | Kind.POSE | Kind.PLACE | Kind.LEADER | Kind.ORDER:
             _deliver(agent, entry)
         case Kind.BEGIN:
             pass
@@ -142,5 +150,7 @@ def _deliver(agent: Agent, entry: Input) -> None:
             agent.receive_place(source, fix)
         case Kind.LEADER if (speed := LeaderSpeed.decode(content)) is not None:
             agent.receive_leader_speed(speed)
+        case Kind.ORDER if (order := FaultOrder.decode(content)) is not None:
+            agent.take_order(order, order.from_tick)
         case _:
             raise ValueError(f"a {entry.kind.name} of {source or 'no robot'} doesn't decode")

@@ -55,6 +55,11 @@ class Localiser:
         # Fix, odometry at its instant, and the turn from odometry's axes to the world's.
         self._anchor = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
+    def remember(self, delay_ticks: int) -> None:
+        """Keep the odometry of so many periods from now on; what isn't kept already is unknown."""
+        unknown = [(0.0, 0.0, 0.0)] * (delay_ticks + 1 - len(self._past))
+        self._past = deque([*unknown, *self._past], maxlen=delay_ticks + 1)
+
     def wheels(
         self, right_wheel_rad: float, left_wheel_rad: float, right_speed: float, left_speed: float
     ) -> RobotMotion:

@@ -21,6 +21,7 @@ from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import can_id_of, to_message
 from bridge.frame import Frame
 from bridge.network.barrier import Hellos
+from bridge.network.fault_orders import OrderInbox
 from bridge.network.link import Arrival, Link, Publisher
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.process.awake import LOOK_S, AwakeClock
@@ -71,10 +72,12 @@ class LockstepLoop:
         subscriptions: Subscriptions,
         path: Publisher,
         hellos: Hellos,
+        orders: OrderInbox | None = None,
         *,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         self._clock = clock
+        self._orders = orders
         self._agent = agent
         self._schedule = agent.brief.schedule
         self._robot = agent.brief.robot
@@ -119,7 +122,7 @@ class LockstepLoop:
             BusClock(self._schedule, agent.feedback_since),
             self._schedule,
         )
-        subscriptions, bus = self._subscriptions, self._bus
+        subscriptions, orders, bus = self._subscriptions, self._orders, self._bus
         timeout_s = BUS_SHARE * schedule.tick_deadline_s
         while True:
             tick: int | None = None
@@ -134,6 +137,8 @@ class LockstepLoop:
                 if schedule.owes(tick):
                     self._await_messages(tick, stop)
                 heard_ns = self._clock.monotonic_ns()
+                if orders is not None and orders.waiting:
+                    take_orders(agent, orders, tick)
                 self._send(agent.step(tick) if not stop.requested else agent.shut_down())
                 if tick >= subscriptions.next_change:
                     subscriptions.change(tick)
@@ -206,6 +211,12 @@ def did_not_start(agent: Agent) -> InfrastructureError:
     waited_s = agent.brief.schedule.start_deadline_s
     said = (f"{agent.brief.robot}: the run did not start within {waited_s:g} s", *agent.refusals())
     return InfrastructureError("; ".join(said))
+
+
+def take_orders(agent: Agent, orders: OrderInbox, tick: int) -> None:
+    """Have the agent carry out what has come, at this tick or later; answer it."""
+    for order in orders.take():
+        orders.answer(order, agent.take_order(order, tick))
 
 
 def deliver(agent: Agent, arrival: Arrival) -> None:

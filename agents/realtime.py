@@ -21,12 +21,13 @@ import can
 from agents.agent import Agent, Trouble
 from agents.bus_health import BusHealth
 from agents.guard import Phase
-from agents.lockstep import deliver, did_not_start
+from agents.lockstep import deliver, did_not_start, take_orders
 from agents.subscriptions import Subscriptions
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import can_id_of, to_frame, to_message
 from bridge.frame import ERR, Frame
 from bridge.network.barrier import Hellos
+from bridge.network.fault_orders import OrderInbox
 from bridge.network.launcher import CUT_OFF, LauncherWatch
 from bridge.network.link import Link, Publisher, waiting
 from bridge.network.messages import Go, Progress
@@ -77,11 +78,13 @@ class RealtimeLoop:
         path: Publisher,
         hellos: Hellos,
         progress: Publisher,
+        orders: OrderInbox | None = None,
         *,
         watch: LauncherWatch | None = None,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         self._clock = clock
+        self._orders = orders
         self._agent = agent
         self._schedule = agent.brief.schedule
         self._robot = agent.brief.robot
@@ -181,6 +184,8 @@ class RealtimeLoop:
                 agent.guard.note(tick, "cut_off" if self._away else "back", "the launcher")
             agent.keep_time(now_ns - epoch_ns, late_s, self._round_trip_s)
             self._receive_messages()
+            if self._orders is not None and self._orders.waiting:
+                take_orders(agent, self._orders, tick)
             frames = agent.step(tick) if not stop.requested else agent.shut_down()
             overdue = now_ns >= due_ns + period_ns and agent.phase is Phase.DRIVING
             if overdue:

@@ -8,11 +8,13 @@ A path state over an edge that doesn't exist at its tick is discarded unseen.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 from agents.admission import Admission
 from agents.emulated_network import HERE, EmulatedNetwork
 from agents.in_edges import InEdges
 from agents.neighbours import Neighbours
+from bridge.netem.channel import Channel
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from configs.brief import AgentBrief
 from configs.leader_speed import speed_at
@@ -22,6 +24,7 @@ class Reception:
     """What one robot has received. Pure."""
 
     def __init__(self, brief: AgentBrief) -> None:
+        self._brief = brief
         self._schedule = brief.schedule
         self._realtime = brief.schedule.realtime
         self._rejoins = brief.rejoins
@@ -72,6 +75,15 @@ class Reception:
         """Store the virtual leader's speed profile."""
         if self.admission.admits_leader_speed(speed):
             self.leader = speed
+
+    def channel_of(self, source: str, tick: int) -> Channel[Any]:
+        """The emulated edge from a source; one without effects is made if there is none.
+
+        What is under way over it arrives as before.
+        """
+        if self.network is None:
+            self.network = EmulatedNetwork(self._brief)
+        return self.network.channel(source) or self.network.open(source, tick, self.leader)
 
     def missing_to_start(self) -> list[str]:
         """Senders whose first message is required for the start and has not arrived."""

@@ -50,17 +50,26 @@ class FaultSchedule:
         self._waiting.append(planned)
         self._look()
 
-    def clear(self, name: str) -> bool:
-        """End a fault at the next tick, on all targets; whether there was one of this name."""
-        before = len(self._waiting)
-        self._waiting = [one for one in self._waiting if one.name != name]
-        found = len(self._waiting) < before
-        for n, one in enumerate(self._acting):
-            if one.name == name:
-                found = True
-                self._acting[n] = one._replace(to_tick=-FOREVER)
+    def clear(self, name: str, tick: int) -> bool:
+        """End a fault at a tick, on all targets; whether there was one of this name.
+
+        One that would begin at that tick or later is forgotten.
+        """
+        of_name = [one for one in (*self._waiting, *self._acting) if one.name == name]
+        self._waiting = [
+            self._ended(one, name, tick)
+            for one in self._waiting
+            if one.name != name or one.from_tick < tick
+        ]
+        self._acting = [self._ended(one, name, tick) for one in self._acting]
         self._look()
-        return found
+        return bool(of_name)
+
+    @staticmethod
+    def _ended(one: PlannedFault, name: str, tick: int) -> PlannedFault:
+        if one.name != name:
+            return one
+        return one._replace(to_tick=tick if one.to_tick is None else min(one.to_tick, tick))
 
     def due(self, tick: int) -> list[Change]:
         """The changes at a tick; `acting` is then what acts from it on."""

@@ -146,6 +146,11 @@ class ChannelModel(Effects):
     seed: str  # of its random streams
 
 
+def channel_seed(seed: int, source: str, hearer: str) -> str:
+    """The seed of the emulated edge from a source to a robot, of a scenario's seed."""
+    return f"{seed} {source} -> {hearer}"
+
+
 def located(channels: Iterable[ChannelModel]) -> tuple[str, ...]:
     """Robots whose poses the emulated network needs: effects depend on the distance to them."""
     return tuple(model.source for model in channels if model.distance is not None)
@@ -173,6 +178,7 @@ class AgentBrief:
     host: HostLimits
     channels: tuple[ChannelModel, ...]  # the emulated edges to it; others have no effects
     faults: tuple[PlannedFault, ...]  # of messages to it, and of its process
+    seed: int  # of the scenario
     phase_ns: int  # in real time, this much after a tick's time the controller acts
     bus: Settings  # keyword arguments of can.Bus, verbatim
     network: NetworkLink
@@ -180,6 +186,10 @@ class AgentBrief:
     # token on the network goes
     logs_inputs: bool = False  # for a replay
     rejoins: bool = False  # in real time, a run that goes on; another process was its controller
+
+    def channel_seed(self, source: str) -> str:
+        """The seed of the emulated edge from a source to this robot."""
+        return channel_seed(self.seed, source, self.robot)
 
     @property
     def located(self) -> tuple[str, ...]:

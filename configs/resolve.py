@@ -18,6 +18,7 @@ from configs.brief import (
     WheelDisturbance,
     Wheels,
     WireModel,
+    channel_seed,
 )
 from configs.connections import OURS, NetworkLink, Settings
 from configs.curves import formation_offset, reference_path
@@ -95,6 +96,7 @@ def agent_brief(
         host=_host_limits(scenario, ours=dict(bus).get("interface", OURS) == OURS),
         channels=channels(scenario, name),
         faults=agent_faults(scenario, name),
+        seed=scenario.seed,
         phase_ns=round(scenario.names.index(name) * ticks.period_ns / len(scenario.names)),
         bus=bus,
         network=network,
@@ -108,7 +110,9 @@ def channels(scenario: Scenario, name: str) -> tuple[ChannelModel, ...]:
         scenario.network, scenario.topology, name, faulted=faulted_sources(scenario, name)
     )
     return tuple(
-        extended(ChannelModel, effects, source=source, seed=f"{scenario.seed} {source} -> {name}")
+        extended(
+            ChannelModel, effects, source=source, seed=channel_seed(scenario.seed, source, name)
+        )
         for source, effects in effects_by_source.items()
     )
 

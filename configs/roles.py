@@ -38,6 +38,7 @@ class Topic(Enum):
     INPUTS = auto()
     TRAFFIC = auto()
     GO = auto()
+    ORDERS_OF_CONTROLLERS = auto()  # in lockstep, where the plant hands them on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +57,8 @@ class Role:
     """Can't be placed on another machine."""
     observer: bool = False
     """Takes no part in the run: it is stopped once plant and controllers have ended."""
+    takes_orders: bool = False
+    """Carries out faults that are ordered during a run."""
     puts: tuple[Topic, ...] = ()
     hears: tuple[Topic, ...] = ()
     watches: tuple[str, ...] = ()
@@ -76,7 +79,8 @@ PLANT = Role(
     module="plant",
     brief=PlantBrief,
     forked=True,
-    puts=(Topic.EMULATED_POSES, Topic.TRUTHS, Topic.TRAFFIC),
+    takes_orders=True,
+    puts=(Topic.EMULATED_POSES, Topic.TRUTHS, Topic.TRAFFIC, Topic.ORDERS_OF_CONTROLLERS),
     hears=(Topic.GO, Topic.MEASURED_POSES),
     watches=(LAUNCHER.name,),
 )
@@ -86,6 +90,7 @@ AGENT = Role(
     brief=AgentBrief,
     per_robot=True,
     forked=True,
+    takes_orders=True,
     puts=(Topic.OWN_PATH, Topic.OWN_TELEMETRY, Topic.OWN_INPUTS),
     hears=(
         Topic.OWN_POSE,
@@ -114,6 +119,11 @@ STARTED = tuple(role for role in ROLES if role.module)
 def is_observer(process: str) -> bool:
     """Whether a process takes no part in the run."""
     return any(role.observer and role.name == process.partition("/")[0] for role in ROLES)
+
+
+def takes_orders(process: str) -> bool:
+    """Whether a process carries out faults that are ordered during a run."""
+    return any(role.takes_orders and role.name == process.partition("/")[0] for role in ROLES)
 
 
 def identity_of(process: str) -> str:

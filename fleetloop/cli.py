@@ -17,6 +17,7 @@ from fleetloop.can.app import app as can_app
 from fleetloop.certificates.app import app as certs_app
 from fleetloop.check.app import check
 from fleetloop.compare.app import compare
+from fleetloop.fault.app import app as fault_app
 from fleetloop.graph.app import graph
 from fleetloop.launch.app import agent, network, plant, run
 from fleetloop.options import VersionOption
@@ -35,6 +36,7 @@ app = typer.Typer(
 )
 app.add_typer(can_app, name="can")
 app.add_typer(certs_app, name="certs")
+app.add_typer(fault_app, name="fault")
 
 
 def init(

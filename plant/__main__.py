@@ -15,11 +15,14 @@ from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.client import StoppedError, open_client
 from bridge.network.clock_exchange import answer_pings
+from bridge.network.fault_orders import OrderInbox
 from bridge.network.launcher import LauncherWatch
 from bridge.network.link import Arrival, Link, Publisher, waiting
 from bridge.network.messages import Go, Notice, PoseFix, Progress, Rows
+from bridge.network.refused_messages import Refusals
 from bridge.network.reports import PlantReport
 from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer
+from bridge.network.zenoh_link import ZenohLink
 from bridge.process.awake import Stall
 from bridge.process.clock import SYSTEM_CLOCK, implausible_start, monotonic_of, process_cpu_ns
 from bridge.process.lifecycle import (
@@ -34,9 +37,10 @@ from configs.brief import PlantBrief
 from configs.connections import Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError
 from configs.events import Event
-from configs.roles import PLANT
+from configs.roles import AGENT, PLANT
 from plant.herald import Herald
 from plant.lockstep import LockstepLoop, PlantCounters
+from plant.orders import PlantOrders
 from plant.real_robot import RealRobot
 from plant.realtime import RealtimeLoop
 from plant.robot import emulated_robot
@@ -98,7 +102,7 @@ def join(hub: Hub, attached: Sequence[tuple[str, Settings]]) -> DrivePort:
     return CombinedPort(hub, ExternalBuses(dict(attached)), names)
 
 
-def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) -> PlantCounters:
+def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePort) -> PlantCounters:
     name = brief.network.run
     emulated = [emulated_robot(robot) for robot in brief.robots]
     others = [RealRobot(robot, start) for robot, start in brief.real_robots]
@@ -117,6 +121,8 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
     taps = {bus: log.add for bus, log in logs.items()}
     progress = link.publisher(keys.progress(name, PLANT.name))
     report = link.publisher(keys.report(name, PLANT.name))
+    refusals = Refusals()
+    orders = _orders(brief, link, refusals)
     link.subscribe(keys.go(name), "go")
     for other in others:
         link.subscribe(keys.pose(name, other.robot), other.robot)
@@ -164,7 +170,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
         by_name = {other.robot: other for other in others}
         record = partial(_record, link, by_name, rows[len(emulated) :], brief.schedule.period_s)
         wall = RealtimeLoop(
-            brief, emulated, end, hub, poses, rows[: len(emulated)], say, taps, record
+            brief, emulated, end, hub, poses, rows[: len(emulated)], say, taps, record, orders
         )
         counters, progress_of, stalls = wall.counters, wall.progress, wall.lateness.stalls
         body = partial(wall.run, epoch_ns)
@@ -173,7 +179,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
         link.declare_live(keys.live(name, PLANT.name))
         _await_go(brief, link, hellos, stop)
         settle_memory()
-        loop = LockstepLoop(brief, emulated, hub, poses, rows, say, taps)
+        loop = LockstepLoop(brief, emulated, hub, poses, rows, say, taps, orders)
         counters, progress_of, body = loop.counters, loop.progress, loop.run
     sampler = Sampler()
     began_ns, waited_ns = process_cpu_ns(), processor_wait_ns()
@@ -192,6 +198,7 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
         say(progress_of())
         summary = PlantReport(
             events=tuple(herald.events),
+            remarks=tuple(refusals.lines()),
             left_early=stop.reason if counters.ticks < brief.schedule.ticks else "",
             missing_privileges=tuple(missing_privileges),
             cpu_ns=process_cpu_ns() - began_ns,
@@ -211,6 +218,14 @@ def _run(brief: PlantBrief, stop: Stop, link: Link, hub: Hub, end: DrivePort) ->
         report.put(summary.encode())
         stop.await_release()
     return counters
+
+
+def _orders(brief: PlantBrief, link: ZenohLink, refusals: Refusals) -> PlantOrders:
+    """The orders to this plant; in lockstep those to controllers come here as well."""
+    run = brief.network.run
+    told = () if brief.schedule.realtime else [robot.robot for robot in brief.robots]
+    relays = {robot: link.publisher(keys.order(run, AGENT.process(robot))) for robot in told}
+    return PlantOrders(brief.schedule, OrderInbox(link, run, PLANT.name, refusals), relays)
 
 
 def _body(body: Callable[[Stop], None], stop: Stop) -> None:

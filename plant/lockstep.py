@@ -31,6 +31,7 @@ from configs.errors import InfrastructureError, PeerLostError
 from plant.bus.build import build_buses
 from plant.bus.port import ALL, Bus
 from plant.bus.sockets import SocketPort
+from plant.orders import PlantOrders
 from plant.robot import EmulatedRobot
 
 REPORT_EVERY_NS = 100_000_000
@@ -92,10 +93,12 @@ class LockstepLoop:
         rows: Sequence[RowBuffer],
         report: Callable[[Progress], None],
         taps: Mapping[str, Tap],
+        orders: PlantOrders | None = None,
         *,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         self._clock = clock
+        self._orders = orders
         self._schedule = schedule = brief.schedule
         self._period_ns, self._ticks = schedule.period_ns, schedule.ticks
         self._tick_wall_ns = int(schedule.period_ns / brief.speed) if brief.speed > 0.0 else 0
@@ -131,7 +134,10 @@ class LockstepLoop:
         hub = self._hub
         for lane in self._lanes.values():
             self._go_on(lane, now_ns)
+        orders = self._orders.waiting if self._orders is not None else ()
         while self._at_slowest and not stop.requested:
+            if orders:
+                self._take_orders()
             answered = hub.collect(WAIT_S)
             after_ns = self._clock.monotonic_ns()
             self.counters.waited_ns += after_ns - now_ns
@@ -159,6 +165,13 @@ class LockstepLoop:
         return Progress(
             tick, tick * self._schedule.period_ns, self._clock.monotonic_ns() - self._start_ns
         )
+
+    def _take_orders(self) -> None:
+        """Carry out orders from a tick on that no bus has begun."""
+        lanes = [lane for lane in self._lanes.values() if not lane.done]
+        if self._orders is not None and lanes:
+            latest = max(lane.tick for lane in lanes)
+            self._orders.take([lane.bus for lane in self._lanes.values()], latest + 1)
 
     # --- one bus -------------------------------------------------------------------------------
 

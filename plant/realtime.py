@@ -23,6 +23,7 @@ from configs.brief import PlantBrief
 from plant.bus.build import build_buses, no_begin
 from plant.bus.sockets import SocketPort
 from plant.lockstep import REPORT_EVERY_NS, PlantCounters
+from plant.orders import PlantOrders
 from plant.robot import EmulatedRobot
 
 FAREWELL_S = 0.5
@@ -43,12 +44,14 @@ class RealtimeLoop:
         report: Callable[[Progress], None],
         taps: Mapping[str, Tap],
         record_others: Callable[[int], None] = lambda _: None,
+        orders: PlantOrders | None = None,
         *,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         self._clock = clock
         self._schedule = brief.schedule
         self._record_others = record_others
+        self._orders = orders
         self._zero_ns = brief.schedule.bus_time_ns(0)
         self._end = end
         self._report = report
@@ -86,6 +89,8 @@ class RealtimeLoop:
                 continue
             self.counters.overruns += now_ns > due_ns + schedule.period_ns
             self.lateness.note(self._tick, (now_ns - due_ns) * 1e-9)
+            if self._orders is not None and self._orders.waiting:
+                self._orders.take(self._buses.values(), self._tick)
             self._keep_tick(power_up_ns)
             self._tick += 1
             if now_ns >= self._next_report_ns:

@@ -163,10 +163,15 @@ def remove_run_folder(folder: Path) -> None:
 
 def live_buses() -> list[Path]:
     """The sockets of all buses with a listener, in order of their names."""
+    return [path for path in trusted(f"*/*{SUFFIX}") if _answers(path)]
+
+
+def trusted(pattern: str) -> list[Path]:
+    """The files of a pattern below the base, in order of their names; none if it isn't safe."""
     base = base_folder()
     with contextlib.suppress(OSError):
         if not _danger(base):
-            return [path for path in sorted(base.glob(f"*/*{SUFFIX}")) if _answers(path)]
+            return sorted(base.glob(pattern))
     return []
 
 

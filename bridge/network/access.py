@@ -4,9 +4,10 @@ The graph *is* the network. The router refuses everything that isn't listed (def
 process is bound to its identity by a random password that it alone is given. The rights of a role
 are in its row of `configs.roles`: of an agent its own path, rows and inputs to put, and to hear the
 paths of exactly its in-neighbours, its own pose, and leader/speed iff h_i = 1. Every role that a
-run starts also puts progress, notices and its report. Besides the roles there are guests, clients
-of buses on other machines: they put their lines up and hear their lines down; which buses they may
-open is the relay's decision.
+run starts also puts progress, notices and its report. Faults are ordered by the launcher alone; in
+lockstep the plant hands orders on to controllers (`bridge.network.fault_orders`). Besides the roles
+there are guests, clients of buses on other machines: they put their lines up and hear their lines
+down; which buses they may open is the relay's decision.
 
 Plant and controllers may watch the launcher's token and hear its last word: on other machines that
 is how they learn that the run is over, and why. A process on another machine has a password that
@@ -37,7 +38,7 @@ from typing import NamedTuple
 
 from bridge.network import keys
 from bridge.network.messages import MOST_BYTES
-from configs.roles import LAUNCHER, ROLES, Role, Topic, processes_of
+from configs.roles import AGENT, LAUNCHER, ROLES, Role, Topic, processes_of, takes_orders
 
 MOST_PER_PERIOD = 8.0
 """Path states and poses of one robot within the period in which the schedule has one."""
@@ -145,7 +146,8 @@ def plan(
     router is a program of its own, where the launcher is a client. Periods are of real time; with
     one, what comes much more often is dropped.
     """
-    graph = _Graph(run, robots, hears, leader, buses, real_robots, located or {})
+    lockstep = share_period_s is None
+    graph = _Graph(run, robots, hears, leader, buses, real_robots, located or {}, lockstep)
     rights: dict[str, Rights] = {}
     for role in ROLES:
         for robot in robots if role.per_robot else ("",):
@@ -182,6 +184,7 @@ class _Graph(NamedTuple):
     buses: Sequence[str]
     measured: Collection[str]  # robots that aren't emulated
     located: Mapping[str, Sequence[str]]  # by robot, those whose poses its emulated network needs
+    lockstep: bool
 
     def keys(self, topics: Iterable[Topic], robot: str) -> tuple[str, ...]:
         """The keys of these topics to a role's process; `robot` is its own."""
@@ -193,6 +196,9 @@ class _Graph(NamedTuple):
             return [keys.go(run)]
         if topic is Topic.LEADER_SPEED:
             return [keys.leader_speed(run)] if robot in self.leader else []
+        if topic is Topic.ORDERS_OF_CONTROLLERS:
+            controllers = map(AGENT.process, self.robots) if self.lockstep else ()
+            return [keys.order(run, process) for process in controllers]
         emulated = [r for r in self.robots if r not in self.measured]
         measured = [r for r in self.robots if r in self.measured]
         key_of, names = {
@@ -218,6 +224,11 @@ def _rights(role: Role, robot: str, graph: _Graph) -> Rights:
     if role.module:
         control = keys.progress(run, process), keys.notice(run, process), keys.report(run, process)
     reports = tuple(keys.report(run, other) for other in role.watches)
+    if role.takes_orders:
+        control, reports = (
+            (*control, keys.answer(run, process)),
+            (*reports, keys.order(run, process)),
+        )
     if role.module and not role.beside_launcher:
         control, reports = (*control, keys.pong(run, process)), (*reports, keys.ping(run))
     return Rights(
@@ -234,7 +245,10 @@ def _launcher(graph: _Graph, bus_guests: Iterable[str]) -> Rights:
     processes = processes_of(tuple(graph.robots))
     said = [of(run, it) for it in processes for of in (keys.progress, keys.notice, keys.report)]
     said += [keys.pong(run, process) for process in processes]
-    own = keys.go(run), keys.leader_speed(run), keys.report(run, LAUNCHER.name), keys.ping(run)
+    own = [keys.go(run), keys.leader_speed(run), keys.report(run, LAUNCHER.name), keys.ping(run)]
+    for process in filter(takes_orders, processes):
+        own.append(keys.order(run, process))
+        said.append(keys.answer(run, process))
     return Rights(
         puts=(*own, *(keys.guest_lines("down", user) for user in users)),
         hears=(*said, *(keys.guest_lines("up", user) for user in users)),

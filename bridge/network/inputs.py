@@ -19,10 +19,11 @@ of all others that of the newest tick.
     TICK      tick i64, then of every frame sent      a period was computed; the answer
               identifier u32, length u8, data
     STOP      as after the tick of a TICK             told to stop before the closing tick
+    ORDER     NUL, `FaultOrder`                       with the tick at which it acts
 
 A replay feeds a controller what is left of its answers, and compares the answers. Whatever else may
-reach a controller, an order of the operator for example, is a kind more: here, where the controller
-takes it (`agents.inputs.LoggedAgent`), and where a replay gives it (`agents.inputs.feed`).
+reach a controller is a kind more: here, where the controller takes it
+(`agents.inputs.LoggedAgent`), and where a replay gives it (`agents.inputs.feed`).
 """
 
 import struct
@@ -60,6 +61,7 @@ class Kind(IntEnum):
     UNSENT = 9
     TICK = 10
     STOP = 11
+    ORDER = 12
 
 
 class Input(NamedTuple):
@@ -74,7 +76,7 @@ class Input(NamedTuple):
         return Frame(_IDENTIFIER.unpack_from(self.payload)[0], self.payload[_IDENTIFIER.size :])
 
     def named(self) -> tuple[str, bytes]:
-        """Source and content of PATH, POSE, PLACE, LEADER and TROUBLE."""
+        """Source and content of PATH, POSE, PLACE, LEADER, ORDER and TROUBLE."""
         source, _, content = self.payload.partition(_NUL)
         return source.decode(), content
 

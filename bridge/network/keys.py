@@ -14,6 +14,8 @@
     fleetloop/<run>/@progress/<process>      how far a process is, to the launcher
     fleetloop/<run>/@notice/<process>        what has just happened, in words, to the launcher
     fleetloop/<run>/@report/<process>        a process's last word, to the launcher
+    fleetloop/<run>/@order/<process>         faults to apply or to end, to the process
+    fleetloop/<run>/@answer/<process>        a process's answer to orders, to the launcher
     fleetloop/@guest/<user>/<line>/<bus>/..  a client of a bus on another machine: up, down, alive;
                                              <run>/<bus> if it names the run as well
     fleetloop/@guest/<user>/@relay           liveliness token: the relay serves this user
@@ -97,6 +99,16 @@ def notice(run: str, process: str) -> str:
 def report(run: str, process: str) -> str:
     """Key of a process's final report."""
     return f"{_run(run)}/@report/{_process(process)}"
+
+
+def order(run: str, process: str) -> str:
+    """Key of orders to a process."""
+    return f"{_run(run)}/@order/{_process(process)}"
+
+
+def answer(run: str, process: str) -> str:
+    """Key of a process's answers to orders."""
+    return f"{_run(run)}/@answer/{_process(process)}"
 
 
 def guest_line(user: str, line: str, channel: str) -> str:

@@ -31,6 +31,8 @@ MOST_BYTES = {
     "progress": 128,
     "pong": 128,
     "notice": 1 << 12,
+    "order": MAX_BYTES,
+    "answer": 1 << 12,
     "truth": 1 << 16,
     "telemetry": 1 << 16,
     "inputs": 1 << 16,

@@ -57,6 +57,8 @@ class ControlPlane:
         self._on_progress = on_progress
         self._on_event = on_event
         self.on_notice = on_notice
+        self.on_answer: Callable[[str, bytes], bool] = lambda *_: False
+        """Called with a process and its answer to an order; returns whether it is well formed."""
 
     def subscribe(self, link: Link, run: str, processes: Iterable[str]) -> None:
         """Subscribe to the messages of these processes."""
@@ -113,6 +115,9 @@ class ControlPlane:
             case "pong":
                 if not self.clocks.take(process, arrival.payload):
                     self.words.refusals.note("time", process, "not well formed")
+            case "answer":
+                if not self.on_answer(process, arrival.payload):
+                    self.words.refusals.note("answer", process, "not well formed")
             case "notice":
                 if (event := self.words.event(process, arrival.payload)) is not None:
                     self._take(self.outcome.said.setdefault(process, []), event)

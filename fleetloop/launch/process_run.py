@@ -31,6 +31,8 @@ from configs.events import Event
 from configs.resolve import leader_brief, schedule
 from configs.roles import LAUNCHER, PLANT, identity_of, processes_of
 from configs.scenario import Scenario
+from fleetloop.door.requests import Request, Respond
+from fleetloop.door.server import Door
 from fleetloop.launch import open_files, placement
 from fleetloop.launch.child import GAVE_UP, Child, Failure, end, refuse_shadowed_roles
 from fleetloop.launch.clock_offsets import (
@@ -41,6 +43,7 @@ from fleetloop.launch.clock_offsets import (
 )
 from fleetloop.launch.control_plane import ControlPlane
 from fleetloop.launch.ending import DRAIN_S, Ending
+from fleetloop.launch.fault_desk import FaultDesk
 from fleetloop.launch.fork_server import ForkServer
 from fleetloop.launch.machine import WATCH_EVERY_S, MachineWatch
 from fleetloop.launch.outcome import Outcome
@@ -99,6 +102,14 @@ class ProcessRun:
         self._supervision = Supervision(self._plane, self._schedule, patience_s)
         limit_s = self._schedule.tick_deadline_s
         self._ending = Ending(self._plane, self._run, self._machine, record, limit_s)
+        self._desk = FaultDesk(
+            scenario,
+            self._schedule,
+            self._deployment.emulates,
+            lambda: self.outcome.ticks,
+            self._now,
+        )
+        self._plane.on_answer = self._desk.take
         self._hellos = Hellos(self._schedule.hello_every_s, clock=clock)
         self._next_look_s = 0.0
         self._ready_s: float | None = None
@@ -153,6 +164,7 @@ class ProcessRun:
                 link = open_.enter_context(self._router(folder, stop))
                 link.declare_live(keys.live(run, LAUNCHER.name))
                 self._plane.subscribe(link, run, self._processes)
+                self._desk.open(link, run, self._processes)
                 spawn(self._orders, self._links, folder, fork_server, self._plane.children)
             if granted := placement.bus_guests(self._deployment):
                 open_.enter_context(Relay(link, folder, scenario.buses, granted))
@@ -250,13 +262,34 @@ class ProcessRun:
     def _watch(self, link: LauncherLink, stop: Stop) -> Failure | None:
         """Follow the run until the plant and all controllers have ended."""
         most, folder = self._scenario.host.restarts, sockets.folder_of(self._run)
-        with Restarts(self._plane, most, folder, self._respawned) as restarts:
-            return self._follow(link, stop, restarts)
+        requests = {"about": Request({}, self._say_about), **self._desk.requests}
+        with (
+            Restarts(self._plane, most, folder, self._respawned) as restarts,
+            Door(folder, requests) as door,
+        ):
+            return self._follow(link, stop, restarts, door)
 
-    def _follow(self, link: LauncherLink, stop: Stop, restarts: Restarts) -> Failure | None:
+    def _say_about(self, respond: Respond) -> None:
+        """Tell a client of the door which run this is, and how far."""
+        tick = self.outcome.ticks
+        respond(
+            {
+                "run": self._run,
+                "folder": str(self._orders.record.parent.absolute()),
+                "scenario": self._scenario.name,
+                "tick": tick,
+                "t_s": round(tick * self._schedule.period_s, 9),
+            }
+        )
+
+    def _follow(
+        self, link: LauncherLink, stop: Stop, restarts: Restarts, door: Door
+    ) -> Failure | None:
         plane, supervision = self._plane, self._supervision
         while not stop.requested:
             plane.receive(link, WATCH_EVERY_S)
+            door.look()
+            self._desk.look()
             self._report_refusals(link)
             plane.clocks.ask(EVERY_S)
             supervision.name_the_frozen()

@@ -10,8 +10,10 @@ from agents.agent import Trouble
 from agents.guard import Phase
 from agents.inputs import feed
 from bridge.frame import Frame
+from bridge.network.fault_orders import FaultOrder
 from bridge.network.inputs import Input, InputBuffer, Kind, entries
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
+from configs.faults.messages import LinkPartition
 from configs.leader_speed import SpeedChange
 
 
@@ -151,3 +153,25 @@ def test_start_messages_that_say_the_same_again_are_logged_once() -> None:
         logged.bench.agent.receive_pose(fix)
     kinds = [entry.kind for entry in logged.entries()]
     assert kinds.count(Kind.POSE) == 2  # the bench's own, then this one
+
+
+def test_a_fault_that_was_ordered_is_repeated_at_its_tick_and_one_that_was_refused_is_not() -> None:
+    logged = Logged("graph.leader=['r1','r2']")
+    logged.bench.agent.receive_leader_speed(LeaderSpeed((SpeedChange(0, 0.5),)))
+    logged.drive(1)
+    cut = LinkPartition(kind="link_partition", at_s=0.0)
+    for n in range(300):
+        if n % 20 == 0:
+            logged.hear(0.3 + 0.01 * n)
+        if n == 50:
+            order = FaultOrder(1, False, "cut", ("r1 -> r2",), cut, 0, 100, False)
+            began = logged.bench.agent.take_order(order, logged.bench.tick_now)
+            assert began == logged.bench.tick_now
+            assert "nothing here" in logged.bench.agent.take_order(
+                order._replace(targets=("r2 -> r1",)), logged.bench.tick_now
+            )
+        logged.tick()
+    log = logged.bench.agent.faults.schedule.log
+    assert [(it.tick - began, it.acts) for it in log] == [(0, True), (100, False)]
+    assert [it.kind for it in logged.entries()].count(Kind.ORDER) == 1
+    logged.assert_repeated()

@@ -49,20 +49,34 @@ def test_an_instant_strikes_once_and_acts_no_more() -> None:
     assert schedule.next_tick == FOREVER
 
 
-def test_an_ordered_fault_acts_at_the_next_tick_and_ends_when_it_is_cleared() -> None:
+def test_an_ordered_fault_acts_at_the_next_tick_and_ends_at_the_tick_at_which_it_is_cleared() -> (
+    None
+):
     schedule = FaultSchedule([])
     assert schedule.next_tick == FOREVER
     schedule.add(pushes("push", 5, None))
     assert [str(one) for one in schedule.due(9)] == ["r1: fault push applied"]
-    assert schedule.clear("push")
-    assert [str(one) for one in schedule.due(10)] == ["r1: fault push cleared"]
-    assert not schedule.clear("push")
+    assert schedule.clear("push", 12)
+    assert schedule.next_tick == 12
+    assert [str(one) for one in schedule.due(12)] == ["r1: fault push cleared"]
+    assert not schedule.clear("push", 13)
 
 
 def test_a_fault_that_is_cleared_before_it_acts_never_does() -> None:
     schedule = FaultSchedule([pushes("push", 5, 9)])
-    assert schedule.clear("push")
+    assert schedule.clear("push", 5)
     assert schedule.due(7) == []
+    assert schedule.log == []
+
+
+def test_a_planned_fault_that_is_cleared_after_it_begins_ends_then_and_never_later() -> None:
+    schedule = FaultSchedule([pushes("push", 5, 9)])
+    assert schedule.clear("push", 7)
+    assert schedule.clear("push", 8)
+    assert [(it.tick, it.acts) for tick in range(12) for it in schedule.due(tick)] == [
+        (5, True),
+        (7, False),
+    ]
 
 
 def test_of_a_controller_that_was_started_again_no_fault_acts_that_is_over() -> None:

@@ -15,9 +15,11 @@ from support.processes import Run
 
 from bridge.network import keys
 from bridge.network.client import open_client
+from bridge.network.fault_orders import FaultOrder
 from bridge.network.messages import PathState, Rows
 from bridge.network.zenoh_link import ZenohLink
 from configs.connections import NetworkLink
+from configs.faults.powertrains import DriveEvent
 from configs.roles import AGENT, identity_of
 from fleetloop.record.reader import Record
 
@@ -184,3 +186,17 @@ def test_a_hearer_with_rights_that_does_not_read_stops_nobody(tmp_path, monkeypa
             subscriber.undeclare()
         ears.close()
     assert status == 0, out
+
+
+def test_only_the_launcher_orders_faults(tmp_path, monkeypatch) -> None:
+    estop = DriveEvent(kind="drive_estop", at_s=0.0)
+    order = FaultOrder(1, False, "stop", ("r1", "r2"), estop, 0, None, False).encode()
+    with attacked(tmp_path, monkeypatch, "--duration", "3", "--speed", "1") as attack:
+        with attack.client(AGENT.identity("r1")) as r1:
+            for process in ("plant", "agent/r2", "agent/r1"):
+                r1._session.put(attack.key(keys.order, process), order)
+            r1.publisher(attack.key(keys.answer, "agent/r1")).put(b"\xc1")
+        status, out = attack.run.end()
+    assert status == 0, out
+    assert attack.run.summary()["stopped_robots"] == {}
+    assert "answer of agent/r1: not well formed" in notices(attack.run)

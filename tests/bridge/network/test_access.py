@@ -51,9 +51,23 @@ def test_rights_of_a_robot_are_its_graph(plan: access.AccessPlan) -> None:
         keys.report(RUN, LAUNCHER.name),
         keys.path(RUN, "r2"),
         keys.path(RUN, "r3"),
+        keys.order(RUN, "agent/r4"),
     }
     assert keys.leader_speed(RUN) in plan.rights["agent-r1"].hears
     assert keys.leader_speed(RUN) not in plan.rights["agent-r2"].hears
+
+
+@pytest.mark.parametrize("share_period_s", [None, 0.02])
+def test_faults_are_ordered_by_the_launcher_and_in_lockstep_handed_on_by_the_plant(
+    share_period_s: float | None,
+) -> None:
+    plan = access.plan(RUN, ROBOTS, HEARS, (), external=True, share_period_s=share_period_s)
+    to_controllers = {keys.order(RUN, AGENT.process(robot)) for robot in ROBOTS}
+    orders = {*to_controllers, keys.order(RUN, PLANT.name)}
+    may = {user: orders.intersection(rights.puts) for user, rights in plan.rights.items()}
+    assert may.pop(LAUNCHER.identity()) == orders
+    assert may.pop(PLANT.identity()) == (to_controllers if share_period_s is None else set())
+    assert not any(may.values())
 
 
 def test_everything_that_is_not_allowed_is_denied(plan: access.AccessPlan) -> None:

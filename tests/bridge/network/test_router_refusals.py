@@ -75,7 +75,9 @@ with open_router(None, plan, folder, outside) as router:
     router.subscribe(keys.path("t", "r1"), "own")
     with login("agent-r1", "one") as link:
         own, others = (link.publisher(keys.path("t", robot)) for robot in ("r1", "r2"))
+        orders = link.publisher(keys.order("t", "plant"))
         for _ in range(7):
+            orders.put(b"a fault")
             others.put(b"forged")
         link._session.put("anything/at/all", b"forged")
         link.subscribe(keys.path("t", "r2"), "secret")
@@ -128,14 +130,16 @@ def test_a_denied_put_leaves_who_and_what_and_an_allowed_one_nothing(
     tmp_path: Path,
 ) -> None:
     said, _ = notes(PUTS, tmp_path, "tcp")
-    *others, forged = sorted(said)
+    *others, ordered, forged = sorted(said)
     assert others == [
         "denied to 'agent-r1' from 127.0.0.1: listening on fleetloop/t/robot/r2/path",
         "denied to 'agent-r1' from 127.0.0.1: put on anything/at/all",
     ]
     # All seven, or fewer: once the client is told that nobody listens there it sends none.
+    put = r"denied to 'agent-r1' from 127\.0\.0\.1: put on fleetloop/t/"
+    assert re.fullmatch(rf"{put}@order/plant( \([2-7] times\))?", ordered)
     assert re.fullmatch(
-        r"denied to 'agent-r1' from 127\.0\.0\.1: put on fleetloop/t/robot/r2/path"
+        rf"{put}robot/r2/path"
         r"( \([2-7] times\))?",
         forged,
     )

@@ -1,0 +1,188 @@
+"""Orders of faults during a run, and the answers to them.
+
+The launcher has validated an order by the scenario; the plant and the controllers carry it out at a
+tick, and answer with that tick or with a reason why not.
+
+    FaultOrder   [1, number, ends, name, targets, fault, from_tick, ticks, exact] @order/<process>
+    FaultAnswer  [1, number, tick, refusal] @answer/<process>
+
+`fault` is the table of [[fault]] without the keys that the other fields give. In real time the
+launcher orders of each process what concerns it. In lockstep it orders of the plant, which owns
+time: the plant hands on what concerns controllers, ahead of a pose that each of them waits for, so
+that all of them have it before the tick at which it is due.
+"""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any, NamedTuple, get_type_hints
+
+from bridge.fault_schedule import FaultSchedule
+from bridge.network import keys
+from bridge.network.packing import ints, pack, printable, unpack
+from bridge.network.refused_messages import Refusals
+from bridge.network.zenoh_link import ZenohLink
+from configs.conformity import conforms
+from configs.faults.base import Fault, PlannedFault
+from configs.faults.kinds import KINDS
+from configs.parameters import as_tuples
+from configs.roles import LAUNCHER
+
+MOST_TARGETS = 1 << 12
+MOST_TEXT = 500
+"""Characters of a name, a target or a refusal."""
+MOST_WAITING = 1 << 10
+"""Orders that one process keeps until its next tick; older ones are dropped unanswered."""
+_GIVEN = frozenset(("name", "at_s", "for_s", "robots"))
+"""Keys of a fault that other fields of an order give."""
+
+
+class FaultOrder(NamedTuple):
+    """A fault to apply, or to end before its time."""
+
+    number: int  # of the order, for the answer
+    ends: bool  # the fault of this name, rather than applies it
+    name: str  # of the fault
+    targets: tuple[str, ...]
+    fault: Fault
+    from_tick: int
+    ticks: int | None  # how long it lasts; None: to the end
+    exact: bool
+    """Refuse it if that tick has gone; otherwise it acts as soon as it can, not before."""
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        number, ends, name, targets, fault, *rest = self
+        return pack(number, ends, name, targets, _table(fault), *rest)
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "FaultOrder | None":
+        """The message in the bytes, None if there is none."""
+        read = unpack(payload, 9)
+        if read is None:
+            return None
+        number, ends, name, targets, table, from_tick, ticks, exact = read[1:]
+        lasts = [] if ticks is None else [ticks]
+        if not ints([number, from_tick, *lasts]) or type(ends) is not bool:
+            return None
+        if type(exact) is not bool or type(targets) is not list or len(targets) > MOST_TARGETS:
+            return None
+        if not all(map(_is_text, (name, *targets))) or (fault := _fault(table)) is None:
+            return None
+        return cls(number, ends, name, tuple(targets), fault, from_tick, ticks, exact)
+
+    def planned(self, target: str, tick: int, period_s: float) -> PlannedFault:
+        """The fault as it acts on one target from a tick on."""
+        until = None if self.ticks is None else tick + self.ticks
+        values = {one.name: getattr(self.fault, one.name) for one in fields(self.fault)}
+        fault = type(self.fault)(**values | {"at_s": tick * period_s})
+        return PlannedFault(self.name, target, fault, tick, until)
+
+    def act(self, schedules: Mapping[str, FaultSchedule], tick: int, period_s: float) -> int | str:
+        """Plan the fault on each of its targets, or its end, from a tick on.
+
+        Returns the tick, or why it can't act; `schedules` by target.
+        """
+        if strangers := [target for target in self.targets if target not in schedules]:
+            return f"{strangers[0]}: nothing here that it can act on"
+        for target in self.targets:
+            if self.ends:
+                schedules[target].clear(self.name, tick)
+            else:
+                schedules[target].add(self.planned(target, tick, period_s))
+        return tick
+
+    def tick(self, earliest: int, ticks: int) -> int | str:
+        """The tick at which it acts in a run of so many, or why it can't."""
+        if self.exact and self.from_tick < earliest:
+            return f"tick {self.from_tick} has gone: tick {earliest} is the next that it can act at"
+        tick = max(self.from_tick, earliest, 0)
+        return tick if tick < ticks else f"the run ends before: it has {ticks} ticks"
+
+
+class FaultAnswer(NamedTuple):
+    """What a process does with an order."""
+
+    number: int
+    tick: int  # at which it acts
+    refusal: str = ""  # why it doesn't; "" if it does
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return pack(*self._replace(refusal=self.refusal[:MOST_TEXT]))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "FaultAnswer | None":
+        """The message in the bytes, None if there is none."""
+        read = unpack(payload, 4)
+        if read is None or not ints(read[1:3]) or not _is_text(read[3]):
+            return None
+        return cls(read[1], read[2], printable(read[3]))
+
+
+class OrderInbox:
+    """Orders to one process: they come on the network's thread, its loop takes them.
+
+    `waiting` is looked at once per tick; nothing else costs while there are none.
+
+    Args:
+        link: of the process.
+        run: of the orders.
+        process: that carries them out.
+        refusals: count what is no order.
+    """
+
+    def __init__(self, link: ZenohLink, run: str, process: str, refusals: Refusals) -> None:
+        self.waiting: deque[bytes] = deque(maxlen=MOST_WAITING)
+        self._refusals = refusals
+        self._answers = link.publisher(keys.answer(run, process))
+        link.each(keys.order(run, process), self.waiting.append)
+
+    def take(self) -> list[FaultOrder]:
+        """The orders that have come; what is none is counted and dropped."""
+        orders = []
+        while self.waiting:
+            order = FaultOrder.decode(self.waiting.popleft())
+            if order is None:
+                self._refusals.note("order", LAUNCHER.name, "not well formed")
+            else:
+                orders.append(order)
+        return orders
+
+    def answer(self, order: FaultOrder, tick: int | str) -> None:
+        """Say the tick at which an order acts, or why it doesn't."""
+        if isinstance(tick, str):
+            said = FaultAnswer(order.number, 0, tick)
+        else:
+            said = FaultAnswer(order.number, tick)
+        self._answers.put(said.encode())
+
+
+def _table(fault: Fault) -> dict[str, Any]:
+    values = {one.name: getattr(fault, one.name) for one in fields(fault)}
+    return {key: value for key, value in values.items() if key not in _GIVEN and value is not None}
+
+
+def _fault(table: object) -> Fault | None:
+    """The fault in a table as `_table` makes it, None if there is none."""
+    if type(table) is not dict or not all(type(key) is str for key in table):
+        return None
+    kind = table.get("kind")
+    made = KINDS.get(kind) if type(kind) is str else None
+    if made is None or _GIVEN & table.keys():
+        return None
+    values: dict[str, Any] = as_tuples(table)
+    hints = get_type_hints(made, include_extras=True)
+    known = {one.name for one in fields(made)}
+    if not all(key in known and conforms(value, hints[key]) for key, value in values.items()):
+        return None
+    return made(**values, at_s=0.0)
+
+
+def _is_text(value: object) -> bool:
+    return type(value) is str and len(value) <= MOST_TEXT
+
+
+def targets_to(targets: Sequence[str], hearer: str) -> tuple[str, ...]:
+    """Those targets that concern a controller: its robot, and edges to it."""
+    return tuple(target for target in targets if target.rpartition(" -> ")[2] == hearer)

@@ -1,0 +1,148 @@
+"""The command line of `fleetloop fault [RUN] VERB ...`: arguments only."""
+
+from typing import Annotated, Any
+
+import typer
+
+from fleetloop.numbers import LONGEST_S, OurWords, between
+from fleetloop.options import listed
+
+
+class RunFirst(OurWords):
+    """Verbs before which a run may be named."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Without a run before its verb, it is the only one that goes on."""
+        if args and args[0] in self.commands:
+            args = ["", *args]
+        return super().parse_args(ctx, args)
+
+
+app = typer.Typer(
+    cls=RunFirst,
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    rich_markup_mode="rich",
+)
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+
+@app.callback()
+def _of_run(
+    ctx: typer.Context,
+    run: Annotated[
+        str,
+        typer.Argument(
+            metavar="RUN",
+            help="Name or folder of a run that goes on on this machine; none: the only one.",
+            show_default=False,
+        ),
+    ] = "",
+) -> None:
+    """Faults of a run while it goes on: list, inject and clear them; the kinds there are."""
+    ctx.obj = run
+
+
+@app.command("list")
+def list_(
+    ctx: typer.Context,
+    as_toml: Annotated[
+        bool,
+        typer.Option("--toml", help="Print the entries of [[fault]] that repeat them."),
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """List all faults of a run: of its scenario and ordered ones, with their state."""
+    from fleetloop.fault.command import list_faults
+
+    list_faults(ctx.obj, as_json=as_json, as_toml=as_toml)
+
+
+@app.command()
+def inject(
+    ctx: typer.Context,
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="A kind of fault (fleetloop fault kinds).")
+    ],
+    robots: Annotated[
+        str | None,
+        typer.Option("--robot", metavar="R1,R2", help="Only these robots. Default: all."),
+    ] = None,
+    edges: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--edge", metavar="'R1 -> R2'", help="Only this edge, of links. May be repeated."
+        ),
+    ] = None,
+    wheel: Annotated[
+        str | None, typer.Option(metavar="right|left|both", help="Behind this wheel.")
+    ] = None,
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="A parameter of the kind. May be repeated."
+        ),
+    ] = None,
+    for_s: Annotated[
+        float | None,
+        typer.Option(
+            "--for",
+            callback=between(0.0, LONGEST_S),
+            metavar="SECONDS",
+            help="So long, in scenario time. Default: until it is cleared.",
+        ),
+    ] = None,
+    at_s: Annotated[
+        float | None,
+        typer.Option(
+            "--at",
+            callback=between(0.0, LONGEST_S),
+            metavar="SECONDS",
+            help="From this scenario time on. Default: now.",
+        ),
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option(metavar="NAME", help="To clear it by. Default: KIND, KIND_2, ...")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Apply a fault; say from which tick on it acts."""
+    from fleetloop.fault.command import inject_fault
+
+    given = {"kind": kind, "wheel": wheel, "for_s": for_s, "at_s": at_s, "name": name}
+    table: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
+    if robots is not None:
+        table["robots"] = list(listed("--robot", robots))
+    if edges:
+        table["edges"] = edges
+    inject_fault(ctx.obj, table, parameters or [], as_json=as_json)
+
+
+@app.command()
+def clear(
+    ctx: typer.Context,
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="NAME...", help="Names of faults.")
+    ] = None,
+    all_: Annotated[bool, typer.Option("--all", help="All that act, or are planned.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """End faults before their time; say at which tick they do."""
+    from fleetloop.fault.command import clear_faults
+
+    if bool(names) is all_:
+        raise typer.BadParameter("name faults, or --all.")
+    clear_faults(ctx.obj, names or [], as_json=as_json)
+
+
+@app.command()
+def kinds(
+    kind: Annotated[
+        str | None, typer.Argument(metavar="KIND", help="Its parameters. Default: all kinds.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """List the kinds of faults; of one its parameters with units, bounds and defaults."""
+    from fleetloop.fault.kinds import print_kinds
+
+    print_kinds(kind, as_json=as_json)

@@ -1,0 +1,264 @@
+"""Faults ordered during a run: requests of its door become orders, answers of processes answers.
+
+    request        arguments          answer
+    fault.list     -                  faults: all of the run, each with its state
+    fault.inject   fault              fault: as it acts, from the tick at which it begins
+    fault.clear    names ([]: all)    cleared: those that end, with the tick at which they do
+
+An order without `at_s` begins as soon as it can, and is answered once the run has reached that
+tick. One that can't be carried out is refused with the reason.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from math import ceil
+from typing import Any
+
+from bridge.network import keys
+from bridge.network.fault_orders import FaultAnswer, FaultOrder, targets_to
+from bridge.network.link import Link, Publisher
+from configs.brief import Schedule
+from configs.errors import ScenarioError
+from configs.faults.base import Fault
+from configs.faults.ordered import fresh_name, ordered_fault
+from configs.faults.plan import plan
+from configs.roles import AGENT, PLANT, takes_orders
+from configs.scenario import Scenario
+from fleetloop.door.requests import Request, Respond
+from fleetloop.launch.fault_ledger import Entry, FaultLedger
+
+ANSWER_S = 3.0
+"""Longest wait for the answers of processes, beyond the deadline of a tick."""
+REACHED_S = 20.0
+"""Longest wait until a tick is reached that processes have named."""
+AHEAD_S = 0.2
+"""In real time, so far ahead of the last progress all processes can have an order."""
+
+
+@dataclass(slots=True)
+class _Pending:
+    """An order that isn't answered yet."""
+
+    entry: Entry
+    ends: bool
+    awaited: set[str]  # processes
+    deadline_s: float
+    done: Callable[["_Pending"], None]
+    at_once: bool  # answered when the run has reached its tick
+    ticks: dict[str, int] = field(default_factory=dict)
+    refusals: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def tick(self) -> int:
+        """The tick that all, or most, have named."""
+        named = [*self.ticks.values()]
+        return max(set(named), key=named.count)
+
+
+class FaultDesk:
+    """Orders faults of one run.
+
+    Args:
+        scenario: of the run.
+        schedule: of the run.
+        emulates: whether the plant emulates a robot.
+        tick: how far the run is.
+        now: seconds on the launcher's clock of awake time.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        schedule: Schedule,
+        emulates: Callable[[str], bool],
+        tick: Callable[[], int],
+        now: Callable[[], float],
+    ) -> None:
+        self.ledger = FaultLedger(scenario)
+        self._scenario = scenario
+        self._schedule = schedule
+        self._emulates = emulates
+        self._tick = tick
+        self._now = now
+        self._publishers: dict[str, Publisher] = {}
+        self._pending: dict[int, _Pending] = {}
+        self._reached: list[tuple[int, float, Callable[[], None]]] = []
+        self._number = 0
+        self.requests: Mapping[str, Request] = {
+            "fault.list": Request({}, self._list),
+            "fault.inject": Request({"fault": dict}, self._inject),
+            "fault.clear": Request({"names": list}, self._clear),
+        }
+
+    def open(self, link: Link, run: str, processes: Iterable[str]) -> None:
+        """Declare what orders and answers need."""
+        for process in filter(takes_orders, processes):
+            link.subscribe(keys.answer(run, process), "answer")
+            if process == PLANT.name or self._schedule.realtime:
+                self._publishers[process] = link.publisher(keys.order(run, process))
+
+    def take(self, process: str, payload: bytes) -> bool:
+        """Take the answer of a process; whether it is well formed."""
+        answer = FaultAnswer.decode(payload)
+        pending = None if answer is None else self._pending.get(answer.number)
+        if answer is None or pending is None:
+            return answer is not None  # else it comes late
+        if answer.refusal:
+            pending.refusals[process] = answer.refusal
+            if not self._schedule.realtime:  # the plant speaks for all
+                pending.awaited.clear()
+        else:
+            pending.ticks[process] = answer.tick
+        pending.awaited.discard(process)
+        if not pending.awaited:
+            self._complete(answer.number)
+        return True
+
+    def look(self) -> None:
+        """Answer what waits for too long, or for a tick that is reached."""
+        now_s, tick = self._now(), self._tick()
+        for number, pending in list(self._pending.items()):
+            if now_s > pending.deadline_s:
+                within = f"no answer in {ANSWER_S:g} s; whether it acts there is not known"
+                pending.refusals |= dict.fromkeys(sorted(pending.awaited), within)
+                self._complete(number)
+        due = [one for one in self._reached if one[0] <= tick or now_s > one[1]]
+        self._reached = [one for one in self._reached if one not in due]
+        for _, _, respond in due:
+            respond()
+
+    # --- requests --------------------------------------------------------------------------------
+
+    def _list(self, respond: Respond) -> None:
+        tick = self._tick()
+        respond({"tick": tick, "t_s": self._seconds(tick), "faults": self.ledger.rows(tick)})
+
+    def _inject(self, respond: Respond, fault: dict[str, Any]) -> None:
+        tick = self._tick()
+        names = [*self.ledger.names, *(it.entry.name for it in self._pending.values())]
+        ordered = ordered_fault(fault, self._scenario, max(self._seconds(tick), 0.0), names)
+        name = ordered.name or fresh_name(ordered.kind, names)
+        planned = plan(ordered, name, self._scenario)
+        first, last = planned[0].from_tick, planned[0].to_tick
+        entry = Entry(name, ordered, tuple(one.target for one in planned), first, last, True)
+        self._refuse_absent(ordered, entry.targets)
+
+        def done(pending: _Pending) -> None:
+            if pending.ticks:
+                self._note_beginning(pending)
+            if pending.refusals:
+                respond({"error": _refused(pending)})
+            else:
+                row = self.ledger.row
+                self._when_reached(pending, lambda: respond({"fault": row(entry, self._tick())}))
+
+        self._order(entry, done, ends=False, exact="at_s" in fault)
+
+    def _clear(self, respond: Respond, names: list[Any]) -> None:
+        if not all(isinstance(name, str) for name in names):
+            raise ScenarioError("names must be texts")
+        entries = self.ledger.to_end(names, self._tick())
+        left, refused = [*entries], []
+        if not entries:
+            respond({"cleared": []})
+
+        def done(pending: _Pending) -> None:
+            left.remove(pending.entry)
+            if pending.ticks:
+                self.ledger.end(pending.entry, pending.tick)
+            if pending.refusals:
+                refused.append(_refused(pending))
+            if left:
+                return
+            if refused:
+                respond({"error": "; ".join(refused)})
+            else:
+                self._when_reached(pending, answer)
+
+        def answer() -> None:
+            respond({"cleared": [self.ledger.row(one, self._tick()) for one in entries]})
+
+        for entry in entries:
+            self._order(entry, done, ends=True, exact=False)
+
+    # --- orders ----------------------------------------------------------------------------------
+
+    def _order(
+        self, entry: Entry, done: Callable[[_Pending], None], *, ends: bool, exact: bool
+    ) -> None:
+        """Order a fault, or its end, of the processes that it concerns."""
+        self._number += 1
+        fault, ticks = entry.fault, None
+        if not ends and entry.to_tick is not None:
+            ticks = entry.to_tick - entry.from_tick
+        from_tick = entry.from_tick if exact else self._soonest()
+        order = FaultOrder(
+            self._number, ends, entry.name, entry.targets, fault, from_tick, ticks, exact
+        )
+        told = self._receivers(fault, entry.targets)
+        awaited = set(told)
+        if fault.PLACE == "agent" and not self._schedule.realtime:
+            awaited, told = set(told), {PLANT.name: entry.targets}
+        limit_s = ANSWER_S + self._schedule.tick_deadline_s
+        self._pending[self._number] = _Pending(
+            entry, ends, awaited, self._now() + limit_s, done, not exact
+        )
+        for process, targets in told.items():
+            self._publishers[process].put(order._replace(targets=targets).encode())
+
+    def _receivers(self, fault: Fault, targets: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+        """The processes that carry a fault out, and its targets at each."""
+        if fault.PLACE == "plant":
+            return {PLANT.name: targets}
+        heard = {name: targets_to(targets, name) for name in self._scenario.names}
+        return {AGENT.process(name): those for name, those in heard.items() if those}
+
+    def _soonest(self) -> int:
+        """A tick that no process has computed when the order arrives; in lockstep it chooses."""
+        if not self._schedule.realtime:
+            return 0
+        return self._tick() + ceil(AHEAD_S / self._schedule.period_s)
+
+    def _refuse_absent(self, fault: Fault, targets: tuple[str, ...]) -> None:
+        """Refuse what no process of this run can carry out.
+
+        Raises:
+            ScenarioError: the text says why.
+        """
+        if fault.PLACE == "process":
+            raise ScenarioError(
+                f"{fault.kind}: can't be ordered during a run: list it in [[fault]]"
+            )
+        real = [robot for robot in targets if fault.PLACE == "plant" and not self._emulates(robot)]
+        if real:
+            raise ScenarioError(f"{real[0]}: isn't emulated: {fault.kind} can't act on it")
+
+    def _complete(self, number: int) -> None:
+        pending = self._pending.pop(number)
+        pending.done(pending)
+
+    def _note_beginning(self, pending: _Pending) -> None:
+        """The fault acts where it was taken, from the ticks that were named."""
+        entry, tick = pending.entry, pending.tick
+        if entry.to_tick is not None:
+            entry.to_tick += tick - entry.from_tick
+        entry.from_tick = tick
+        entry.ticks = {it: at for it, at in pending.ticks.items() if at != tick}
+        entry.fault = replace(entry.fault, name=entry.name, at_s=self._seconds(tick))
+        self.ledger.add(entry)
+
+    def _when_reached(self, pending: _Pending, respond: Callable[[], None]) -> None:
+        """Answer once the run has reached a tick; what was ordered for a later one at once."""
+        tick = pending.tick if pending.at_once else self._tick()
+        self._reached.append((tick, self._now() + REACHED_S, respond))
+
+    def _seconds(self, tick: int) -> float:
+        return round(tick * self._schedule.period_s, 9)
+
+
+def _refused(pending: _Pending) -> str:
+    """What the processes have against an order; where it acts all the same is said, too."""
+    why = "; ".join(f"{process}: {text}" for process, text in pending.refusals.items())
+    what = "not cleared" if pending.ends else "not applied"
+    elsewhere = f"; at {', '.join(pending.ticks)} it is" if pending.ticks else ""
+    return f"{pending.entry.name}: {what}: {why}{elsewhere}"

@@ -1,0 +1,172 @@
+"""Orders of faults and what becomes of them, as the launcher keeps account."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from bridge.network.fault_orders import FaultAnswer, FaultOrder
+from configs.errors import ScenarioError
+from configs.loading import load
+from configs.resolve import schedule
+from configs.roles import processes_of
+from fleetloop.launch.fault_desk import ANSWER_S, REACHED_S, FaultDesk
+
+CUT = {"kind": "link_partition", "edges": ["r1 -> r2", "leader -> r1"]}
+
+
+class Bench:
+    """A desk whose processes are the test."""
+
+    def __init__(self, *overrides: str, emulated: tuple[str, ...] = ("r1", "r2")) -> None:
+        self.scenario = load("two_robots", ("duration_s=20.0", *overrides))
+        self.tick, self.now_s = 1000, 0.0
+        self.sent: list[tuple[str, FaultOrder]] = []
+        self.answers: list[dict[str, Any]] = []
+        self.desk = FaultDesk(
+            self.scenario,
+            schedule(self.scenario),
+            emulated.__contains__,
+            lambda: self.tick,
+            lambda: self.now_s,
+        )
+        link = SimpleNamespace(subscribe=lambda *_: None, publisher=self._publisher)
+        self.desk.open(link, "run", processes_of(self.scenario.names))
+
+    def _publisher(self, key: str) -> SimpleNamespace:
+        process = key.partition("@order/")[2]
+        return SimpleNamespace(put=lambda order: self._put(process, order))
+
+    def _put(self, process: str, payload: bytes) -> None:
+        order = FaultOrder.decode(payload)
+        assert order is not None
+        self.sent.append((process, order))
+
+    def ask(self, request: str, **arguments: Any) -> None:
+        self.desk.requests[request].act(self.answers.append, **arguments)
+
+    def inject(self, **fault: Any) -> None:
+        self.ask("fault.inject", fault=fault)
+
+    def answer(self, process: str, tick: int, refusal: str = "") -> None:
+        number = self.sent[-1][1].number
+        assert self.desk.take(process, FaultAnswer(number, tick, refusal).encode())
+        self.desk.look()
+
+    def faults(self) -> dict[str, tuple[str, int, int | None]]:
+        self.ask("fault.list")
+        rows = self.answers.pop()["faults"]
+        return {row["name"]: (row["state"], row["from_tick"], row["to_tick"]) for row in rows}
+
+
+def test_a_fault_is_ordered_of_the_plant_and_answered_when_the_run_has_reached_its_tick() -> None:
+    bench = Bench()
+    bench.inject(kind="push", robots=["r2"], for_s=0.5)
+    ((process, order),) = bench.sent
+    assert process == "plant"
+    assert (order.name, order.targets, order.ticks, order.exact) == ("push", ("r2",), 250, False)
+    bench.answer("plant", 1017)
+    assert bench.answers == []
+    bench.tick = 1017
+    bench.desk.look()
+    (answer,) = bench.answers
+    assert answer["fault"]["from_tick"] == 1017
+    assert answer["fault"]["state"] == "acting"
+    assert bench.faults() == {"push": ("acting", 1017, 1267)}
+    bench.tick = 1267
+    assert bench.faults() == {"push": ("over", 1017, 1267)}
+
+
+def test_in_lockstep_the_plant_hands_on_what_controllers_answer() -> None:
+    bench = Bench()
+    bench.inject(**CUT, at_s=3.0)
+    ((process, order),) = bench.sent
+    assert (process, order.targets) == ("plant", ("r1 -> r2", "leader -> r1"))
+    assert (order.from_tick, order.exact) == (1500, True)
+    bench.answer("agent/r1", 1500)
+    assert bench.answers == []
+    bench.answer("agent/r2", 1500)
+    assert bench.answers[0]["fault"]["state"] == "planned"
+
+
+def test_in_real_time_every_controller_is_ordered_what_concerns_it_some_time_ahead() -> None:
+    bench = Bench("clock.mode='realtime'")
+    bench.inject(**CUT)
+    assert {process: order.targets for process, order in bench.sent} == {
+        "agent/r1": ("leader -> r1",),
+        "agent/r2": ("r1 -> r2",),
+    }
+    assert {order.from_tick for _, order in bench.sent} == {1100}
+    bench.answer("agent/r1", 1100)
+    bench.answer("agent/r2", 1103)
+    bench.tick = 1103
+    bench.desk.look()
+    fault = bench.answers[0]["fault"]
+    assert (fault["from_tick"], fault["ticks"]) in (
+        (1100, {"agent/r2": 1103}),
+        (1103, {"agent/r1": 1100}),
+    )
+
+
+def test_a_refusal_of_a_process_is_the_answer_and_the_fault_is_none() -> None:
+    bench = Bench()
+    bench.inject(**CUT)
+    bench.answer("plant", 0, "the run ends before")
+    assert bench.answers == [{"error": "link_partition: not applied: plant: the run ends before"}]
+    assert bench.faults() == {}
+
+
+def test_what_is_not_answered_is_told_after_a_while() -> None:
+    bench = Bench()
+    bench.inject(kind="push")
+    bench.now_s = ANSWER_S + 10.0
+    bench.desk.look()
+    assert "plant: no answer" in bench.answers[0]["error"]
+    assert bench.desk.take("plant", FaultAnswer(1, 1017).encode())  # too late: nothing happens
+    assert not bench.desk.take("plant", b"\xc1")
+
+
+def test_a_run_that_stands_still_is_not_waited_for() -> None:
+    bench = Bench()
+    bench.inject(kind="push")
+    bench.answer("plant", 1017)
+    bench.now_s = REACHED_S + 1.0
+    bench.desk.look()
+    assert bench.answers[0]["fault"]["state"] == "planned"
+
+
+def test_all_that_acts_or_is_planned_is_cleared() -> None:
+    bench = Bench('fault=[{kind="push", at_s=9.0}, {kind="drive_estop", at_s=1.0}]')
+    bench.ask("fault.clear", names=[])
+    ((process, order),) = bench.sent
+    assert (process, order.ends, order.name) == ("plant", True, "push")
+    bench.tick = 1017
+    bench.answer("plant", 1017)
+    assert [one["name"] for one in bench.answers[0]["cleared"]] == ["push"]
+    assert bench.faults() == {"push": ("cleared", 4500, 4500), "drive_estop": ("over", 500, None)}
+    bench.ask("fault.clear", names=[])
+    assert bench.answers[-1] == {"cleared": []}
+    for name, why in (
+        ("drive_estop", "happened at an instant, at tick 500"),
+        ("push", "was cleared already"),
+        ("shove", "no such fault in this run; there are: push, drive_estop"),
+    ):
+        with pytest.raises(ScenarioError, match=why):
+            bench.ask("fault.clear", names=[name])
+
+
+def test_no_order_is_taken_that_no_process_could_carry_out() -> None:
+    bench = Bench(emulated=("r1",))
+    with pytest.raises(ScenarioError, match="r2: isn't emulated: push can't act on it"):
+        bench.inject(kind="push")
+    bench.inject(kind="push", robots=["r1"])
+    assert [process for process, _ in bench.sent] == ["plant"]
+
+
+def test_two_faults_have_two_names_though_the_first_is_not_answered_yet() -> None:
+    bench = Bench()
+    bench.inject(kind="push")
+    bench.inject(kind="push")
+    assert [order.name for _, order in bench.sent] == ["push", "push_2"]
+    with pytest.raises(ScenarioError, match="another fault of this run has this name"):
+        bench.inject(kind="push", name="push_2")
