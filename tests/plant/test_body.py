@@ -150,3 +150,101 @@ def test_wheel_torques_are_the_inverse_of_the_accelerations(right_damping: float
     for v, omega, right, left in ((0.6, 0.3, 0.2, -0.1), (-0.4, 2.0, -0.3, 0.5)):
         rates = body.accelerations(v, omega, right, left)
         assert body.wheel_torques(v, omega, *rates) == pytest.approx((right, left))
+
+
+# --- pushes and wheels that slip ------------------------------------------------------------------
+
+ROLLED = st.tuples(st.floats(0.05, 1.0), st.floats(0.05, 1.0))
+MOTION = st.tuples(st.floats(-2, 2), st.floats(-5, 5))
+TORQUES = st.tuples(st.floats(-1, 1), st.floats(-1, 1))
+MASS_KG, INERTIA_KG_M2, AXLE_KG_M2 = 2.58, 2.3 * 0.02**2 + 2 * 0.28 * 0.01 + 0.01 + 0.004, 0.0056
+
+
+def energy_J(robot: RigidBody, v: float, omega: float) -> float:
+    right, left = robot.wheel_speeds(v, omega)
+    rolling = MASS_KG * v * v + INERTIA_KG_M2 * omega * omega
+    return 0.5 * (rolling + AXLE_KG_M2 * (right * right + left * left))
+
+
+@given(MOTION, TORQUES)
+def test_with_a_push_of_nothing_and_no_slip_the_general_equations_are_those_of_the_paper(
+    motion: tuple[float, float], torques: tuple[float, float]
+) -> None:
+    plain = RigidBody(ETSRO, UNDISTURBED).accelerations(*motion, *torques)
+    general = RigidBody(ETSRO, UNDISTURBED, push=(1e-300, 0.0)).accelerations(*motion, *torques)
+    assert general == pytest.approx(plain, rel=1e-9, abs=1e-9)
+
+
+@given(ROLLED, MOTION, TORQUES, st.tuples(st.floats(-9, 9), st.floats(-1, 1)))
+def test_slip_turns_power_of_the_wheels_that_drive_into_heat_and_creates_none(
+    rolled: tuple[float, float],
+    motion: tuple[float, float],
+    torques: tuple[float, float],
+    push: tuple[float, float],
+) -> None:
+    robot = RigidBody(ETSRO, UNDISTURBED, rolled=rolled, push=push)
+    v, omega = motion
+    v_rate, omega_rate = robot.accelerations(v, omega, *torques)
+    speeds, rates = robot.wheel_speeds(v, omega), robot.wheel_speeds(v_rate, omega_rate)
+    gained_W = MASS_KG * v * v_rate + INERTIA_KG_M2 * omega * omega_rate
+    gained_W += sum(AXLE_KG_M2 * nu * rate for nu, rate in zip(speeds, rates, strict=True))
+    passed_on = [(torque - 0.02 * nu) * nu for torque, nu in zip(torques, speeds, strict=True)]
+    heat_W = sum(
+        (1.0 - share) * max(power, 0.0) for share, power in zip(rolled, passed_on, strict=True)
+    )
+    given_W = push[0] * v + push[1] * omega + sum(passed_on)
+    assert gained_W == pytest.approx(given_W - heat_W, rel=1e-6, abs=1e-6)
+    assert heat_W >= 0.0
+
+
+@given(ROLLED, MOTION, st.floats(0.001, 0.1))
+def test_wheels_that_slip_and_brake_take_no_more_than_the_body_had(
+    rolled: tuple[float, float], motion: tuple[float, float], brake_N_m_s: float
+) -> None:
+    body = replace(ETSRO, damping_right_wheel_N_m_s=0.0, damping_left_wheel_N_m_s=0.0)
+    robot = RigidBody(body, UNDISTURBED, rolled=rolled)
+    state, step_s = REST._replace(v=motion[0], omega=motion[1]), 0.0005
+    had = energy_J(robot, *motion)
+    taken = 0.0
+    for _ in range(100):
+        speeds = robot.wheel_speeds(state.v, state.omega)
+        before = state
+        after = rk4(robot, state, *(-brake_N_m_s * nu for nu in speeds), 0.0, step_s)
+        assert after is not None
+        state = after
+        turned = (
+            state.right_wheel_rad - before.right_wheel_rad,
+            state.left_wheel_rad - before.left_wheel_rad,
+        )
+        taken += sum(brake_N_m_s * nu * angle for nu, angle in zip(speeds, turned, strict=True))
+    assert taken <= had * (1.0 + 1e-9) + 1e-9
+    assert energy_J(robot, state.v, state.omega) <= had * (1.0 + 1e-9) + 1e-9
+
+
+def test_the_angle_of_a_wheel_that_slips_is_the_integral_of_its_speed() -> None:
+    robot = RigidBody(ETSRO, UNDISTURBED, rolled=(0.5, 1.0))
+    end = run(robot, REST, 0.05, 0.08, 1.0)
+    rolled = REST
+    right = left = 0.0
+    for k in range(1000):
+        after = rk4(robot, rolled, 0.05, 0.08, k * 0.001, 0.001)
+        assert after is not None
+        speeds = [robot.wheel_speeds(one.v, one.omega) for one in (rolled, after)]
+        right += 0.0005 * (speeds[0][0] + speeds[1][0])
+        left += 0.0005 * (speeds[0][1] + speeds[1][1])
+        rolled = after
+    assert (end.right_wheel_rad, end.left_wheel_rad) == pytest.approx((right, left), rel=1e-5)
+
+
+@given(ROLLED)
+def test_no_wheel_turns_less_than_the_least_inertia(rolled: tuple[float, float]) -> None:
+    # Kinetic energy in wheel speeds is νᵀ M ν / 2: its least eigenvalue, by a trace and a product.
+    robot = RigidBody(ETSRO, UNDISTURBED, rolled=rolled)
+    rho_right, rho_left = 0.04 * rolled[0], 0.04 * rolled[1]
+    along, turning = MASS_KG / 4.0, INERTIA_KG_M2 / 0.04
+    m_right = rho_right**2 * (along + turning) + AXLE_KG_M2
+    m_left = rho_left**2 * (along + turning) + AXLE_KG_M2
+    across = rho_right * rho_left * (along - turning)
+    mean, half = 0.5 * (m_right + m_left), 0.5 * (m_right - m_left)
+    least = mean - (half * half + across * across) ** 0.5
+    assert robot.least_inertia_wheel_kg_m2 <= least * (1.0 + 1e-9)
