@@ -97,8 +97,7 @@ class LockstepLoop:
         clock = AwakeClock(held=launcher_stopped, clock=self._clock)
         deadline = clock.now() + self._schedule.start_deadline_s
         while not stop.requested:
-            self._hellos.say()
-            message = self._receive(0.02)
+            message = self._receive(min(self._hellos.say(), LOOK_S))
             if message is not None:
                 return message
             if clock.now() > deadline:

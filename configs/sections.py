@@ -45,7 +45,11 @@ class Clock(Parameters):
         0.001, "longest integration step of the plant"
     )
     countdown_s: SecondsOrZero = parameter(0.25, "for arming the drives, before t = 0")
-    tick_deadline_s: Seconds = parameter(2.0, "longest wait within a tick, wall clock")
+    tick_deadline_s: Seconds | None = parameter(
+        None,
+        "longest wait within a tick, wall clock; if not given 2 s, or 20 ms for each robot if that"
+        " is more",
+    )
     start_deadline_s: Seconds | None = parameter(
         None,
         "longest wait for all processes to be ready; if not given 20 s, or 0.5 s for each"

@@ -14,12 +14,17 @@ from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, launcher_stopped
 from configs.errors import InfrastructureError
 
+RARER, RAREST = 0.05, 8.0
+"""The pause after a round: a part of the time since the first; at most so many of the first's."""
+
 
 class Hellos:
     """What a process says on its publishers before the run: the same as in it, marked as early.
 
+    Rounds grow rarer, so that a fleet that takes long doesn't spend its time on them.
+
     Args:
-        every_s: from one round to the next, however often one is asked for.
+        every_s: from one round to the next at first, however often one is asked for.
     """
 
     def __init__(self, every_s: float, *, clock: Clock = SYSTEM_CLOCK) -> None:
@@ -27,6 +32,7 @@ class Hellos:
         self._hellos: list[tuple[Publisher, bytes]] = []
         self._every_s = every_s
         self._next_s = 0.0
+        self._began_s = clock.monotonic_s()
 
     def add(self, publisher: Publisher, payload: bytes) -> None:
         """Say `payload` on `publisher` at every round, the first of which is at once."""
@@ -38,7 +44,8 @@ class Hellos:
         now = self._clock.monotonic_s()
         if now >= self._next_s:
             # Never sooner: a hello that answers a hello would be a storm on a ring.
-            self._next_s = now + self._every_s
+            rarer_s = min(RARER * (now - self._began_s), RAREST * self._every_s)
+            self._next_s = now + max(rarer_s, self._every_s)
             for publisher, payload in self._hellos:
                 publisher.put(payload)
         return max(self._next_s - self._clock.monotonic_s(), 0.0)

@@ -24,7 +24,9 @@ POLLED_DEPTH = 1 << 15
 """Newest messages kept on a key of a polled link: many times more than any schedule lets be under
 way (`configs.brief.LEAD_TICKS`), so that a flood doesn't displace due messages."""
 _YIELDS = 20
-_PAUSE_S, _LONGEST_PAUSE_S = 50e-6, 2e-3
+_PAUSE_S, _LONGEST_PAUSE_S, _PAUSE_SHARE = 50e-6, 2e-3, 0.05
+"""Between two looks; where nothing has come for long, up to this part of that time: a fleet that
+waits for its last robots leaves them the processor."""
 
 
 class ZenohLink:
@@ -162,13 +164,15 @@ class PolledLink(ZenohLink):
     """A link that is polled at given times: an arriving message wakes no thread and runs no Python.
 
     `receive` looks at all subscribers in turn. Waiting is looking again: a few times giving way to
-    others, then with pauses that grow.
+    others, then with pauses that grow until a message comes.
     """
 
     def __init__(self, session: zenoh.Session, depth: int, *, clock: Clock = SYSTEM_CLOCK) -> None:
         super().__init__(session)
         self._depth, self._clock = depth, clock
         self._polled: list[tuple[str, str, Callable[[], zenoh.Sample | None]]] = []
+        self._looks, self._pause_s = 0, _PAUSE_S  # since the last message that was waited for
+        self._idle_since_s = 0.0
         self.receive = self._receive
 
     def subscribe(self, key: str, tag: str, **_: int) -> None:
@@ -189,19 +193,26 @@ class PolledLink(ZenohLink):
 
     def _receive(self, timeout_s: float) -> Arrival | None:
         if (arrival := self._look()) is not None or timeout_s <= 0.0:
+            if arrival is not None:
+                self._looks = 0
             return arrival
         clock = self._clock
-        deadline = clock.monotonic_s() + timeout_s
-        looks, pause_s = 0, _PAUSE_S
-        while (left_s := deadline - clock.monotonic_s()) > 0.0:
-            if looks < _YIELDS:
+        now_s = clock.monotonic_s()
+        deadline = now_s + timeout_s
+        if not self._looks:
+            self._pause_s, self._idle_since_s = _PAUSE_S, now_s
+        while (left_s := deadline - now_s) > 0.0:
+            if self._looks < _YIELDS:
                 os.sched_yield()
             else:
-                clock.sleep(min(pause_s, left_s))
-                pause_s = min(1.5 * pause_s, _LONGEST_PAUSE_S)
-            looks += 1
+                clock.sleep(min(self._pause_s, left_s))
+                longest_s = max(_LONGEST_PAUSE_S, _PAUSE_SHARE * (now_s - self._idle_since_s))
+                self._pause_s = min(1.5 * self._pause_s, longest_s)
+            self._looks += 1
             if (arrival := self._look()) is not None:
+                self._looks = 0
                 return arrival
+            now_s = clock.monotonic_s()
         return None
 
     def _look(self) -> Arrival | None:

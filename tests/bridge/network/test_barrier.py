@@ -1,9 +1,11 @@
 """The start barrier on a clock that stands still but for its waits."""
 
+from itertools import pairwise
+
 import pytest
 from support.clocks import ManualClock
 
-from bridge.network.barrier import Hellos, await_hellos
+from bridge.network.barrier import RARER, RAREST, Hellos, await_hellos
 from bridge.network.link import Arrival
 from bridge.process.lifecycle import Stop
 from configs.errors import InfrastructureError
@@ -55,6 +57,16 @@ def test_it_is_passed_with_the_last_hello_awaited_and_says_its_own_until_then() 
     place, passed_s = awaiting({0.05: "a", 0.11: "b"}, 20.0)
     assert passed_s == pytest.approx(0.11)
     assert place.said_s == pytest.approx([0.0, 0.02, 0.04, 0.06, 0.08, 0.10])
+
+
+def test_of_a_start_that_takes_long_hellos_take_a_bounded_part() -> None:
+    place, passed_s = awaiting({0.05: "a", 40.0: "b"}, 60.0)
+    assert passed_s == pytest.approx(40.0)
+    pauses_s = [after - before for before, after in pairwise(place.said_s)]
+    for before_s, pause_s in zip(place.said_s, pauses_s, strict=False):
+        rarer_s = max(min(RARER * before_s, RAREST * EVERY_S), EVERY_S)
+        assert pause_s == pytest.approx(rarer_s, abs=1e-6)
+    assert len(place.said_s) < 300  # of 2000 without
 
 
 def test_who_is_still_missing_is_named_at_the_bound() -> None:
