@@ -1,8 +1,10 @@
 """Faults of the plant: what acts on the robots of one bus, tick by tick.
 
-EFFECTS    of faults that last: their part of the robot's effects (`plant.effects`), which are
-           made anew of all that act on it when one begins or ends
-STRIKES    of faults that are an instant: what they do to the robot, once
+EFFECTS        of faults that last: their part of the robot's effects (`plant.effects`), which are
+               made anew of all that act on it when one begins or ends
+STRIKES        of faults that are an instant: what they do to the robot, once
+BUS_EFFECTS    of faults of frames and CAN controllers: their part of the bus's disturbance
+               (`plant.disturbance`)
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -12,6 +14,7 @@ from typing import Any
 from bridge.fault_schedule import FaultSchedule
 from configs.brief import Schedule
 from configs.faults.base import PlannedFault
+from plant.disturbance import Disturbances
 from plant.effects import PoseDrift, RobotEffects, WheelEffects, of_side
 from plant.robot import EmulatedRobot
 
@@ -196,13 +199,15 @@ STRIKES: Mapping[str, Strike] = {
 class BusFaults:
     """The faults of the robots on one bus."""
 
-    __slots__ = ("_robots", "_ticks", "schedule")
+    __slots__ = ("_robots", "_ticks", "disturbances", "schedule")
 
     def __init__(
         self, planned: Iterable[PlannedFault], robots: Sequence[EmulatedRobot], ticks: Schedule
     ) -> None:
         self._robots = {robot.brief.robot: robot for robot in robots}
         self._ticks = ticks
+        self.disturbances = Disturbances(robots)
+        """Faults of the bus itself: of its frames and CAN controllers."""
         self.schedule = FaultSchedule(one for one in planned if one.target in self._robots)
 
     def begin(self, tick: int) -> None:
@@ -212,16 +217,17 @@ class BusFaults:
 
     def _change(self, tick: int) -> None:
         changes = self.schedule.due(tick)
-        lasting = [change.planned.target for change in changes if not change.planned.fault.INSTANT]
+        lasting = [c.planned.target for c in changes if c.planned.fault.kind in EFFECTS]
         for name in dict.fromkeys(lasting):
             effects = RobotEffects()
             for planned in self.schedule.acting:
-                if planned.target == name:
+                if planned.target == name and planned.fault.kind in EFFECTS:
                     begun_ns = planned.from_tick * self._ticks.period_ns
                     EFFECTS[planned.fault.kind](effects, planned.fault, begun_ns)
             self._robots[name].apply(effects)
         bus_ns = self._ticks.bus_time_ns(tick)
         for change in changes:
             planned = change.planned
-            if planned.fault.INSTANT:
+            if planned.fault.kind in STRIKES:
                 STRIKES[planned.fault.kind](self._robots[planned.target], planned.fault, bus_ns)
+        self.disturbances.follow(self.schedule.acting, changes)

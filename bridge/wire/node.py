@@ -59,6 +59,7 @@ class Node:
         "counters",
         "name",
         "not_before_ns",
+        "of_drive",
         "queue",
         "recessive_from_ns",
         "restart_ns",
@@ -68,10 +69,17 @@ class Node:
     )
 
     def __init__(
-        self, name: str, queue: Queue, *, restart_ns: int | None, wrong_bit_rate: bool
+        self,
+        name: str,
+        queue: Queue,
+        *,
+        restart_ns: int | None,
+        wrong_bit_rate: bool,
+        of_drive: bool,
     ) -> None:
         self.name = name
         self.queue = queue
+        self.of_drive = of_drive
         self.restart_ns = restart_ns
         self.wrong_bit_rate = wrong_bit_rate
         self.confinement = Confinement()
@@ -84,6 +92,17 @@ class Node:
 
     def __repr__(self) -> str:
         return f"Node({self.name!r})"
+
+
+class Babbler:
+    """The frame that a node sends again and again."""
+
+    __slots__ = ("frame", "next_ns", "period_ns")
+
+    def __init__(self, first_ns: int, frame: Frame, period_ns: int) -> None:
+        self.next_ns = first_ns
+        self.frame = frame
+        self.period_ns = period_ns
 
 
 class Recovery:

@@ -25,6 +25,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from bridge.frame import EFF
+from bridge.frame_faults import ActingFrameFault, FrameFaults
 from bridge.wire.bits import (
     END_BITS,
     ERROR_DELIMITER_BITS,
@@ -35,7 +36,6 @@ from bridge.wire.bits import (
     stuffed_bits,
 )
 from bridge.wire.confinement import NodeState
-from bridge.wire.faults import Fault, Faults
 from bridge.wire.node import ErrorKind, Node
 from bridge.wire.queues import Entry
 
@@ -60,7 +60,7 @@ class Outcome(NamedTuple):
     error_bit: int = 0  # where the error flag begins
     fallen: Sequence[Sending] = ()  # passive senders that saw a bit error and dropped out
     first: Node | None = None  # a listener that destroyed it
-    fault: Fault | None = None
+    fault: ActingFrameFault | None = None
     orders: Sequence[Sending] = ()  # injected error flags that destroyed it
 
 
@@ -83,6 +83,13 @@ class Plan:
         self.done_ns = start_ns + done * _SECOND_NS // bit_rate
         self.free_ns = start_ns + bits * _SECOND_NS // bit_rate
         self.heard_by: tuple[Node, ...] = ()
+
+    def carries(self, entry: Entry) -> bool:
+        """Whether a frame is sent in it."""
+        if self.what is None:
+            return entry is self.entry
+        what = self.what
+        return any(s.entry is entry for s in (*what.senders, *what.fallen, *what.orders))
 
     def involves(self, node: Node) -> bool:
         """Whether a node is sending in it."""
@@ -116,7 +123,7 @@ def cut_short(plan: Plan, order: Sending, bit: int) -> Outcome:
     )
 
 
-def outcome(senders: Sequence[Sending], nodes: Sequence[Node], faults: Faults) -> Outcome:
+def outcome(senders: Sequence[Sending], nodes: Sequence[Node], faults: FrameFaults) -> Outcome:
     """Outcome of the frame of `senders`, the winners of the arbitration, among all `nodes`."""
     frame = senders[0].entry.frame
     listeners = [node for node in nodes if node.state is not NodeState.BUS_OFF]
@@ -134,10 +141,8 @@ def outcome(senders: Sequence[Sending], nodes: Sequence[Node], faults: Faults) -
         if clash is not None:
             return clash
         senders = [sender for sender in senders if sender not in fallen]
-    entry = senders[0].entry
-    fault = None
-    if faults:
-        fault = faults.match(senders[0].node.name, entry.frame, on_wire=True)
+    sender, entry = senders[0]
+    fault = faults.match(entry.frame, of_drive=sender.of_drive, on_wire=True)
     if fault is not None:
         at = entry.bits - _AFTER_ACKNOWLEDGE - 1
         found = _destroyed(senders, ErrorKind.FORM, at, ERROR_FLAG_BITS)

@@ -8,9 +8,9 @@ arbitration before or at that instant voids it. So the segment needs no clock, a
 events however often it is asked.
 """
 
+from bridge.frame_faults import FrameFaults
 from bridge.wire.bits import SUSPEND_BITS
-from bridge.wire.confinement import NodeState
-from bridge.wire.faults import Faults
+from bridge.wire.confinement import OFF, NodeState
 from bridge.wire.node import (
     Delivered,
     ErrorFrame,
@@ -31,7 +31,9 @@ class Segment:
     """Nodes connected with each other. Times are handed in, in order."""
 
     __slots__ = (
+        "_acting",
         "_bit_rate",
+        "_failing",
         "_faults",
         "_first_ns",
         "_listeners",
@@ -48,9 +50,11 @@ class Segment:
         "recovery",
     )
 
-    def __init__(self, bit_rate: int, faults: Faults) -> None:
+    def __init__(self, bit_rate: int, faults: FrameFaults) -> None:
         self._bit_rate = bit_rate
         self._faults = faults
+        self._acting = faults.acting
+        self._failing: list[Node] = []  # go bus-off at the end of their frame
         self.nodes: list[Node] = []
         self.free_ns = 0
         self.busy_ns = 0
@@ -81,11 +85,10 @@ class Segment:
         """Let a node go; a frame of its own that is on the wire goes on."""
         self.nodes.remove(node)
         self._moves = [move for move in self._moves if move[0] is not node]
-        for some in (self._ready, self.recovery.nodes):
+        for some in (self._failing, self.recovery.nodes):
             if node in some:
                 some.remove(node)
-        if not self._ready:
-            self._first_ns = None
+        self._rest_for_good(node)
         self.revise(at_ns)
 
     def move(self, node: Node, to: "Segment", at_ns: int) -> None:
@@ -96,6 +99,27 @@ class Segment:
         elif to is not self:
             self.leave(node, at_ns)
             to.join(node, at_ns)
+
+    def discard(self, node: Node, at_ns: int) -> int:
+        """Drop what a node has queued, less its frame on the wire; return how many frames."""
+        plan = self._plan if self.is_sending(node, at_ns) else None
+        entries = node.queue.entries
+        kept = [entry for entry in entries if plan is not None and plan.carries(entry)]
+        dropped = len(entries) - len(kept)
+        entries[:] = kept
+        if not kept:
+            self._rest_for_good(node)
+        self.revise(at_ns)
+        return dropped
+
+    def fail(self, node: Node, at_ns: int, events: list[Event]) -> None:
+        """Let a node go bus-off; if it is sending, at the end of its frame."""
+        if self.is_sending(node, at_ns):
+            self._failing.append(node)
+            return
+        node.confinement.tec = OFF
+        self._report_state(node, at_ns, events)
+        self._rest_for_good(node)
 
     def awaits(self, segment: "Segment") -> bool:
         """Whether a node is about to move to that segment."""
@@ -195,7 +219,7 @@ class Segment:
             return self._arbitrate(self._first_ns)
         if entry.key == ERROR_KEY:
             return self._plan_error(start_ns, entry)
-        if self._plain and not tied and not self._faults:
+        if self._plain and not tied and not self._acting:
             plan = Plan(best, entry, start_ns, None, self._bit_rate)
             others = self._others.get(best)
             if others is None:
@@ -251,6 +275,10 @@ class Segment:
         self._first_ns = free_ns if self._ready else None
         if self.recovery.nodes:
             self.recovery.count(plan.start_ns, free_ns)
+        if self._failing:
+            for node in [node for node in self._failing if plan.involves(node)]:
+                self._failing.remove(node)
+                self.fail(node, plan.done_ns, events)
         if self._moves:
             for node, to in self._moves.copy():
                 self.move(node, to, plan.done_ns)
@@ -271,6 +299,13 @@ class Segment:
             node.not_before_ns = plan.free_ns + SUSPEND_BITS * _SECOND_NS // self._bit_rate
         if not node.queue.entries and node in self._ready:
             self._ready.remove(node)
+
+    def _rest_for_good(self, node: Node) -> None:
+        """A node has nothing to send."""
+        if node in self._ready:
+            self._ready.remove(node)
+        if not self._ready:
+            self._first_ns = None
 
     def _received(self, plan: Plan, events: list[Event]) -> None:
         """All others have received a frame."""
@@ -299,7 +334,7 @@ class Segment:
         at_ns, frame = plan.done_ns, plan.entry.frame
         events.append(ErrorFrame(at_ns, plan.start_ns, plan.free_ns, kind, senders, frame, orders))
         if what.fault is not None:
-            self._faults.applied(what.fault)
+            self._faults.count(what.fault)
         for node, entry in what.orders:
             node.counters.sent += 1
             if node.attached:

@@ -26,10 +26,10 @@ propagation, clock tolerance, and that a node which drops out of a clash is back
 from heapq import heappop, heappush
 
 from bridge.frame import ERR, Frame
+from bridge.frame_faults import ActingFrameFault, FrameFaults
 from bridge.wire.bits import ERROR_FRAME_BITS, arbitration_key, frame_bits
 from bridge.wire.confinement import NodeState
-from bridge.wire.faults import Fault, FaultKind, Faults
-from bridge.wire.node import Event, Node
+from bridge.wire.node import Babbler, Event, Node
 from bridge.wire.queues import ERROR_KEY, Entry, Fifo, Queue
 from bridge.wire.segment import Segment
 
@@ -46,11 +46,14 @@ class Wire:
             )
         self.bitrate_bit_s = bitrate_bit_s
         self.now_ns = 0
-        self._faults = Faults()
-        self._main = Segment(bitrate_bit_s, self._faults)
+        self.faults = FrameFaults()
+        """The faults that act on its frames; tell `revise` after a change."""
+        self._acting = self.faults.acting
+        self._main = Segment(bitrate_bit_s, self.faults)
         self._apart: list[Segment] = []  # an open line leaves a node on a wire of its own
         self._events: list[Event] = []
         self._withheld: list[tuple[int, int, Node, Entry]] = []
+        self._babblers: dict[Node, Babbler] = {}
         self._number = 0
 
     # --- nodes -----------------------------------------------------------------------------------
@@ -62,6 +65,7 @@ class Wire:
         queue: Queue | None = None,
         restart_ns: int | None = None,
         wrong_bit_rate: bool = False,
+        of_drive: bool = False,
     ) -> Node:
         """Join a node now; `queue` is a host's FIFO of 10 if not given.
 
@@ -73,6 +77,7 @@ class Wire:
             Fifo() if queue is None else queue,
             restart_ns=restart_ns,
             wrong_bit_rate=wrong_bit_rate,
+            of_drive=of_drive,
         )
         self._main.join(node, self.now_ns)
         return node
@@ -87,6 +92,7 @@ class Wire:
         kept = [held for held in self._withheld if held[2] is not node]
         node.counters.dropped += len(self._withheld) - len(kept)
         self._withheld = sorted(kept, key=lambda held: held[:2])
+        self._babblers.pop(node, None)
         segment.leave(node, self.now_ns)
         self._forget_empty()
 
@@ -95,19 +101,40 @@ class Wire:
         if node.state is NodeState.BUS_OFF and node.attached:
             self._segment(node).recovery.start(node, self.now_ns)
 
-    def disconnect(self, node: Node) -> None:
-        """Open the line to a node: it is isolated. Its frame on the wire goes on."""
-        if node.attached and self._segment(node) is self._main:
-            segment = Segment(self.bitrate_bit_s, self._faults)
-            self._apart.append(segment)
-            self._main.move(node, segment, self.now_ns)
-            self._forget_empty()
+    def fail(self, node: Node) -> None:
+        """Take a node off the bus as its error counters would, at the end of its frame if any."""
+        if node.attached and node.state is not NodeState.BUS_OFF:
+            self._segment(node).fail(node, self.now_ns, self._events)
+
+    def discard(self, node: Node) -> None:
+        """Drop what a node has queued; its frame on the wire goes on."""
+        if node.attached:
+            node.counters.dropped += self._segment(node).discard(node, self.now_ns)
+
+    def disconnect(self, *nodes: Node) -> None:
+        """Open the line to some nodes: only each other they hear. Frames on the wire go on."""
+        segment = Segment(self.bitrate_bit_s, self.faults)
+        self._apart.append(segment)
+        for node in nodes:
+            if node.attached:
+                self._segment(node).move(node, segment, self.now_ns)
+        self._forget_empty()
 
     def reconnect(self, node: Node) -> None:
         """Close the line again."""
         if node.attached:
             self._segment(node).move(node, self._main, self.now_ns)
             self._forget_empty()
+
+    def babble(self, node: Node, frame: Frame, period_ns: int) -> None:
+        """Let a node send a frame now and every `period_ns`, whenever it has room for it."""
+        present = self._babblers.get(node)
+        if present is None or (present.frame, present.period_ns) != (frame, period_ns):
+            self._babblers[node] = Babbler(self.now_ns, frame, period_ns)
+
+    def quieten(self, node: Node) -> None:
+        """Let a node babble no more."""
+        self._babblers.pop(node, None)
 
     # --- frames ----------------------------------------------------------------------------------
 
@@ -128,8 +155,8 @@ class Wire:
         bits = frame_bits(frame)
         self._number += 1
         entry = Entry(arbitration_key(frame.can_id), self._number, frame, bits)
-        if self._faults:
-            found = self._faults.match(node.name, frame, on_wire=False)
+        if self._acting:
+            found = self.faults.take(frame, of_drive=node.of_drive)
             if found is not None:
                 return self._apply(found, node, entry)
         return self._queue(node, entry)
@@ -154,15 +181,10 @@ class Wire:
 
     # --- faults and figures ----------------------------------------------------------------------
 
-    def inject(self, fault: Fault) -> None:
-        """Apply a fault from now on."""
-        self._faults.add(fault)
-        self._revise()
-
-    def clear_faults(self) -> None:
-        """Forget all faults that are still to be applied."""
-        self._faults.clear()
-        self._revise()
+    def revise(self) -> None:
+        """The faults have changed."""
+        for segment in (self._main, *self._apart):
+            segment.revise(self.now_ns)
 
     @property
     def busy_ns(self) -> int:
@@ -188,9 +210,11 @@ class Wire:
         return self._main
 
     def _forget_empty(self) -> None:
-        main = self._main
+        segments = (self._main, *self._apart)
         self._apart = [
-            segment for segment in self._apart if not segment.deserted() or main.awaits(segment)
+            segment
+            for segment in self._apart
+            if not segment.deserted() or any(other.awaits(segment) for other in segments)
         ]
 
     def _queue(self, node: Node, entry: Entry) -> bool:
@@ -211,20 +235,19 @@ class Wire:
             self._segment(node).interrupt(node, self.now_ns)
         return True
 
-    def _apply(self, found: Fault, node: Node, entry: Entry) -> bool:
+    def _apply(self, found: ActingFrameFault, node: Node, entry: Entry) -> bool:
         """Apply a fault to a frame on its way to the controller."""
-        self._faults.applied(found)
         match found.kind:
-            case FaultKind.DROP:
+            case "can_drop":
                 node.counters.accepted += 1
                 node.counters.dropped += 1
                 return True
-            case FaultKind.DELAY:
+            case "can_delay":
                 node.counters.accepted += 1
                 held = (self.now_ns + found.delay_ns, entry.number, node, entry)
                 heappush(self._withheld, held)
                 return True
-            case FaultKind.DUPLICATE:
+            case "can_duplicate":
                 taken = self._queue(node, entry)
                 self._number += 1
                 self._queue(node, entry._replace(number=self._number))
@@ -242,7 +265,10 @@ class Wire:
             node.counters.dropped += 1
 
     def _next_ns(self) -> int | None:
+        if not (self._apart or self._withheld or self._babblers):
+            return self._main.next_ns()
         times = [self._main.next_ns(), *(segment.next_ns() for segment in self._apart)]
+        times += [babbler.next_ns for babbler in self._babblers.values()]
         if self._withheld:
             times.append(self._withheld[0][0])
         return min((time for time in times if time is not None), default=None)
@@ -250,7 +276,7 @@ class Wire:
     def _run(self, to_ns: int) -> None:
         if to_ns < self.now_ns:
             raise ValueError(f"bus time {to_ns} ns is in the past; it is {self.now_ns} ns already")
-        while self._withheld or self._apart:
+        while self._withheld or self._apart or self._babblers:
             next_ns = self._next_ns()
             if next_ns is None or next_ns > to_ns:
                 break
@@ -267,7 +293,10 @@ class Wire:
         self._forget_empty()
         while self._withheld and self._withheld[0][0] <= to_ns:
             self._release()
-
-    def _revise(self) -> None:
-        for segment in (self._main, *self._apart):
-            segment.revise(self.now_ns)
+        for node, babbler in self._babblers.items():
+            if babbler.next_ns <= to_ns:
+                babbler.next_ns += babbler.period_ns
+                self._number += 1
+                frame = babbler.frame
+                key = arbitration_key(frame.can_id)
+                self._queue(node, Entry(key, self._number, frame, frame_bits(frame)))

@@ -7,6 +7,8 @@ lockstep    the drives' frames of an instant are the question, the answer reache
 real time   a set-point for both wheels is answered at once by their encoder frames; what is
             cyclic goes out with the ticks, or in its own time where encoder frames are more
             frequent. An external bus (another python-can interface) is one of these as well
+
+Faults of frames and nodes act at the drives' end (`plant.bus.interference`).
 """
 
 from collections.abc import Sequence
@@ -14,6 +16,7 @@ from collections.abc import Sequence
 from bridge.frame import Frame
 from bridge.network.telemetry import FROM_DRIVE, Tap
 from configs.brief import Schedule
+from plant.bus.interference import Interference
 from plant.bus.port import ALL, Begin, Port, Steps
 from plant.faults import BusFaults
 from plant.robot import EmulatedRobot
@@ -36,6 +39,8 @@ class IdealBus:
     ) -> None:
         self.robots = robots
         self.faults = faults
+        self._interference = Interference()
+        faults.disturbances.disturb = self._interference.disturb
         self.crossed = 0
         self._tap = tap
         self._port = port
@@ -60,14 +65,16 @@ class IdealBus:
         schedule, begin, substeps = self._schedule, self._begin, self._substeps
         tap, deliver, receive = self._tap, self._port.deliver, self._port.receive
         period_s, period_ns, last = schedule.period_s, schedule.period_ns, schedule.ticks
-        robots, begin_faults = self.robots, self.faults.begin
+        robots, begin_faults, interference = self.robots, self.faults.begin, self._interference
         (single,) = robots if len(robots) == 1 else (None,)
         late: list[Frame] = []  # replies that wait for the next tick
         for tick in range(-schedule.countdown_ticks, last + 1):
             bus_ns = schedule.bus_time_ns(tick)
             begin_faults(tick)
             begin(tick)
-            if single is not None:
+            if interference.acts:
+                frames = interference.frames_due(robots, bus_ns)
+            elif single is not None:
                 frames = single.frames_due(bus_ns)
             else:
                 frames = sorted(frame for robot in robots for frame in robot.frames_due(bus_ns))
@@ -77,6 +84,8 @@ class IdealBus:
             deliver(bus_ns, frames)
             yield ALL
             answers = receive()
+            if interference.acts:
+                answers = interference.to_drives(answers, bus_ns)
             count = 0
             self.crossed += len(frames) + len(answers)
             while answers:
@@ -92,6 +101,8 @@ class IdealBus:
                 deliver(bus_ns, replies)
                 yield ALL
                 answers = receive()
+                if interference.acts:
+                    answers = interference.to_drives(answers, bus_ns)
                 self.crossed += len(replies) + len(answers)
             if 0 <= tick < last:
                 t_s = tick * period_ns * 1e-9
@@ -108,11 +119,11 @@ class IdealBus:
     def react(self, now_ns: int) -> None:
         """Process the clients' frames, and answer."""
         self.move(now_ns)
-        received = self._port.receive()
+        received = self._arriving(self._port.receive(), now_ns)
         self._tap(now_ns, received, 0)
         replies = self._react(received, now_ns)
         for robot in self.robots:
-            replies += robot.feedback(now_ns)
+            replies += self._leaving(robot.feedback(now_ns), now_ns)
         self.crossed += len(received)
         self._send(now_ns, replies)
 
@@ -129,6 +140,14 @@ class IdealBus:
 
     def send_due(self, bus_ns: int) -> None:
         """Let the drives send what is due at a tick."""
+        if self._interference.acts:
+            held = self._interference.to_drives((), bus_ns)
+            self._tap(bus_ns, held, 0)
+            self.crossed += len(held)
+            replies = self._react(held, bus_ns)
+            replies += self._interference.frames_due(self.robots, bus_ns)
+            self._send(bus_ns, replies)
+            return
         self._send(bus_ns, [frame for robot in self.robots for frame in robot.frames_due(bus_ns)])
 
     def _send(self, bus_ns: int, frames: Sequence[Frame]) -> None:
@@ -137,7 +156,18 @@ class IdealBus:
             self._tap(bus_ns, frames, FROM_DRIVE)
             self._port.deliver(bus_ns, frames)
 
+    def _arriving(self, sent: Sequence[Frame], bus_ns: int) -> Sequence[Frame]:
+        """What arrives at the drives of frames of clients."""
+        return self._interference.to_drives(sent, bus_ns) if self._interference.acts else sent
+
+    def _leaving(self, sent: Sequence[Frame], bus_ns: int) -> Sequence[Frame]:
+        """What arrives at the clients of frames of drives."""
+        return self._interference.from_drives(sent, bus_ns) if self._interference.acts else sent
+
     def _react(self, frames: Sequence[Frame], bus_ns: int) -> list[Frame]:
+        if self._interference.acts:
+            heard = self._interference.react(self.robots, frames, bus_ns)
+            return self._interference.from_drives(heard, bus_ns)
         replies: list[Frame] = []
         for robot in self.robots:
             on_frame = robot.on_frame

@@ -23,7 +23,6 @@ from heapq import heappop, heappush
 from random import Random
 
 from bridge.can_bus.packet import Key, Submitted, Transmitted
-from bridge.drives.interface import DriveNode
 from bridge.frame import Frame
 from bridge.network.telemetry import FROM_DRIVE, Tap
 from bridge.wire.confinement import NodeState
@@ -33,24 +32,12 @@ from bridge.wire.queues import Fifo, Mailboxes
 from bridge.wire.wire import Wire
 from configs.brief import Schedule, WireModel
 from plant.bus.port import Begin, Port, Steps
+from plant.bus.wire_nodes import WireDrive, WireHost, disturb, has_to_send
+from plant.disturbance import Disturbance
 from plant.faults import BusFaults
 from plant.robot import EmulatedRobot
 
 _NEVER = 1 << 62
-
-
-class _Drive:
-    """A drive at its node of the wire."""
-
-    __slots__ = ("backlog", "drive", "due_ns", "looks_ns", "node", "robot")
-
-    def __init__(self, robot: EmulatedRobot, drive: DriveNode, node: Node) -> None:
-        self.robot = robot
-        self.drive = drive
-        self.node = node
-        self.due_ns = 0
-        self.looks_ns = 0  # when firmware looks at the last frame that came for it
-        self.backlog: dict[int, Frame] = {}  # by identifier, waiting for a mailbox
 
 
 class TimedBus:
@@ -82,7 +69,7 @@ class TimedBus:
         self._begin = begin
         self._random = random
         self._drives = [
-            _Drive(robot, drive, self._drive_node(f"{robot.brief.robot} {side}"))
+            WireDrive(robot, drive, self._drive_node(f"{robot.brief.robot} {side}"))
             for robot in robots
             for side, drive in zip(("right", "left"), robot.drives, strict=True)
         ]
@@ -91,22 +78,24 @@ class TimedBus:
             for robot in robots
         }
         self._of_node = {drive.node: drive for drive in self._drives}
-        self._hosts: dict[Key, Node] = {}
+        self._hosts: dict[Key, WireHost] = {}
         self._key_of: dict[Node, Key] = {}
         self._states: dict[Node, NodeState] = {}
         for robot in robots:
             self._host(robot.brief.robot)
-        self._mail: list[tuple[int, int, _Drive, Frame]] = []
+        self._mail: list[tuple[int, int, WireDrive, Frame]] = []
         self._number = 0
         self._now_ns = 0
         self._transmitted: list[Transmitted] = []
-        self._freed: list[tuple[Key, int]] = []
+        self._stirred: dict[Key, None] = {}  # clients whose queues have changed
+        faults.disturbances.disturb = self._disturb
         self.crossed = 0
         """Frames that ended on the wire, drives' and clients'."""
 
     def node_counts(self) -> dict[str, dict[str, int]]:
         """Frames of each drive and of each client that is still there, by their fate."""
-        nodes = (*(drive.node for drive in self._drives), *self._hosts.values())
+        hosts = (host.node for host in self._hosts.values())
+        nodes = (*(drive.node for drive in self._drives), *hosts)
         return {node.name: node.counters.as_dict() for node in nodes}
 
     # --- lockstep --------------------------------------------------------------------------------
@@ -175,24 +164,25 @@ class TimedBus:
 
     def submit(self, submitted: Sequence[Submitted]) -> None:
         """Put frames of clients into their transmit queues now."""
-        refused: dict[Key, int] = {}
         for key, frame in submitted:
-            node = self._hosts.get(key) or self._host(key)
-            if not self.wire.submit(node, frame, self._now_ns):
-                refused[key] = refused.get(key, 0) + 1
-        self._freed += refused.items()
+            host = self._hosts.get(key) or self._host(key)
+            host.submitted += 1
+            self.wire.submit(host.node, frame, self._now_ns)
+            self._stirred[key] = None
 
     def _detach(self, key: Key) -> None:
         """A client has left."""
-        node = self._hosts.pop(key, None)
-        if node is not None:
-            del self._key_of[node]
-            self.wire.detach(node)
+        host = self._hosts.pop(key, None)
+        if host is not None:
+            del self._key_of[host.node]
+            self.wire.detach(host.node)
 
     def _return_credit(self) -> None:
-        freed, self._freed = self._freed, []
-        for key, count in freed:
-            self._port.return_credit(key, count)
+        stirred, self._stirred = self._stirred, {}
+        for key in stirred:
+            host = self._hosts.get(key)
+            if host is not None and (count := host.newly_freed()):
+                self._port.return_credit(key, count)
 
     def _move(self, bus_ns: int) -> None:
         for robot in self.robots:
@@ -202,7 +192,7 @@ class TimedBus:
         """Run until the drives of a robot have sent all of the tick; None at its end."""
         while True:
             for robot in waiting:
-                if not any(d.node.queue.entries or d.backlog for d in self._of_robot[robot]):
+                if not any(map(has_to_send, self._of_robot[robot])):
                     return robot
             if not self._event(end_ns):
                 return None
@@ -255,24 +245,25 @@ class TimedBus:
 
     def _deliver(self, event: Delivered) -> None:
         end_ns, sender, frame = event.end_ns, event.sender, event.frame
+        drive = self._of_node.get(sender)
+        if drive is not None:
+            if not drive.apart:
+                self.crossed += 1
+                self._transmitted.append(Transmitted(end_ns, frame))
+                self._tap(end_ns, (frame,), FROM_DRIVE)
+            self._submit_backlog(drive)
+            return
         self.crossed += 1
         key = self._key_of.get(sender)
         self._transmitted.append(Transmitted(end_ns, frame, key))
         self._tap(end_ns, (frame,), FROM_DRIVE if key is None else 0)
-        drive = self._of_node.get(sender)
-        if drive is not None:
-            if drive.backlog:
-                waiting = list(drive.backlog.values())
-                drive.backlog.clear()
-                self._submit(drive, waiting)
-            return
         if key is not None:
-            self._freed.append((key, 1))
+            self._stirred[key] = None
         can_id = frame.can_id
         # A set-point concerns only the drive at its address.
         concerned = [d for d in self._drives if d.drive.setpoint_id == can_id] or self._drives
         for target in concerned:
-            if target.node in event.heard_by:
+            if target.node in event.heard_by and not target.apart:
                 soonest_ns, latest_ns = target.robot.brief.drive.command_latency_ns
                 latency_ns = soonest_ns
                 if latest_ns > soonest_ns:
@@ -283,9 +274,12 @@ class TimedBus:
                 heappush(self._mail, (target.looks_ns, self._number, target, frame))
 
     def _note_error(self, event: ErrorFrame) -> None:
-        apart = {key: of_error(event, node) for key, node in self._hosts.items()}
+        senders = (*event.senders, *event.ordered_by)
+        if all(node in self._of_node and self._of_node[node].apart for node in senders):
+            return  # no client is on that wire
+        apart = {key: of_error(event, host.node) for key, host in self._hosts.items()}
         self._transmitted.append(Transmitted(event.at_ns, of_error(event, None), apart=apart))
-        self._freed += [(self._key_of[n], 1) for n in event.ordered_by if n in self._key_of]
+        self._stirred |= {self._key_of[n]: None for n in event.ordered_by if n in self._key_of}
 
     def _note_state(self, event: StateChanged) -> None:
         node = event.node
@@ -294,19 +288,36 @@ class TimedBus:
             before = self._states.get(node, NodeState.ERROR_ACTIVE)
             self._states[node] = event.state
             self._transmitted.append(Transmitted(event.at_ns, of_state(event, before), to=key))
+            self._stirred[key] = None
+        elif node in self._of_node and event.state is not NodeState.BUS_OFF:
+            self._submit_backlog(self._of_node[node])
 
-    def _submit(self, drive: _Drive, frames: Sequence[Frame]) -> None:
+    def _submit_backlog(self, drive: WireDrive) -> None:
+        """What waited for a mailbox tries again."""
+        if drive.backlog:
+            waiting = list(drive.backlog.values())
+            drive.backlog.clear()
+            self._submit(drive, waiting)
+
+    def _submit(self, drive: WireDrive, frames: Sequence[Frame]) -> None:
+        if drive.silent:
+            return
         for frame in frames:
             if drive.backlog or not self.wire.submit(drive.node, frame, self._now_ns):
                 drive.backlog[frame.can_id] = frame
 
     def _drive_node(self, name: str) -> Node:
         mailboxes = Mailboxes(self._model.tx_mailboxes)
-        return self.wire.attach(name, queue=mailboxes, restart_ns=self._model.drive_restart_ns)
+        restart_ns = self._model.drive_restart_ns
+        return self.wire.attach(name, queue=mailboxes, restart_ns=restart_ns, of_drive=True)
 
-    def _host(self, key: Key) -> Node:
+    def _host(self, key: Key) -> WireHost:
         model = self._model
         node = self.wire.attach(str(key), queue=Fifo(model.txqueuelen), restart_ns=model.restart_ns)
-        self._hosts[key] = node
+        host = self._hosts[key] = WireHost(node)
         self._key_of[node] = key
-        return node
+        return host
+
+    def _disturb(self, disturbance: Disturbance) -> None:
+        """Let this act from now on."""
+        disturb(self.wire, self._drives, disturbance)

@@ -4,10 +4,10 @@ import itertools
 import random
 
 import pytest
+from support.frame_faults import frame_fault, inject
 
 from bridge.frame import Frame
 from bridge.wire.bits import least_bits
-from bridge.wire.faults import Fault, FaultKind
 from bridge.wire.node import Delivered, Event
 from bridge.wire.wire import Wire
 
@@ -37,7 +37,7 @@ def test_a_frame_that_only_can_fd_could_carry_is_refused_and_leaves_no_trace() -
 def test_a_dropped_frame_is_accepted_and_never_sent() -> None:
     wire = Wire(1_000_000)
     node, _ = wire.attach("node"), wire.attach("other")
-    wire.inject(Fault(FaultKind.DROP, can_id=0x80))
+    inject(wire, frame_fault("can_drop", can_id=0x80, count=1))
     taken = [wire.submit(node, SYNC, 0) for _ in range(3)]
     assert taken == [True] * 3
     assert len(delivered(wire.advance(MS))) == 2
@@ -48,7 +48,7 @@ def test_a_dropped_frame_is_accepted_and_never_sent() -> None:
 def test_a_duplicated_frame_comes_twice() -> None:
     wire = Wire(1_000_000)
     node, _ = wire.attach("node"), wire.attach("other")
-    wire.inject(Fault(FaultKind.DUPLICATE))
+    inject(wire, frame_fault("can_duplicate", count=1))
     for _ in range(2):
         wire.submit(node, SYNC, 0)
     assert len(delivered(wire.advance(MS))) == 3
@@ -58,7 +58,7 @@ def test_a_duplicated_frame_comes_twice() -> None:
 def test_a_delayed_frame_goes_to_arbitration_later_by_exactly_that() -> None:
     wire = Wire(1_000_000)
     node, _ = wire.attach("node"), wire.attach("other")
-    wire.inject(Fault(FaultKind.DELAY, delay_ns=5 * MS))
+    inject(wire, frame_fault("can_delay", count=1, delay_s=0.005))
     wire.submit(node, Frame(0x100, b""), 0)
     wire.submit(node, Frame(0x101, b""), 0)
     assert len(node.queue.entries) == 1  # the other one is withheld
@@ -66,13 +66,6 @@ def test_a_delayed_frame_goes_to_arbitration_later_by_exactly_that() -> None:
     assert (first.frame.can_id, second.frame.can_id) == (0x101, 0x100)
     assert second.start_ns == 5 * MS
     assert node.counters.accepted == node.counters.sent == 2
-
-
-def test_faults_that_make_no_sense_are_refused() -> None:
-    with pytest.raises(ValueError, match="count = 0"):
-        Fault(FaultKind.DROP, count=0)
-    with pytest.raises(ValueError, match="delay_ns = 0"):
-        Fault(FaultKind.DELAY)
 
 
 # --- everything at once ---------------------------------------------------------------------------
@@ -84,22 +77,14 @@ def test_whatever_goes_wrong_every_frame_is_accounted_for_and_none_overlap(seed:
     wire = Wire(500_000)
     nodes = [wire.attach(f"n{n}", restart_ns=rng.choice([None, 0, MS])) for n in range(4)]
     events: list[Event] = []
-    kinds = (
-        FaultKind.DROP,
-        FaultKind.DUPLICATE,
-        FaultKind.DELAY,
-        FaultKind.CORRUPT,
-        FaultKind.CORRUPT,
-    )
+    kinds = ("can_drop", "can_duplicate", "can_delay", "can_corrupt", "can_corrupt")
     for _ in range(400):
         now = wire.now_ns + rng.randrange(400 * US)
         node = rng.choice(nodes)
         events += wire.advance(now)
         match rng.randrange(20):
             case 0:
-                kind = rng.choice(kinds)
-                delay_ns = 300 * US if kind is FaultKind.DELAY else 0
-                wire.inject(Fault(kind, count=rng.randrange(1, 40), delay_ns=delay_ns))
+                inject(wire, frame_fault(rng.choice(kinds), count=rng.randrange(1, 40)))
             case 1:
                 wire.disconnect(node)
             case 2 | 3:
@@ -125,3 +110,42 @@ def test_whatever_goes_wrong_every_frame_is_accounted_for_and_none_overlap(seed:
     shortest_ns = least_bits(0) * 2000
     assert wire.busy_ns >= len(frames) * shortest_ns - shortest_ns
     assert wire.busy_ns <= wire.now_ns
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_groups_apart_babblers_and_nodes_that_fail_leave_every_frame_accounted_for(
+    seed: int,
+) -> None:
+    rng = random.Random(seed)
+    wire = Wire(500_000)
+    nodes = [wire.attach(f"n{n}", restart_ns=rng.choice([None, 0, MS])) for n in range(5)]
+    events: list[Event] = []
+    for _ in range(400):
+        now = wire.now_ns + rng.randrange(400 * US)
+        node = rng.choice(nodes)
+        events += wire.advance(now)
+        frame = Frame(rng.randrange(8), rng.randbytes(rng.randrange(9)))
+        disturb = [
+            lambda node: wire.disconnect(node, rng.choice(nodes)),
+            wire.reconnect,
+            wire.reconnect,
+            wire.restart,
+            wire.discard,
+            wire.fail,
+            wire.quieten,
+            wire.quieten,
+            lambda node, frame=frame: wire.babble(node, frame, rng.randrange(50, 900) * US),
+            lambda _: inject(wire, frame_fault("can_corrupt", count=rng.randrange(1, 9))),
+        ]
+        if rng.random() < 0.3:
+            rng.choice(disturb)(node)
+        else:
+            wire.submit(node, frame, now)
+    events += wire.advance(wire.now_ns + 5 * MS)
+    for node in nodes:
+        c = node.counters
+        assert c.accepted == c.sent + c.dropped + len(node.queue.entries)
+        assert node.state is node.confinement.state
+    assert [event[0] for event in events] == sorted(event[0] for event in events)
+    sent = sum(1 + len(event.merged) for event in delivered(events))
+    assert sent == sum(node.counters.sent for node in nodes)

@@ -5,11 +5,12 @@ import random
 
 import pytest
 from support.babbler import Endless
+from support.frame_faults import clear, frame_fault, inject
 
 from bridge.frame import EFF, Frame
+from bridge.frame_faults import ActingFrameFault
 from bridge.wire.bits import frame_bits
 from bridge.wire.confinement import NodeState
-from bridge.wire.faults import Fault, FaultKind
 from bridge.wire.node import Delivered, ErrorFrame, ErrorKind, Event, Node, StateChanged
 from bridge.wire.queues import Fifo, Mailboxes
 from bridge.wire.wire import Wire
@@ -32,21 +33,21 @@ def states(events: list[Event], node: Node) -> list[NodeState]:
     return [e.state for e in events if isinstance(e, StateChanged) and e.node is node]
 
 
-def corrupt(count: int | None = 1, **match: object) -> Fault:
-    return Fault(FaultKind.CORRUPT, count=count, **match)  # type: ignore[arg-type]
+def corrupt(count: int | None = 1, **match: object) -> ActingFrameFault:
+    return frame_fault("can_corrupt", count=count, **match)
 
 
 def off_the_bus(restart_ns: int | None) -> tuple[Wire, Node, Node, int]:
     """A wire of which one node has just gone bus-off, and when."""
     wire = Wire(1_000_000)
     node, other = wire.attach("node", restart_ns=restart_ns), wire.attach("other")
-    wire.inject(corrupt(None, node="node"))
+    inject(wire, corrupt(None))
     wire.submit(node, SYNC, 0)
     while node.state is not NodeState.BUS_OFF:
         due = wire.next_ns()
         assert due is not None
         wire.advance(due)
-    wire.clear_faults()
+    clear(wire)
     return wire, node, other, wire.now_ns
 
 
@@ -123,7 +124,7 @@ def test_a_corrupted_frame_is_sent_again_after_an_error_frame_of_17_to_23_bits(
 ) -> None:
     wire = Wire(1_000_000)
     node, other = wire.attach("node"), wire.attach("other")
-    wire.inject(corrupt())
+    inject(wire, corrupt())
     wire.submit(node, frame, 0)
     events = wire.advance(MS)
     (error,) = errors(events)
@@ -148,7 +149,7 @@ def test_the_error_frame_of_a_clash_has_17_to_23_bits(data: tuple[bytes, bytes])
 def test_a_passive_sender_keeps_running_with_a_pause_of_8_bits_after_each_frame() -> None:
     wire = Wire(1_000_000)
     node, _ = wire.attach("node", queue=Fifo(100)), wire.attach("other")
-    wire.inject(corrupt(20, node="node"))
+    inject(wire, corrupt(20))
     for _ in range(40):
         wire.submit(node, SYNC, 0)
     events = wire.advance(20 * MS)
@@ -164,7 +165,7 @@ def test_a_passive_sender_keeps_running_with_a_pause_of_8_bits_after_each_frame(
 def test_only_the_frames_asked_for_are_corrupted() -> None:
     wire = Wire(1_000_000)
     a, b = wire.attach("a"), wire.attach("b")
-    wire.inject(corrupt(2, can_id=0x101))
+    inject(wire, corrupt(2, can_id=0x101))
     for can_id in (0x100, 0x101, 0x102):
         wire.submit(a, Frame(can_id, b""), 0)
         wire.submit(b, Frame(can_id + 8, b""), 0)

@@ -4,12 +4,13 @@ from collections.abc import Callable
 
 import pytest
 from support.babbler import Endless
+from support.frame_faults import frame_fault, inject
 from support.manual_port import ManualPort, Question
 
 from bridge.can_bus.packet import Submitted
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisState, Command, identifier
-from bridge.frame import Frame
+from bridge.frame import ERR, Frame
 from bridge.network.telemetry import no_tap
 from bridge.wire.node import NodeState
 from configs.brief import PlantBrief
@@ -117,7 +118,7 @@ def test_who_says_more_than_the_transmit_queue_holds_is_refused_and_told() -> No
     flood = [Frame(0x700, bytes(8))] * 40
     driven = Driven(lambda tick: flood if tick == -250 else [])
     driven.tick()
-    assert driven.bus._hosts["r1"].counters.refused == 30
+    assert driven.bus._hosts["r1"].node.counters.refused == 30
     freed = [count for ask in driven.ticks(5) for _, count in ask.freed]
     assert sum(freed) == 40
 
@@ -183,12 +184,9 @@ def test_encoder_frames_have_a_period_of_their_own() -> None:
 
 
 def test_error_frames_reach_the_clients_and_the_frame_is_sent_again() -> None:
-    from bridge.frame import ERR
-    from bridge.wire.faults import Fault, FaultKind
-
     driven = Driven(lambda _: [])
     driven.tick()
-    driven.bus.wire.inject(Fault(FaultKind.CORRUPT, can_id=0x009))
+    inject(driven.bus.wire, frame_fault("can_corrupt", can_id=0x009, count=1))
     (ask,) = driven.tick()
     kinds = [passed.frame.can_id for passed in ask.transmitted]
     errors = [passed for passed in ask.transmitted if passed.frame.can_id & ERR]
@@ -199,8 +197,6 @@ def test_error_frames_reach_the_clients_and_the_frame_is_sent_again() -> None:
 
 
 def test_an_error_frame_from_a_client_destroys_what_starts_with_it_and_leaves_its_queue() -> None:
-    from bridge.frame import ERR
-
     driven = Driven(lambda _: torques(0.1, 0.1))
     driven.ticks(3)
     ask = driven.port.next_question(driven.steps)
@@ -210,8 +206,8 @@ def test_an_error_frame_from_a_client_destroys_what_starts_with_it_and_leaves_it
     passed = [p for a in (ask, *after) if a is not None for p in a.transmitted]
     assert [p.frame.can_id & ~ERR for p in passed if p.frame.can_id & ERR] == [0x08]
     assert [p.frame.can_id for p in passed].count(torques(0.1, 0.1)[0].can_id) == 2
-    assert driven.bus._hosts["r1"].confinement.tec == 8 - 3  # three frames have been sent since
-    assert driven.bus._hosts[7].confinement.rec == 0
+    assert driven.bus._hosts["r1"].node.confinement.tec == 8 - 3  # three have been sent since
+    assert driven.bus._hosts[7].node.confinement.rec == 0
     assert (7, 1) in [freed for a in after for freed in a.freed]
 
 
@@ -226,11 +222,10 @@ def test_who_only_listens_is_no_node_on_the_wire() -> None:
 
 
 def test_a_drive_that_goes_bus_off_falls_silent_and_the_controller_hears_the_other() -> None:
-    from bridge.wire.faults import Fault, FaultKind
 
     driven = Driven(lambda _: [])
     driven.tick()
-    driven.bus.wire.inject(Fault(FaultKind.CORRUPT, node="r1 right", count=32))
+    inject(driven.bus.wire, frame_fault("can_corrupt", can_id=0x009, count=32))
     driven.ticks(20)
     (ask, *_) = driven.tick()
     assert [passed.frame.can_id for passed in ask.transmitted] == [0x029]
@@ -238,10 +233,8 @@ def test_a_drive_that_goes_bus_off_falls_silent_and_the_controller_hears_the_oth
 
 
 def test_a_host_that_nobody_acknowledges_hears_of_it_and_finds_its_queue_full() -> None:
-    from bridge.frame import ERR
-
     driven = Driven(lambda tick: [Frame(0x700, b"")] if tick < 0 else [])
-    host = driven.bus._hosts["r1"]
+    host = driven.bus._hosts["r1"].node
     driven.bus.wire.disconnect(host)
     heard = [passed.frame for ask in driven.ticks(40) for passed in ask.transmitted]
     kinds = {frame.can_id & ~ERR for frame in heard if frame.can_id & ERR}
