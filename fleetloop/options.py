@@ -72,6 +72,10 @@ DeploymentOption = Annotated[
         help="CAN interfaces, router and roles on other machines. Default: all on this machine.",
     ),
 ]
+JunitOption = Annotated[
+    Path | None,
+    typer.Option("--junit", metavar="FILE", help="Write the verdicts as JUnit XML, for CI."),
+]
 VersionOption = Annotated[
     bool,
     typer.Option(

@@ -1,6 +1,5 @@
 """`fleetloop check`: findings about a scenario before it runs."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -8,7 +7,7 @@ from pathlib import Path
 from rich.table import Table
 
 from configs.deployment import Deployment, load_deployment
-from configs.errors import Complaint, ExitStatus, ScenarioError
+from configs.errors import ExitStatus, ScenarioError
 from configs.loading import json_schema, load, shipped
 from configs.overrides import Overrides
 from configs.roles import AGENT
@@ -17,6 +16,7 @@ from fleetloop.check.examine import examine
 from fleetloop.check.finding import Finding, resting_on, worst
 from fleetloop.check.rehearsal import rehearse
 from fleetloop.check.table import print_findings
+from fleetloop.results.outcome import problems_of
 from fleetloop.terminal import ResultConsole, say, say_json
 
 _VERDICTS = {
@@ -41,7 +41,7 @@ def check_scenario(
     except ScenarioError as error:
         if not as_json:
             raise
-        _say_json(problems=_problems(error))
+        _say_json(problems=problems_of(error))
         return ExitStatus.USAGE
     unsound = any(finding.level == "error" for finding in found)
     if as_json:
@@ -63,24 +63,6 @@ def _find(
         placed = place_findings(scenario, load_deployment(deployment, scenario))
         found += resting_on("the deployment", placed)
     return scenario, found
-
-
-def _problems(error: ScenarioError) -> list[dict[str, object]]:
-    """Errors in a file or an option, for machines."""
-    if error.complaints:
-        return [
-            {**complaint._asdict(), "value": _json_value(complaint.value)}
-            for complaint in error.complaints
-        ]
-    return [Complaint("", "", None, text)._asdict() for text in str(error).splitlines()]
-
-
-def _json_value(value: object) -> object:
-    """As it is, if JSON has it; nan and infinity it has not."""
-    try:
-        return json.loads(json.dumps(value, allow_nan=False))
-    except (TypeError, ValueError):
-        return str(value)
 
 
 def _say_json(

@@ -9,6 +9,7 @@ from fleetloop import numbers
 from fleetloop.options import (
     ClockOption,
     DeploymentOption,
+    JunitOption,
     ScenarioArg,
     SeedOption,
     SetOption,
@@ -52,8 +53,14 @@ def run(
         ),
     ] = None,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print summary.json on standard output, no table.")
+        bool,
+        typer.Option(
+            "--json",
+            help="Print the outcome as JSON on standard output, no table: summary.json and more,"
+            " or the problems of the scenario.",
+        ),
     ] = False,
+    junit: JunitOption = None,
     profile: Annotated[
         bool,
         typer.Option(
@@ -100,6 +107,7 @@ def run(
         deployment=deployment,
         allow_unchecked=allow_unchecked,
         force=force,
+        junit=junit,
     )
     raise typer.Exit(run_scenario(scenario, options))
 

@@ -10,7 +10,7 @@ from bridge.process.clock import SYSTEM_CLOCK, local_date
 from bridge.process.lifecycle import Stop, keep_to_itself
 from configs.connections import NetworkLink
 from configs.deployment import Deployment, load_deployment
-from configs.errors import ExitStatus, InfrastructureError, ScenarioError
+from configs.errors import ExitStatus, FleetloopError, InfrastructureError, ScenarioError
 from configs.events import KINDS, Event, told
 from configs.loading import load, to_toml
 from configs.overrides import Overrides
@@ -29,6 +29,8 @@ from fleetloop.record.run_record import RunRecord
 from fleetloop.record.scan import RecordError
 from fleetloop.results import run_folder
 from fleetloop.results.expectations import out_of_reach
+from fleetloop.results.junit import write_junit
+from fleetloop.results.outcome import Outcome, of_error, of_summary, unbegun
 from fleetloop.results.summary import RunStats, Summary, summarise, to_json
 from fleetloop.results.tables import print_report, print_results
 from fleetloop.signals import stop_on_signals
@@ -59,6 +61,7 @@ class RunOptions:
     allow_unchecked: bool = False
     force: bool = False
     """Run what `fleetloop check` calls an error."""
+    junit: Path | None = None
 
 
 class _Live(NamedTuple):
@@ -81,13 +84,47 @@ class _Live(NamedTuple):
         self.progress.notice(f"{short_name(process)}: {text}")
 
 
+class _Teller:
+    """Tells the outcome of a run once: as JSON on standard output, in a JUnit file."""
+
+    def __init__(self, source: str, options: RunOptions) -> None:
+        self._source, self._options = source, options
+        self.told = False
+
+    def tell(self, outcome: Outcome) -> int:
+        """Tell the outcome as the options want it; return the exit status."""
+        options, self.told = self._options, True
+        if options.as_json:
+            say_json(outcome)
+        if options.junit is not None:
+            allowed = options.allow_unchecked
+            write_junit(options.junit, {self._source: outcome}, allow_unchecked=allowed)
+        status: int = outcome["exit_status"]
+        return status
+
+
 def run_scenario(source: str, options: RunOptions) -> int:
     """Run a scenario, save and print its results; return the exit status.
+
+    With `as_json` an error is told as an outcome, too, and not raised.
 
     Raises:
         ScenarioError: the scenario or an option is wrong; nothing was started.
         InfrastructureError: the run could not start.
     """
+    teller = _Teller(source, options)
+    try:
+        return _run(source, options, teller)
+    except FleetloopError as error:
+        if teller.told:
+            raise
+        status = teller.tell(of_error(source, error))
+        if options.as_json:
+            return status
+        raise
+
+
+def _run(source: str, options: RunOptions, teller: _Teller) -> int:
     scenario = load(source, options.overrides)
     if options.in_process and scenario.clock.mode == "realtime":
         raise ScenarioError(
@@ -146,9 +183,11 @@ def run_scenario(source: str, options: RunOptions) -> int:
     if not stats.began:
         run_folder.discard(created)
         note(f"{stats.ended}: {stats.reason}; the run did not begin")
-        return EXIT_STATUS[stats.ended]
+        return teller.tell(
+            unbegun(scenario.name, stats.ended, stats.reason, EXIT_STATUS[stats.ended])
+        )
     stats.started = local_date(started_ns).isoformat()
-    return _finish(scenario, folder, stats, options)
+    return _finish(scenario, folder, stats, options, teller)
 
 
 def _look_ahead(source: str, scenario: Scenario, options: RunOptions) -> None:
@@ -245,7 +284,9 @@ def run_in_process(
     )
 
 
-def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: RunOptions) -> int:
+def _finish(
+    scenario: Scenario, folder: Path, stats: RunStats, options: RunOptions, teller: _Teller
+) -> int:
     record = folder / run_folder.RECORD
     if not record.exists():
         gone = stats.reason or f"{record} is not there: the run's folder was removed or moved"
@@ -254,17 +295,19 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: RunOptio
         recorded = Record.open(record)
     except RecordError as error:
         note(f"{stats.ended}: {stats.reason}; {error}")
-        return EXIT_STATUS["aborted" if stats.ended == "completed" else stats.ended]
+        ended = "aborted" if stats.ended == "completed" else stats.ended
+        reason = f"{stats.reason}; {error}" if stats.reason else str(error)
+        return teller.tell(unbegun(scenario.name, ended, reason, EXIT_STATUS[ended]))
     summary = summarise(recorded, scenario, stats)
     unsaved: InfrastructureError | None = None
     try:
         run_folder.write(folder / run_folder.SUMMARY, to_json(summary))
     except InfrastructureError as error:
         unsaved = error  # results first
-    if options.as_json:
-        say_json(summary | {"folder": str(folder)})
-    else:
+    if not options.as_json:
         print_results(summary, folder)
+    status = exit_status(summary, allow_unchecked=options.allow_unchecked)
+    teller.tell(of_summary(summary, folder, status))
     if unsaved is not None:
         raise unsaved
     if options.figures and summary["ticks"]:
@@ -273,7 +316,7 @@ def _finish(scenario: Scenario, folder: Path, stats: RunStats, options: RunOptio
         page = write_report(folder, recorded)
         if not options.as_json:
             print_report(page)
-    return exit_status(summary, allow_unchecked=options.allow_unchecked)
+    return status
 
 
 def exit_status(summary: Summary, *, allow_unchecked: bool) -> int:

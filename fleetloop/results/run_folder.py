@@ -74,6 +74,18 @@ def write(path: Path, content: str | bytes) -> None:
         raise InfrastructureError(f"can't write {path}: {error.strerror or error}") from error
 
 
+def make_parents(path: Path) -> None:
+    """Make the folder that a file goes to.
+
+    Raises:
+        InfrastructureError: it can't be made.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InfrastructureError(f"can't make {path.parent}: {error.strerror or error}") from error
+
+
 def discard(created: Created) -> None:
     """Remove the folder of a run that never began, and what was made for it."""
     can, inputs = created.path / CAN_FOLDER, created.path / inputs_file.FOLDER

@@ -123,10 +123,12 @@ def test_check_of_an_unsound_scenario_ends_with_1(tmp_path: Path) -> None:
 def test_run_refuses_what_check_calls_an_error_unless_it_is_forced(tmp_path: Path) -> None:
     stiff = "--in-process", "--no-report", "--json", "--set", "control.k4=30.0"
     refused = fleetloop(tmp_path, "run", "two_robots", *stiff)
-    assert (refused.returncode, refused.stdout) == (2, "")
+    outcome = json.loads(refused.stdout)
+    assert (refused.returncode, outcome["exit_status"]) == (2, 2)
+    assert outcome["verdict"] == "refused"
     assert "error: r1, r2: sampled speed loop" in refused.stderr
-    assert "would not work as it is, by r1, r2: sampled speed loop" in refused.stderr
-    assert "--force runs it" in refused.stderr
+    assert "would not work as it is, by r1, r2: sampled speed loop" in outcome["reason"]
+    assert "--force runs it" in outcome["problems"][0]["remedy"]
     assert list(tmp_path.iterdir()) == []
     forced = fleetloop(tmp_path, "run", "two_robots", *stiff, "--force", "--duration", "0.5")
     assert json.loads(forced.stdout)["verdict"] == "failed"
