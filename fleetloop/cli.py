@@ -22,6 +22,7 @@ from fleetloop.graph.app import graph
 from fleetloop.launch.app import agent, network, plant, run
 from fleetloop.options import VersionOption
 from fleetloop.results.app import diff, export, report
+from fleetloop.suite.app import test
 
 app = typer.Typer(
     name="fleetloop",
@@ -50,7 +51,7 @@ def init(
     write_starter(file)
 
 
-for verb in (run, agent, plant, check, compare, graph, network, report, export, diff, init):
+for verb in (run, test, agent, plant, check, compare, graph, network, report, export, diff, init):
     app.command()(verb)
 
 
