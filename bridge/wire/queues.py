@@ -44,9 +44,16 @@ class Queue(ABC):
         self.capacity = capacity
         self.entries: list[Entry] = []
 
-    @abstractmethod
     def push(self, entry: Entry) -> bool:
         """Take a frame, or return False: no room."""
+        if len(self.entries) >= self.capacity:
+            return False
+        self.put(entry)
+        return True
+
+    @abstractmethod
+    def put(self, entry: Entry) -> None:
+        """Take a frame, room or not, where it belongs."""
 
     def sent(self, entry: Entry) -> None:
         """Forget a frame that was sent."""
@@ -67,13 +74,9 @@ class Fifo(Queue):
     def __init__(self, capacity: int = HOST_QUEUE) -> None:
         super().__init__(capacity)
 
-    def push(self, entry: Entry) -> bool:
-        """Take a frame, or return False: no room."""
-        entries = self.entries
-        if len(entries) >= self.capacity:
-            return False
-        entries.append(entry)
-        return True
+    def put(self, entry: Entry) -> None:
+        """Take a frame behind all others."""
+        self.entries.append(entry)
 
 
 class Mailboxes(Queue):
@@ -84,10 +87,6 @@ class Mailboxes(Queue):
     def __init__(self, capacity: int = DRIVE_MAILBOXES) -> None:
         super().__init__(capacity)
 
-    def push(self, entry: Entry) -> bool:
-        """Take a frame into a free mailbox, or return False: there is none."""
-        entries = self.entries
-        if len(entries) >= self.capacity:
-            return False
-        insort(entries, entry)
-        return True
+    def put(self, entry: Entry) -> None:
+        """Take a frame by its identifier."""
+        insort(self.entries, entry)

@@ -34,6 +34,8 @@ from bridge.wire.queues import ERROR_KEY, Entry, Fifo, Queue
 from bridge.wire.segment import Segment
 
 MAX_BIT_RATE = 1_000_000
+MOST_BABBLES = 2
+"""Frames of a babbler that are queued: the one on the wire, and the next."""
 
 
 class Wire:
@@ -127,7 +129,10 @@ class Wire:
             self._forget_empty()
 
     def babble(self, node: Node, frame: Frame, period_ns: int) -> None:
-        """Let a node send a frame now and every `period_ns`, whenever it has room for it."""
+        """Let a node send a frame now and every `period_ns`, beside the frames in its queue.
+
+        Two of them at most wait: where its wire is slower, it sends one after the other.
+        """
         present = self._babblers.get(node)
         if present is None or (present.frame, present.period_ns) != (frame, period_ns):
             self._babblers[node] = Babbler(self.now_ns, frame, period_ns)
@@ -264,6 +269,18 @@ class Wire:
             node.counters.refused -= 1
             node.counters.dropped += 1
 
+    def _say_again(self, node: Node, frame: Frame) -> None:
+        """A node that babbles sends its frame."""
+        waiting = sum(entry.frame is frame for entry in node.queue.entries)
+        if node.state is NodeState.BUS_OFF or waiting >= MOST_BABBLES:
+            node.counters.refused += 1
+            return
+        node.counters.accepted += 1
+        self._number += 1
+        entry = Entry(arbitration_key(frame.can_id), self._number, frame, frame_bits(frame))
+        node.queue.put(entry)
+        self._segment(node).wake(node, self.now_ns)
+
     def _next_ns(self) -> int | None:
         if not (self._apart or self._withheld or self._babblers):
             return self._main.next_ns()
@@ -296,7 +313,4 @@ class Wire:
         for node, babbler in self._babblers.items():
             if babbler.next_ns <= to_ns:
                 babbler.next_ns += babbler.period_ns
-                self._number += 1
-                frame = babbler.frame
-                key = arbitration_key(frame.can_id)
-                self._queue(node, Entry(key, self._number, frame, frame_bits(frame)))
+                self._say_again(node, babbler.frame)

@@ -39,7 +39,7 @@ class IdealBus:
     ) -> None:
         self.robots = robots
         self.faults = faults
-        self._interference = Interference()
+        self._interference = Interference(robots)
         faults.disturbances.disturb = self._interference.disturb
         self.crossed = 0
         self._tap = tap
@@ -73,7 +73,7 @@ class IdealBus:
             begin_faults(tick)
             begin(tick)
             if interference.acts:
-                frames = interference.frames_due(robots, bus_ns)
+                frames = interference.frames_due(bus_ns)
             elif single is not None:
                 frames = single.frames_due(bus_ns)
             else:
@@ -145,7 +145,7 @@ class IdealBus:
             self._tap(bus_ns, held, 0)
             self.crossed += len(held)
             replies = self._react(held, bus_ns)
-            replies += self._interference.frames_due(self.robots, bus_ns)
+            replies += self._interference.frames_due(bus_ns)
             self._send(bus_ns, replies)
             return
         self._send(bus_ns, [frame for robot in self.robots for frame in robot.frames_due(bus_ns)])
@@ -166,7 +166,7 @@ class IdealBus:
 
     def _react(self, frames: Sequence[Frame], bus_ns: int) -> list[Frame]:
         if self._interference.acts:
-            heard = self._interference.react(self.robots, frames, bus_ns)
+            heard = self._interference.react(frames, bus_ns)
             return self._interference.from_drives(heard, bus_ns)
         replies: list[Frame] = []
         for robot in self.robots:

@@ -22,11 +22,22 @@ _Held = list[tuple[int, int, Frame]]
 
 
 class Interference:
-    """What acts on one ideal bus."""
+    """What acts on one ideal bus with the drives of these robots."""
 
-    __slots__ = ("_faults", "_from_drives", "_number", "_silent", "_to_drives", "acts")
+    __slots__ = (
+        "_cut",
+        "_faults",
+        "_from_drives",
+        "_number",
+        "_robots",
+        "_silent",
+        "_to_drives",
+        "acts",
+    )
 
-    def __init__(self) -> None:
+    def __init__(self, robots: Sequence[EmulatedRobot]) -> None:
+        self._robots = robots
+        self._cut = False  # all drives are cut off
         self._faults = FrameFaults()
         self._silent: list[DriveNode] = []
         self._from_drives: _Held = []
@@ -38,14 +49,15 @@ class Interference:
     def disturb(self, disturbance: Disturbance) -> None:
         """Let this act from now on."""
         self._faults.replace(disturbance.frames)
+        self._cut = all(robot in disturbance.cut for robot in self._robots)
         cut = [drive for robot in disturbance.cut for drive in robot.drives]
         self._silent = [*disturbance.silent, *cut]
         self._look()
 
-    def frames_due(self, robots: Sequence[EmulatedRobot], now_ns: int) -> list[Frame]:
-        """What the robots' drives send at an instant, and arrives."""
+    def frames_due(self, now_ns: int) -> list[Frame]:
+        """What drives send at an instant, and arrives."""
         frames: list[Frame] = []
-        for robot in robots:
+        for robot in self._robots:
             robot.update_encoders()
             for drive in robot.drives:
                 said = drive.due(now_ns)
@@ -59,15 +71,14 @@ class Interference:
 
     def to_drives(self, frames: Sequence[Frame], now_ns: int) -> list[Frame]:
         """What arrives at drives of frames that clients sent, and of those held back."""
-        return self._pass(frames, self._to_drives, now_ns, of_drive=False)
+        sent = () if self._cut else frames
+        return self._pass(sent, self._to_drives, now_ns, of_drive=False)
 
-    def react(
-        self, robots: Sequence[EmulatedRobot], frames: Sequence[Frame], now_ns: int
-    ) -> list[Frame]:
+    def react(self, frames: Sequence[Frame], now_ns: int) -> list[Frame]:
         """Let the drives that hear them process frames; return their replies."""
         return [
             reply
-            for robot in robots
+            for robot in self._robots
             for frame in frames
             for drive in robot.drives
             if not self.is_silent(drive)

@@ -18,6 +18,9 @@ class Endless(Queue):
         """No: it says one thing only."""
         return False
 
+    def put(self, entry: Entry) -> None:
+        """Not asked for."""
+
     def sent(self, entry: Entry) -> None:
         """It goes on."""
 
