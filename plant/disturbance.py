@@ -111,9 +111,10 @@ class Disturbances:
         if not any(change.planned.fault.kind in BUS_EFFECTS for change in changes):
             return
         disturbance = Disturbance()
-        kept = {id(acting.planned): acting for acting in self._acting}
+        # An order may have changed when one ends: it is the same fault, and goes on counting.
+        kept = {(id(one.planned.fault), one.planned.target): one for one in self._acting}
         self._acting = [
-            kept.get(id(one)) or self._begin(one)
+            kept.get((id(one.fault), one.target)) or self._begin(one)
             for one in planned
             if one.fault.kind in BUS_EFFECTS
         ]

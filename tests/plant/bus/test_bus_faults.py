@@ -2,13 +2,21 @@
 
 import pytest
 from support.emulated_fleet import Fleet
+from support.manual_port import ManualPort
+from support.robot_bench import NOWHERE
 
 from agents.guard import Phase
 from bridge.drives.odrive.frames import AxisState, Command, identifier
+from bridge.frame import RTR, Frame
+from bridge.network.telemetry import no_tap
 from bridge.wire.node import NodeState
 from configs.faults.kinds import KINDS
+from configs.loading import load
+from configs.resolve import plant_brief
+from plant.bus.ideal import IdealBus
 from plant.disturbance import BUS_EFFECTS
-from plant.faults import EFFECTS, STRIKES
+from plant.faults import EFFECTS, STRIKES, BusFaults
+from plant.robot import emulated_robot
 
 WIRE = ('bus.timing="wire"',)
 BOTH = pytest.mark.parametrize("timing", [(), WIRE], ids=["ideal", "wire"])
@@ -268,3 +276,136 @@ def test_a_babbling_idiot_starves_all_others_until_it_stops() -> None:
     fleet.until(1.2)
     assert fleet.happened() == AFTERWARDS
     assert fleet.phase("r2") is Phase.DRIVING
+
+
+# --- several robots, several faults ---------------------------------------------------------------
+
+
+SHARED = ('robot.r1.bus="fleet"', 'robot.r2.bus="fleet"')
+
+
+@BOTH
+@pytest.mark.parametrize("kind", ["bus_cut", "can_drop", "node_silent"])
+def test_on_a_shared_bus_the_other_robot_is_left_alone(kind: str, timing: tuple[str, ...]) -> None:
+    fleet = Fleet(fault(kind, 0.2, 0.2), overrides=(*SHARED, *timing)).until(0.4)
+    of_r2 = identifier(2, Command.GET_ENCODER_ESTIMATES)
+    assert fleet.count(0.2, 0.4, ENCODER, "fleet") == 0
+    assert fleet.count(0.2, 0.4, of_r2, "fleet") == 40
+    assert fleet.watchdogs() == [True, True]
+    assert fleet.phase() is Phase.STOPPED
+    fleet.until(1.2)
+    assert fleet.happened() == AFTERWARDS
+    assert fleet.happened("r2") == []
+    assert fleet.states("r2") == [CLOSED, CLOSED]
+
+
+@BOTH
+def test_when_all_faults_of_a_bus_have_ended_nothing_is_left_of_them(
+    timing: tuple[str, ...],
+) -> None:
+    kinds = ("can_drop", "can_duplicate", "can_delay", "bus_cut", "node_silent", "node_silent")
+    faults = [fault(kind, 0.1 + 0.02 * n, 0.07) for n, kind in enumerate(kinds)]
+    fleet = Fleet(*faults, overrides=timing).until(1.2)
+    assert fleet.run._buses["r1"].faults.schedule.acting == ()
+    assert fleet.happened() == AFTERWARDS
+    assert fleet.states() == [CLOSED, CLOSED]
+    counts = [fleet.count(1.0, 1.2, can_id) for can_id in (ENCODER, ENCODER_LEFT, TORQUE)]
+    assert counts == [40, 40, 40]
+    if timing:
+        assert not fleet.bus().wire._apart
+        assert not fleet.bus().wire.faults.acting
+    else:
+        assert not fleet.run._buses["r1"]._interference.acts  # type: ignore[attr-defined]
+
+
+def test_a_silent_drive_in_a_cut_bus_joins_the_other_one_when_it_speaks_again() -> None:
+    cut, silent = fault("bus_cut", 0.1, 0.3), fault("node_silent", 0.15, 0.1, wheel="left")
+    fleet = Fleet(cut, silent, overrides=WIRE).until(0.2)
+    right, left = (drive.node for drive in fleet.bus()._drives)
+    assert right.confinement.tec == 128  # alone
+    sent = left.counters.sent
+    fleet.until(0.4)
+    assert left.counters.sent > sent
+    assert right.confinement.tec < 128
+    assert fleet.count(0.1, 0.4, ENCODER) == 0
+    fleet.until(1.2)
+    assert fleet.happened() == AFTERWARDS
+
+
+# --- real time ------------------------------------------------------------------------------------
+
+
+class Wall:
+    """An ideal bus in real time, whose clients are the test."""
+
+    def __init__(self, *faults: str) -> None:
+        scenario = load(
+            "two_robots_100hz", (f"fault=[{', '.join(faults)}]", 'clock.mode="realtime"')
+        )
+        plant = plant_brief(scenario, network=NOWHERE)
+        self.port = ManualPort()
+        robot = emulated_robot(plant.robots[0])
+        acting = BusFaults(plant.faults, [robot], plant.schedule)
+        self.bus = IdealBus([robot], plant.schedule, 1, self.port, lambda _: None, no_tap, acting)
+        self.schedule = plant.schedule
+        self.tick_number = 0
+
+    def tick(self) -> list[int]:
+        """A tick: identifiers that clients hear."""
+        bus_ns = self.schedule.bus_time_ns(self.tick_number)
+        self.port.questions.clear()
+        self.bus.move(bus_ns)
+        self.bus.faults.begin(self.tick_number)
+        self.bus.send_due(bus_ns)
+        self.tick_number += 1
+        return self._heard()
+
+    def say(self, *frames: Frame, after_ns: int) -> list[int]:
+        """Clients send frames so long after the tick: identifiers that they hear at once."""
+        self.port.questions.clear()
+        self.port.frames = list(frames)
+        self.bus.react(self.schedule.bus_time_ns(self.tick_number - 1) + after_ns)
+        return self._heard()
+
+    def _heard(self) -> list[int]:
+        return [frame.can_id for given in self.port.questions for frame in given.frames]
+
+
+REQUEST = Frame(identifier(0, Command.GET_BUS_VOLTAGE_CURRENT) | RTR, bytes(8))
+ANSWER = REQUEST.can_id & ~RTR
+MS = 1_000_000
+
+
+def test_in_real_time_a_dropped_frame_is_lost_at_the_drives_end() -> None:
+    wall = Wall(fault("can_drop", 0.01, 0.01, can_id=ANSWER, direction="to_drives"))
+    heard = []
+    for _ in range(3):
+        wall.tick()
+        heard.append(wall.say(REQUEST, after_ns=MS))
+    assert heard == [[ANSWER], [], [ANSWER]]
+
+
+def test_in_real_time_a_delayed_frame_comes_with_the_next_frame_or_tick_after_its_time() -> None:
+    wall = Wall(fault("can_delay", 0.01, 0.01, delay_s=0.003, can_id=ANSWER, direction="to_drives"))
+    wall.tick()
+    assert wall.say(REQUEST, after_ns=MS) == [ANSWER]
+    wall.tick()
+    assert wall.say(REQUEST, after_ns=MS) == []
+    assert wall.say(after_ns=5 * MS) == [ANSWER]
+    assert wall.say(REQUEST, REQUEST, after_ns=8 * MS) == []
+    assert wall.tick().count(ANSWER) == 0
+    assert wall.tick().count(ANSWER) == 2
+    assert not wall.bus._interference.acts
+
+
+def test_in_real_time_a_cut_bus_passes_nothing_either_way() -> None:
+    wall = Wall(fault("bus_cut", 0.01, 0.02))
+    heard = [(wall.tick() != [], wall.say(REQUEST, after_ns=MS)) for _ in range(4)]
+    assert heard == [(True, [ANSWER]), (False, []), (False, []), (True, [ANSWER])]
+
+
+def test_a_fault_that_is_told_its_end_while_it_acts_goes_on_counting() -> None:
+    drop = fault("can_drop", 0.1, count=30, can_id=TORQUE, direction="to_drives")
+    fleet = Fleet(drop, fault("can_delay", 0.15, 0.02, can_id=0x7FF)).until(0.12)
+    assert fleet.run._buses["r1"].faults.schedule.clear("can_drop", 60)
+    assert fleet.until(0.4).count(0.1, 0.4, TORQUE) == 60 - 30
