@@ -13,6 +13,7 @@ import typer
 
 from configs.errors import ExitStatus, FleetloopError
 from fleetloop import numbers
+from fleetloop.campaign.app import campaign
 from fleetloop.can.app import app as can_app
 from fleetloop.certificates.app import app as certs_app
 from fleetloop.check.app import check
@@ -51,7 +52,21 @@ def init(
     write_starter(file)
 
 
-for verb in (run, test, agent, plant, check, compare, graph, network, report, export, diff, init):
+for verb in (
+    run,
+    test,
+    agent,
+    plant,
+    check,
+    compare,
+    campaign,
+    graph,
+    network,
+    report,
+    export,
+    diff,
+    init,
+):
     app.command()(verb)
 
 

@@ -20,6 +20,7 @@ from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, settled_memory
 from configs.brief import AgentBrief, LeaderBrief, PlantBrief
 from configs.events import Event
+from configs.faults.base import PlannedFault
 from fleetloop.record.writer import Source
 from plant.bus.build import build_buses
 from plant.herald import Herald
@@ -192,6 +193,8 @@ class InProcessRun:
                 agent.receive_leader_speed(LeaderSpeed(leader.speed_changes))
         self.ticks = 0
         self.wall_s = 0.0
+        self._next_tick = -self._schedule.countdown_ticks
+        self._start_ns = 0
 
     @property
     def frames(self) -> dict[str, int]:
@@ -239,11 +242,38 @@ class InProcessRun:
 
     def run(self, stop: Stop) -> None:
         """Run from the first tick of the countdown to the closing tick, or until told to stop."""
+        with settled_memory():
+            self.begin()
+            self.go(self._schedule.ticks + 1, stop)
+        self.finish()
+
+    def begin(self) -> None:
+        """Exchange what is due before the first tick."""
         self._exchange_paths(-1)
         for robot, agent in zip(self._robots, self._agents, strict=True):
             self._localise(robot, agent, -1, 0)
-        with settled_memory():
-            self._run(stop)
+        self._next_tick = -self._schedule.countdown_ticks
+
+    def go(self, to_tick: int, stop: Stop) -> None:
+        """Go on to the tick before this one, or until told to stop."""
+        period_ns = self._schedule.period_ns
+        for tick in range(self._next_tick, to_tick):
+            if stop.requested:
+                break
+            if tick <= 0:
+                self._start_ns = self._clock.monotonic_ns()
+            self._tick(tick)
+            self._next_tick = tick + 1
+            self.ticks = max(tick, 0)
+            if tick % PROGRESS_EVERY_TICKS == 0:
+                wall_ns = self._clock.monotonic_ns() - self._start_ns
+                self._herald.look(tick)
+                self._on_progress(Progress(tick, tick * period_ns, wall_ns))
+        self._herald.look(self.ticks)
+        self.wall_s = (self._clock.monotonic_ns() - self._start_ns) * 1e-9
+
+    def finish(self) -> None:
+        """Hand the writer the rest: nothing follows."""
         for rows in (*self._truths, *self._telemetry):
             rows.finish()
         for inputs in self._inputs.values():
@@ -251,22 +281,22 @@ class InProcessRun:
         for log in self._logs.values():
             log.finish()
 
-    def _run(self, stop: Stop) -> None:
-        schedule = self._schedule
-        start_ns = self._clock.monotonic_ns()
-        for tick in range(-schedule.countdown_ticks, schedule.ticks + 1):
-            if stop.requested:
-                break
-            if tick == 0:
-                start_ns = self._clock.monotonic_ns()
-            self._tick(tick)
-            self.ticks = max(tick, 0)
-            if tick % PROGRESS_EVERY_TICKS == 0:
-                wall_ns = self._clock.monotonic_ns() - start_ns
-                self._herald.look(tick)
-                self._on_progress(Progress(tick, tick * schedule.period_ns, wall_ns))
-        self._herald.look(self.ticks)
-        self.wall_s = (self._clock.monotonic_ns() - start_ns) * 1e-9
+    def order(self, planned: PlannedFault) -> None:
+        """Take a fault beside the scenario's; from its tick on it acts as one of them would.
+
+        Raises:
+            ValueError: it is a process's; here are none.
+        """
+        if planned.fault.PLACE == "process":
+            raise ValueError(f"{planned.name}: no processes here")
+        if planned.fault.PLACE == "plant":
+            (bus,) = {r.brief.bus for r in self._robots if r.brief.robot == planned.target}
+            self._buses[bus].faults.schedule.add(planned)
+            return
+        hearer = planned.target.rpartition(" -> ")[2]
+        for agent in self._agents:
+            if agent.brief.robot == hearer:
+                agent.faults.schedule.add(planned)
 
     def _tick(self, tick: int) -> None:
         """One tick of all buses, one after the other: within a tick they don't meet."""

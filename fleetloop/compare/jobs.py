@@ -1,42 +1,19 @@
-"""The jobs of a comparison, as the process that does one gets them, and what each brings.
+"""The jobs of a comparison, and what each brings."""
 
-A scenario travels as text: a process loads it, and its laws, as `fleetloop run` does.
-"""
-
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bridge.network.messages import Progress
 from bridge.process.lifecycle import Stop
-from configs.loading import loads, to_toml
-from configs.scenario import Scenario
+from configs.loading import to_toml
 from fleetloop.compare.measures import Course, Measures, courses, measures
 from fleetloop.compare.step_cost import Sample, StepCost, samples, step_costs
+from fleetloop.jobs.job import Tell, Told
 from fleetloop.launch.run import run_in_process
 from fleetloop.record.reader import Record
 from fleetloop.results import run_folder
 from fleetloop.results.summary import Summary, summarise, to_json
-
-Tell = Callable[[object], None]
-"""Says that a job goes on: a `Progress`."""
-
-
-@dataclass(frozen=True, slots=True)
-class Told:
-    """A scenario on its way to another process."""
-
-    toml: str
-    folder: str
-
-    @classmethod
-    def of(cls, scenario: Scenario, folder: str) -> "Told":
-        """Of a scenario whose own laws and shapes are in this folder."""
-        return cls(to_toml(scenario), folder)
-
-    def scenario(self) -> Scenario:
-        """The scenario again."""
-        return loads(run_folder.SCENARIO, self.toml, folder=self.folder)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,14 +78,3 @@ class CostOfSteps:
         """Cost by label."""
         scenarios = {label: told.scenario() for label, told in self.told.items()}
         return step_costs(scenarios, self.samples)
-
-
-Job = Trial | CostOfSteps
-
-
-@dataclass(frozen=True, slots=True)
-class Brief:
-    """A job, and the descriptor on which its process tells of it."""
-
-    job: Job
-    tell_fd: int

@@ -10,8 +10,8 @@ from configs.scenario import Scenario
 from configs.sections import LAW
 from fleetloop.compare.jobs import Outcome
 from fleetloop.compare.measures import Measures
-from fleetloop.compare.pool import Failed
 from fleetloop.compare.step_cost import StepCost
+from fleetloop.jobs.pool import Failed
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 from bridge.network.messages import Progress
 from bridge.process.lifecycle import Stop
 from configs.scenario import Scenario
-from fleetloop.compare import pool
-from fleetloop.compare.jobs import CostOfSteps, Told, Trial
+from fleetloop.compare.jobs import CostOfSteps, Trial
 from fleetloop.compare.results import Row
+from fleetloop.jobs import pool
+from fleetloop.jobs.job import Told
 from fleetloop.terminal import note
 
 

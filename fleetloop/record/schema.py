@@ -49,7 +49,8 @@ class Kind(IntEnum):
 
 
 @cache
-def _row_type(signals: tuple[Signal, ...]) -> np.dtype[np.void]:
+def row_type(signals: tuple[Signal, ...]) -> np.dtype[np.void]:
+    """One row: the tick, then the signals by name."""
     fields = [("tick", "<i8"), *((signal.name, "<f8") for signal in signals)]
     return np.dtype(fields)
 
@@ -119,8 +120,8 @@ class Layout:
         return self.controllers[robot_number_of(channel)]
 
     def row_type(self, channel: int) -> np.dtype[np.void]:
-        """One row: the tick, then the signals by name."""
-        return _row_type(self.signals(channel))
+        """One row of a channel."""
+        return row_type(self.signals(channel))
 
     def message_type(self, channel: int) -> np.dtype[np.void]:
         """One message of a channel, as it is in the file."""

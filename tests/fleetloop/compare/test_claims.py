@@ -13,10 +13,11 @@ from bridge.process.lifecycle import Stop
 from configs.loading import load
 from fleetloop.compare.claims import Claim, Verdict, claims
 from fleetloop.compare.contenders import contenders, scenario_under
-from fleetloop.compare.jobs import Outcome, Told, Trial
-from fleetloop.compare.pool import Failed
+from fleetloop.compare.jobs import Outcome, Trial
 from fleetloop.compare.results import Row
 from fleetloop.compare.step_cost import StepCost
+from fleetloop.jobs.job import Told
+from fleetloop.jobs.pool import Failed
 
 SLOW_FILTERS = "adaptive_dsc:gamma_1_s=0.05:gamma_2_s=0.05:gamma_3_s=0.05"
 FAST_LEARNER = "adaptive_dsc:k5=[2.0,2.0,2.0,2.0,2.0,2.0,2.0,2.0]"

@@ -13,10 +13,11 @@ from support.command_line import fleetloop
 
 from bridge.process.lifecycle import Stop
 from configs.loading import load
-from fleetloop.compare import pool
 from fleetloop.compare.contenders import contenders, scenario_under
-from fleetloop.compare.jobs import Told, Trial
+from fleetloop.compare.jobs import Trial
 from fleetloop.compare.runs import Planned, folders
+from fleetloop.jobs import pool
+from fleetloop.jobs.job import Told
 
 LAWS = """
 from dataclasses import dataclass

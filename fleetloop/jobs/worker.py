@@ -4,9 +4,9 @@ import sys
 from multiprocessing.connection import Connection
 
 from bridge.process.lifecycle import Stop, serve
-from fleetloop.compare.jobs import Brief
+from fleetloop.jobs.job import Brief, Done
 
-NAME = "compare"
+NAME = "job"
 
 
 def main() -> int:
@@ -18,7 +18,7 @@ def _work(brief: Brief, stop: Stop) -> str | None:
     with Connection(brief.tell_fd, readable=False) as pipe:
         done = brief.job.work(pipe.send, stop)
         if not stop.requested:
-            pipe.send(done)
+            pipe.send(Done(done))
     return None
 
 

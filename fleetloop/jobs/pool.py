@@ -18,7 +18,7 @@ from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Status, Stop, pack_brief
 from configs.errors import InfrastructureError
 from fleetloop import packages
-from fleetloop.compare.jobs import Brief, Job
+from fleetloop.jobs.job import Brief, Done, Job
 
 SILENCE_S = 60.0
 TERM_GRACE_S = 2.0
@@ -41,7 +41,7 @@ class _Worker:
             with theirs:
                 # -P: a folder here that is named like one of our packages must not shadow it.
                 self._process = subprocess.Popen(
-                    [sys.executable, "-P", "-m", "fleetloop.compare.worker"],
+                    [sys.executable, "-P", "-m", "fleetloop.jobs.worker"],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     pass_fds=[theirs.fileno()],
@@ -108,6 +108,7 @@ def work(
     jobs: Sequence[Job],
     stop: Stop,
     on_progress: Callable[[dict[int, Progress], dict[int, Any]], None] = lambda *_: None,
+    on_told: Callable[[int, Any], None] = lambda *_: None,
     *,
     at_once: int | None = None,
     silence_s: float = SILENCE_S,
@@ -119,6 +120,7 @@ def work(
         jobs: in the order in which they are begun.
         stop: once requested, all processes are ended, and what was done is returned.
         on_progress: told a few times a second how far each job is, and what is done.
+        on_told: told at once what else a job says, by its number.
         at_once: processes at a time; as many as there are processors if not given.
         silence_s: a process that tells nothing for so long is killed.
         clock: of the caller.
@@ -136,7 +138,7 @@ def work(
             while left and len(workers) < most:
                 number, job = left.pop(0)
                 workers[number] = _Worker(number, job, clock)
-            _hear(workers, far, done)
+            _hear(workers, far, done, on_told)
             for number, worker in list(workers.items()):
                 if number not in done and clock.monotonic_s() - worker.heard_s > silence_s:
                     done[number] = Failed(f"stands still: nothing for {silence_s:g} s, ended")
@@ -153,13 +155,22 @@ def work(
     return done
 
 
-def _hear(workers: dict[int, _Worker], far: dict[int, Progress], done: dict[int, Any]) -> None:
+def _hear(
+    workers: dict[int, _Worker],
+    far: dict[int, Progress],
+    done: dict[int, Any],
+    on_told: Callable[[int, Any], None],
+) -> None:
     """Take what processes say, waiting a moment for it."""
     speaking: dict[Any, _Worker] = {worker.pipe: worker for worker in workers.values()}
     for pipe in wait(list(speaking), _LOOK_EVERY_S):
         worker = speaking[pipe]
-        said = worker.hear()
-        if isinstance(said, Progress):
-            far[worker.number] = said
-        else:
-            done[worker.number] = worker.reason() if said is None else said
+        match worker.hear():
+            case None:
+                done[worker.number] = worker.reason()
+            case Done(result=result):
+                done[worker.number] = result
+            case Progress() as state:
+                far[worker.number] = state
+            case said:
+                on_told(worker.number, said)

@@ -1,0 +1,1 @@
+"""`fleetloop campaign`: fault by time by seed, a verdict each."""

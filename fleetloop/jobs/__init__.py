@@ -1,0 +1,1 @@
+"""Jobs of `compare` and `campaign`, each in a process of its own."""
