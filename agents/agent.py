@@ -108,7 +108,7 @@ class Agent:
         """Senders whose first message is required for the start and has not arrived."""
         self.missing = reception.missing
         """Messages that are due at a tick and have not arrived."""
-        self.faults = MessageFaults(brief, self._channel_of)
+        self.faults = MessageFaults(brief, self._channel_of, self._guard.note)
         """Faults of the messages to this robot."""
         self._neighbours, self._edges = reception.neighbours, reception.edges
         self._history = self._pose_history(brief)

@@ -20,13 +20,22 @@ Channels = Callable[[str, int], Channel[Any]]
 
 
 class MessageFaults:
-    """The faults of the messages to one robot."""
+    """The faults of the messages to one robot.
 
-    __slots__ = ("_channel_of", "_period_s", "_schedules", "schedule")
+    Args:
+        brief: of its controller.
+        channel_of: its emulated edges.
+        note: called with the tick, kind and text of the event of each that begins or ends.
+    """
 
-    def __init__(self, brief: AgentBrief, channel_of: Channels) -> None:
+    __slots__ = ("_channel_of", "_note", "_period_s", "_schedules", "schedule")
+
+    def __init__(
+        self, brief: AgentBrief, channel_of: Channels, note: Callable[[int, str, str], None]
+    ) -> None:
         self.schedule = FaultSchedule(one for one in brief.faults if one.fault.PLACE == "agent")
         self._channel_of = channel_of
+        self._note = note
         self._period_s = brief.schedule.period_s
         sources = [LOCALISATION, *(edge.speaker for edge in brief.hears)]
         sources += [LEADER] if brief.leader_link is not None else []
@@ -43,7 +52,10 @@ class MessageFaults:
             self._change(tick)
 
     def _change(self, tick: int) -> None:
-        for source in dict.fromkeys(_source(change.planned) for change in self.schedule.due(tick)):
+        changes = self.schedule.due(tick)
+        for change in changes:
+            self._note(tick, change.event.kind, change.event.text)
+        for source in dict.fromkeys(_source(change.planned) for change in changes):
             delay_s, arrives, cut = 0.0, 1.0, False
             for planned in self.schedule.acting:
                 if _source(planned) != source:

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from configs.edges import FOREVER
+from configs.events import Event
 from configs.faults.base import PlannedFault
 
 
@@ -19,11 +20,15 @@ class Change(NamedTuple):
     acts: bool
     """Whether it acts from this tick on; of one that is an instant: it acts at this tick."""
 
-    def __str__(self) -> str:
-        planned = self.planned
-        what = "applied" if self.acts else "cleared"
-        kind = "" if planned.name == planned.fault.kind else f" ({planned.fault.kind})"
-        return f"{planned.target}: fault {planned.name}{kind} {what}"
+    @property
+    def event(self) -> Event:
+        """The change as an event of its robot: of a link, of the one that hears it."""
+        name, target, fault, *_ = self.planned
+        source, arrow, robot = target.rpartition(" -> ")
+        kind = "" if name == fault.kind else f" ({fault.kind})"
+        where = f" on {source}{arrow}{robot}" if arrow else ""
+        what = "fault_applied" if self.acts else "fault_cleared"
+        return Event(self.tick, robot, what, f"{name}{kind}{where}")
 
 
 class FaultSchedule:

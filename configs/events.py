@@ -47,6 +47,8 @@ KINDS: dict[str, EventKind] = {
     "left": EventKind("a robot leaves the formation, as the scenario has it"),
     "diverged": EventKind("the motion of a body left its bounds"),
     "law": EventKind("a law recorded a number that isn't finite"),
+    "fault_applied": EventKind("a fault of the scenario, or an ordered one, begins to act"),
+    "fault_cleared": EventKind("a fault acts no more"),
     "bus_trouble": EventKind("a bus failed, or drives ignored frames", exact=False),
     "stalled": EventKind("a process, or its machine, stood still", exact=False),
     "silent": EventKind("a process shows no sign of life", exact=False),

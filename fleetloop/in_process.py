@@ -23,6 +23,7 @@ from configs.events import Event
 from configs.faults.base import PlannedFault
 from fleetloop.record.writer import Source
 from plant.bus.build import build_buses
+from plant.faults import fault_events
 from plant.herald import Herald
 from plant.robot import EmulatedRobot, emulated_robot
 from plant.troubles import diverged_robots, divergences
@@ -171,7 +172,13 @@ class InProcessRun:
         for agent in self._agents:
             agent.guard.announce = on_event
         period_ns = plant.schedule.period_ns
-        self._herald = Herald(lambda _: divergences(self._robots, period_ns), on_event)
+        self._herald = Herald(
+            lambda _: (
+                divergences(self._robots, period_ns)
+                | fault_events(bus.faults for bus in self._buses.values())
+            ),
+            on_event,
+        )
         self._on_progress = on_progress
         ends = dict(zip(self._robots, zip(self._agents, self._truths, strict=True), strict=True))
 

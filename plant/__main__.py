@@ -38,6 +38,7 @@ from configs.connections import Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError
 from configs.events import Event
 from configs.roles import AGENT, PLANT
+from plant.faults import fault_events
 from plant.herald import Herald
 from plant.lockstep import LockstepLoop, PlantCounters
 from plant.orders import PlantOrders
@@ -135,6 +136,7 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         hellos.add(truth, Rows(0, 0, b"", False).encode())
 
     stalls: list[Stall] = []
+    loop: LockstepLoop | RealtimeLoop | None = None
 
     def news(tick: int) -> dict[str, Event]:
         troubles = bus_troubles(end.troubles(), emulated)
@@ -151,7 +153,8 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
             )
             for stall in stalls
         }
-        return buses | late | divergences(emulated, brief.schedule.period_ns)
+        changes = fault_events(bus.faults for bus in loop.buses.values()) if loop else {}
+        return buses | late | divergences(emulated, brief.schedule.period_ns) | changes
 
     notice = link.publisher(keys.notice(name, PLANT.name))
     herald = Herald(news, lambda event: notice.put(Notice(event).encode()))
@@ -169,7 +172,7 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         missing_privileges = go_realtime(PLANT_PRIORITY)
         by_name = {other.robot: other for other in others}
         record = partial(_record, link, by_name, rows[len(emulated) :], brief.schedule.period_s)
-        wall = RealtimeLoop(
+        loop = wall = RealtimeLoop(
             brief, emulated, end, hub, poses, rows[: len(emulated)], say, taps, record, orders
         )
         counters, progress_of, stalls = wall.counters, wall.progress, wall.lateness.stalls

@@ -13,6 +13,7 @@ from typing import Any
 
 from bridge.fault_schedule import FaultSchedule
 from configs.brief import Schedule
+from configs.events import Event
 from configs.faults.base import PlannedFault
 from plant.disturbance import Disturbances
 from plant.effects import PoseDrift, RobotEffects, WheelEffects, of_side
@@ -231,3 +232,12 @@ class BusFaults:
             if planned.fault.kind in STRIKES:
                 STRIKES[planned.fault.kind](self._robots[planned.target], planned.fault, bus_ns)
         self.disturbances.follow(self.schedule.acting, changes)
+
+
+def fault_events(faults: Iterable[BusFaults]) -> dict[str, Event]:
+    """All beginnings and ends of faults so far, each under a name of its own."""
+    return {
+        f"fault {bus} {n}": change.event
+        for bus, of_bus in enumerate(faults)
+        for n, change in enumerate(of_bus.schedule.log)
+    }

@@ -115,8 +115,11 @@ class LockstepLoop:
         def begin(group: Sequence[EmulatedRobot]) -> Callable[[int], None]:
             return partial(self._begin, [(robot, ends[robot]) for robot in group])
 
-        buses = build_buses(brief, robots, lambda name, _: SocketPort(name, hub, hub), begin, taps)
-        self._lanes = {name: _Lane(bus, first) for name, bus in buses.items()}
+        self.buses = build_buses(
+            brief, robots, lambda name, _: SocketPort(name, hub, hub), begin, taps
+        )
+        """By name."""
+        self._lanes = {name: _Lane(bus, first) for name, bus in self.buses.items()}
         self._slowest = first
         self._at_slowest = len(self._lanes)
         self._held: list[_Lane] = []
@@ -171,7 +174,7 @@ class LockstepLoop:
         lanes = [lane for lane in self._lanes.values() if not lane.done]
         if self._orders is not None and lanes:
             latest = max(lane.tick for lane in lanes)
-            self._orders.take([lane.bus for lane in self._lanes.values()], latest + 1)
+            self._orders.take(self.buses.values(), latest + 1)
 
     # --- one bus -------------------------------------------------------------------------------
 

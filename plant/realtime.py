@@ -56,10 +56,11 @@ class RealtimeLoop:
         self._end = end
         self._report = report
         external = {robot.brief.bus for robot in robots}.difference(hub.names)
-        self._buses = build_buses(
+        self.buses = build_buses(
             brief, robots, lambda name, _: SocketPort(name, end, hub), no_begin, taps, external
         )
-        self._acting = [bus for bus in self._buses.values() if bus.acts_between_ticks]
+        """By name."""
+        self._acting = [bus for bus in self.buses.values() if bus.acts_between_ticks]
         """Buses on which something happens between two ticks."""
         self._poses = dict(zip(robots, poses, strict=True))
         self._rows = dict(zip(robots, rows, strict=True))
@@ -90,7 +91,7 @@ class RealtimeLoop:
             self.counters.overruns += now_ns > due_ns + schedule.period_ns
             self.lateness.note(self._tick, (now_ns - due_ns) * 1e-9)
             if self._orders is not None and self._orders.waiting:
-                self._orders.take(self._buses.values(), self._tick)
+                self._orders.take(self.buses.values(), self._tick)
             self._keep_tick(power_up_ns)
             self._tick += 1
             if now_ns >= self._next_report_ns:
@@ -101,7 +102,7 @@ class RealtimeLoop:
         while self._end.clients() and self._clock.monotonic_s() < deadline and not stop.requested:
             self._serve(0.01, power_up_ns)
         self.counters.wall_ns = max(self._clock.monotonic_ns() - epoch_ns, 0)
-        for name, bus in self._buses.items():
+        for name, bus in self.buses.items():
             self.counters.frames[name] = bus.crossed
             self.counters.add_nodes(name, bus.node_counts())
 
@@ -112,7 +113,7 @@ class RealtimeLoop:
             wait_s = min(wait_s, max(left_ns, 0) * 1e-9)
         self._end.serve(wait_s)
         for bus in self._end.pending():
-            self._buses[bus].react(self._clock.monotonic_ns() - power_up_ns)
+            self.buses[bus].react(self._clock.monotonic_ns() - power_up_ns)
         for acting in self._acting:
             acting.advance(self._clock.monotonic_ns() - power_up_ns)
 
@@ -122,7 +123,7 @@ class RealtimeLoop:
         bus_ns, t_ns = schedule.bus_time_ns(tick), tick * schedule.period_ns
         if 0 <= tick < schedule.ticks:
             self._record_others(tick)
-        for bus in self._buses.values():
+        for bus in self.buses.values():
             bus.move(bus_ns)
             bus.faults.begin(tick)
             for robot in bus.robots:

@@ -24,7 +24,7 @@ def list_faults(run: str, *, as_json: bool, as_toml: bool) -> None:
         name = client.run
     faults = said["faults"]
     if as_toml:
-        say(tomli_w.dumps({"fault": [one["table"] for one in faults if one["table"]]}).rstrip())
+        say(tomli_w.dumps({"fault": said["tables"]}).rstrip())
     elif as_json:
         say_json({"run": name} | said)
     elif faults:

@@ -24,6 +24,7 @@ def stats_of(outcome: Outcome, *, realtime: bool, period_s: float) -> RunStats:
         teardown_s=outcome.teardown_s,
         machine=outcome.machine,
         refused=outcome.refused,
+        faults=outcome.faults,
         clocks=outcome.clocks,
     )
     stats.cpu_s["launcher"] = round(outcome.cpu_ns * 1e-9, 3)

@@ -1,7 +1,8 @@
 """Faults ordered during a run: requests of its door become orders, answers of processes answers.
 
     request        arguments          answer
-    fault.list     -                  faults: all of the run, each with its state
+    fault.list     -                  faults: all of the run, each with its state; tables: the
+                                      entries of [[fault]] that repeat them
     fault.inject   fault              fault: as it acts, from the tick at which it begins
     fault.clear    names ([]: all)    cleared: those that end, with the tick at which they do
 
@@ -131,7 +132,8 @@ class FaultDesk:
 
     def _list(self, respond: Respond) -> None:
         tick = self._tick()
-        respond({"tick": tick, "t_s": self._seconds(tick), "faults": self.ledger.rows(tick)})
+        rows, tables = self.ledger.rows(tick), self.ledger.tables()
+        respond({"tick": tick, "t_s": self._seconds(tick), "faults": rows, "tables": tables})
 
     def _inject(self, respond: Respond, fault: dict[str, Any]) -> None:
         tick = self._tick()

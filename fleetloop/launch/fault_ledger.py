@@ -114,9 +114,12 @@ class FaultLedger:
             "from_s": self._seconds(entry.from_tick),
             "to_tick": last,
             "to_s": None if last is None else self._seconds(last),
-            "table": self._table(entry),
         }
         return row | ({"ticks": entry.ticks} if entry.ticks else {})
+
+    def tables(self) -> list[dict[str, Any]]:
+        """The entries of [[fault]] that repeat all faults as they were, or are to be."""
+        return [table for one in self._entries.values() if (table := self._table(one))]
 
     def _table(self, entry: Entry) -> dict[str, Any]:
         """The table of [[fault]] that repeats a fault as it was; empty: it never acted."""

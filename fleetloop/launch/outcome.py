@@ -21,6 +21,7 @@ class Outcome:
     cpu_ns: int = 0  # of the launcher, from the first tick on
     reports: dict[str, Report] = field(default_factory=dict)
     said: dict[str, list[Event]] = field(default_factory=dict)  # by a process, as they came
+    faults: list[dict[str, Any]] = field(default_factory=list)  # of `fleetloop.launch.fault_ledger`
     events: dict[str, list[Event]] = field(default_factory=dict)  # of a process, as observed here
     remarks: dict[str, list[str]] = field(default_factory=dict)  # of launcher and router
     clocks: dict[str, dict[str, float]] = field(default_factory=dict)

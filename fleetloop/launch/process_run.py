@@ -335,6 +335,7 @@ class ProcessRun:
         """Add what machine, router and the launcher's own reading say of the run."""
         outcome, words = self.outcome, self._plane.words
         outcome.machine = self._machine.report()
+        outcome.faults = self._desk.ledger.rows(outcome.ticks)
         if refusals := link.denials.notes():
             outcome.remarks["router"] = refusals
         outcome.clocks = self._plane.clocks.account()

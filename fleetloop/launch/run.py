@@ -22,6 +22,7 @@ from fleetloop.check.finding import in_words, titled
 from fleetloop.in_process import InProcessRun
 from fleetloop.launch import placement, wall_time
 from fleetloop.launch.accounts import stats_of
+from fleetloop.launch.fault_ledger import FaultLedger
 from fleetloop.launch.process_run import ProcessRun
 from fleetloop.record.background import BackgroundWriter
 from fleetloop.record.reader import Record
@@ -278,6 +279,7 @@ def run_in_process(
         frames_per_bus=run.frames,
         nodes=run.nodes,
         stopped_robots=run.stopped_robots,
+        faults=FaultLedger(scenario).rows(run.ticks),
         events=run.events,
         remarks=run.remarks,
         messages=run.messages,

@@ -46,6 +46,7 @@ class RunStats:
     waits_s: dict[str, dict[str, float]] = field(default_factory=dict)
     stopped_robots: dict[str, str] = field(default_factory=dict)
     events: list[Event] = field(default_factory=list)  # of a source in their order
+    faults: list[dict[str, Any]] = field(default_factory=list)  # of `fleetloop.launch.fault_ledger`
     remarks: dict[str, list[str]] = field(default_factory=dict)  # on the whole run, by process
     clocks: dict[str, dict[str, float]] = field(default_factory=dict)  # offsets, by process
     refused: dict[str, dict[str, int]] = field(default_factory=dict)  # by kind, by identity
@@ -108,6 +109,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
             for robot in scenario.names
             if robot in stats.stopped_robots
         },
+        "faults": stats.faults,
         "events": [
             {"tick": it.tick, "t_s": _seconds(it.tick * scenario.clock.control_period_s)}
             | {"source": it.source, "kind": it.kind, "text": it.text}

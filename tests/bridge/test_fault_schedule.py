@@ -3,10 +3,12 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.fault_schedule import FaultSchedule
+from bridge.fault_schedule import Change, FaultSchedule
 from configs.edges import FOREVER
+from configs.events import Event
 from configs.faults.base import PlannedFault
 from configs.faults.bodies import Push
+from configs.faults.messages import LinkPartition
 from configs.faults.powertrains import DriveEvent
 
 PUSH = Push(kind="push", at_s=0.0)
@@ -44,7 +46,7 @@ def test_an_instant_strikes_once_and_acts_no_more() -> None:
     assert schedule.due(2) == []
     (change,) = schedule.due(3)
     assert change.acts
-    assert str(change) == "r1: fault stop (drive_estop) applied"
+    assert change.event == Event(3, "r1", "fault_applied", "stop (drive_estop)")
     assert schedule.acting == ()
     assert schedule.next_tick == FOREVER
 
@@ -55,10 +57,10 @@ def test_an_ordered_fault_acts_at_the_next_tick_and_ends_at_the_tick_at_which_it
     schedule = FaultSchedule([])
     assert schedule.next_tick == FOREVER
     schedule.add(pushes("push", 5, None))
-    assert [str(one) for one in schedule.due(9)] == ["r1: fault push applied"]
+    assert [one.event for one in schedule.due(9)] == [Event(9, "r1", "fault_applied", "push")]
     assert schedule.clear("push", 12)
     assert schedule.next_tick == 12
-    assert [str(one) for one in schedule.due(12)] == ["r1: fault push cleared"]
+    assert [one.event for one in schedule.due(12)] == [Event(12, "r1", "fault_cleared", "push")]
     assert not schedule.clear("push", 13)
 
 
@@ -83,3 +85,10 @@ def test_of_a_controller_that_was_started_again_no_fault_acts_that_is_over() -> 
     schedule = FaultSchedule([pushes("gone", 5, 9), pushes("going", 5, 90)])
     assert [one.planned.name for one in schedule.due(50)] == ["going"]
     assert schedule.next_tick == 90
+
+
+def test_a_change_of_a_link_is_an_event_of_the_robot_that_hears_it() -> None:
+    cut = LinkPartition(kind="link_partition", at_s=0.0)
+    change = Change(7, PlannedFault("cut", "leader -> r2", cut, 0, 7), acts=False)
+    said = "cut (link_partition) on leader -> r2"
+    assert change.event == Event(7, "r2", "fault_cleared", said)

@@ -1,5 +1,7 @@
 """Faults ordered during a run: at the tick that is answered, as if the scenario had listed them."""
 
+import json
+import re
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +15,7 @@ from support.command_line import fleetloop
 from support.processes import Run, completed, running
 
 from fleetloop.door.client import RefusedError, RunClient, open_run
-from fleetloop.results.run_folder import SCENARIO, read_record
+from fleetloop.results.run_folder import SCENARIO, SUMMARY, read_record
 
 pytestmark = pytest.mark.system
 
@@ -57,16 +59,27 @@ def test_they_leave_the_record_of_a_scenario_that_lists_them_at_these_ticks(tmp_
         assert shove["from_tick"] < ended["to_tick"] < shove["to_tick"]
         (ended,) = client.ask("fault.clear", names=["link_partition"])["cleared"]
         assert ended["to_tick"] > cut["from_tick"]
-        listed = client.ask("fault.list")["faults"]
+        tables = client.ask("fault.list")["tables"]
         status, out = run.end()
     assert status == 0, out
-    tables = [one["table"] for one in listed]
     assert len(tables) == 5
     scenario = tomllib.loads((a / SCENARIO).read_text()) | {"fault": tables}
     (tmp_path / "listed.toml").write_text(tomli_w.dumps(scenario))
     status, out = completed(b, str(tmp_path / "listed.toml"), "--in-process")
     assert status == 0, out
     assert same_but_for_ages(a, b)
+    summaries = [json.loads((folder / SUMMARY).read_text()) for folder in (a, b)]
+    changes, in_process = (
+        [one for one in it["events"] if one["kind"].startswith("fault")] for it in summaries
+    )
+    assert changes == in_process
+    assert [one["kind"] for one in changes].count("fault_applied") == 7  # of 5 faults, by target
+    said = r"r2: tick \d+ \(t = .* s\): fault_applied: shove \(push\)"
+    assert re.search(said, out), out
+    assert [one["state"] for one in summaries[0]["faults"]] == [
+        *("cleared", "cleared", "acting", "over", "acting")
+    ]
+    assert [one["ordered"] for one in summaries[1]["faults"]] == [False] * 5
     rows = read_record(b, partial=False).controller["r2"]
     assert rows["age_of_r1_s"].max() > 0.1  # the cut was there
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from bridge.fault_schedule import FaultSchedule
 from bridge.network.fault_orders import FaultAnswer, FaultOrder, targets_to
 from bridge.network.packing import pack, unpack
+from configs.events import Event
 from configs.faults.bodies import Push
 from configs.faults.kinds import KINDS
 from configs.faults.messages import LinkLoss
@@ -82,11 +83,11 @@ def test_it_acts_on_its_targets_from_a_tick_on_as_a_listed_fault_does() -> None:
     one, other = FaultSchedule([]), FaultSchedule([])
     schedules = {"r1": one, "r2": other}
     assert order().act(schedules, 50, 0.002) == 50
-    assert [str(it) for it in one.due(50)] == ["r1: fault shove (push) applied"]
+    assert [it.event for it in one.due(50)] == [Event(50, "r1", "fault_applied", "shove (push)")]
     (planned,) = one.acting
     assert (planned.from_tick, planned.to_tick, planned.fault.at_s) == (50, 60, 0.1)
     assert order()._replace(ends=True).act(schedules, 55, 0.002) == 55
-    assert [str(it) for it in one.due(55)] == ["r1: fault shove (push) cleared"]
+    assert [it.event for it in one.due(55)] == [Event(55, "r1", "fault_cleared", "shove (push)")]
     assert "r2: nothing here" in str(order().act({"r1": one}, 70, 0.002))
     assert one.next_tick > 10**6  # nothing of a refused order is left
 
