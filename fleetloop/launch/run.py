@@ -11,7 +11,7 @@ from bridge.process.lifecycle import Stop, keep_to_itself
 from configs.connections import NetworkLink
 from configs.deployment import Deployment, load_deployment
 from configs.errors import ExitStatus, FleetloopError, InfrastructureError, ScenarioError
-from configs.events import KINDS, Event, told
+from configs.events import KINDS, Event, in_order, told
 from configs.loading import load, to_toml
 from configs.overrides import Overrides
 from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of
@@ -25,6 +25,7 @@ from fleetloop.launch.accounts import stats_of
 from fleetloop.launch.fault_ledger import FaultLedger
 from fleetloop.launch.process_run import ProcessRun
 from fleetloop.record.background import BackgroundWriter
+from fleetloop.record.events_file import EVENTS, events_file
 from fleetloop.record.reader import Record
 from fleetloop.record.run_record import RunRecord
 from fleetloop.record.scan import RecordError
@@ -304,6 +305,8 @@ def _finish(
     unsaved: InfrastructureError | None = None
     try:
         run_folder.write(folder / run_folder.SUMMARY, to_json(summary))
+        events = in_order(stats.events, scenario.names)
+        run_folder.write(folder / EVENTS, events_file(events, schedule(scenario).period_ns))
     except InfrastructureError as error:
         unsaved = error  # results first
     if not options.as_json:

@@ -89,10 +89,11 @@ def polygon_distance(places: np.ndarray, corners: np.ndarray) -> np.ndarray:
     distance from itself.
     """
     nearest = np.full(len(places), np.nan)
+    square = (corners**2).sum(axis=1)
     for start in range(0, len(places), _BLOCK):
         block = places[start : start + _BLOCK]
-        square = ((block[:, None, :] - corners[None, :, :]) ** 2).sum(axis=2)
-        corner = np.argmin(square, axis=1)
+        # |p − c|² without |p|², which is the same for all corners.
+        corner = np.argmin(square - 2.0 * (block @ corners.T), axis=1)
         before = _side_distance(block, corners, np.maximum(corner - 1, 0))
         behind = _side_distance(block, corners, np.minimum(corner, len(corners) - 2))
         nearest[start : start + _BLOCK] = np.minimum(before, behind)

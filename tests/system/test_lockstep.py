@@ -98,6 +98,8 @@ def test_a_robot_joins_and_leaves_at_the_same_ticks_over_processes(tmp_path: Pat
     summaries = [json.loads((tmp_path / name / "summary.json").read_text()) for name in "ab"]
     events, in_process = (summary["events"] for summary in summaries)
     assert events == in_process
+    files = [(tmp_path / name / "events.mcap").read_bytes() for name in "ab"]
+    assert files[0] == files[1]
     assert [(it["source"], it["kind"]) for it in events[:2]] == [("r1", "armed"), ("r2", "armed")]
     assert max(it["tick"] for it in events[:2]) < 0
     assert [(it["t_s"], it["kind"]) for it in events[2:]] == [(0.2, "joined"), (0.5, "left")]
