@@ -22,6 +22,7 @@ from fleetloop.fault.app import app as fault_app
 from fleetloop.graph.app import graph
 from fleetloop.launch.app import agent, network, plant, run
 from fleetloop.options import VersionOption
+from fleetloop.replay.app import replay
 from fleetloop.results.app import diff, export, report
 from fleetloop.suite.app import test
 
@@ -65,6 +66,7 @@ for verb in (
     report,
     export,
     diff,
+    replay,
     init,
 ):
     app.command()(verb)

@@ -55,6 +55,25 @@ PartialOption = Annotated[
         " it, with 1 if it is cut, 2 if it is damaged.",
     ),
 ]
+ToleranceOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--tolerance",
+        metavar="NUMBER|SIGNAL=NUMBER",
+        help="Values this close are alike, in the signal's unit. May be repeated; that of a signal"
+        " goes before that of all. Default: bit for bit.",
+    ),
+]
+ByOption = Annotated[
+    str,
+    typer.Option(
+        "--by",
+        metavar="first|size",
+        help="Rank signals by their first difference, or by the size of the largest, measured by"
+        " the signal's peak.",
+    ),
+]
+AllOption = Annotated[bool, typer.Option("--all", help="Show every signal that differs.")]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -90,6 +109,13 @@ def listed(option: str, text: str | None) -> tuple[str, ...]:
     if text is not None and not names:
         raise ScenarioError(f"{option} {text!r}: names nothing; leave it out for all")
     return names
+
+
+def size_first(by: str) -> bool:
+    """Whether `--by` ranks by size."""
+    if by not in ("first", "size"):
+        raise ScenarioError(f"--by {by}: must be first or size")
+    return by == "size"
 
 
 def overrides_of(

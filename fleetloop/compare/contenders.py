@@ -64,23 +64,33 @@ def contenders(text: str) -> tuple[Contender, ...]:
         raise ScenarioError(f"--laws {text!r}: names no law; for example adaptive_dsc,fixed_dsc")
     if twice := next((one for one in labels if labels.count(one) > 1), None):
         raise ScenarioError(f"--laws {text}: {twice} comes twice")
-    return tuple(map(_contender, labels))
+    return tuple(contender(label, f"--laws {label}") for label in labels)
 
 
-def _contender(label: str) -> Contender:
+def contender(label: str, option: str) -> Contender:
+    """One law with its gains; `option` is what a complaint names.
+
+    Raises:
+        ScenarioError: it gives a gain no value.
+    """
     parts = label.split(":")
     first = next((n for n, part in enumerate(parts) if "=" in part), len(parts))
     gains: dict[str, object] = {}
     for part in parts[first:]:
         override = Override.from_set(f"control.{part}")
         if isinstance(override, Complaint):
-            raise ScenarioError(f"--laws {label}: {part!r} must read gain=value")
+            raise ScenarioError(f"{option}: {part!r} must read gain=value")
         gains[override.key.removeprefix("control.")] = override.value
     return Contender(label, ":".join(parts[:first]), gains)
 
 
 def scenario_under(
-    scenario: Scenario, contender: Contender, *, folder: str, seed: int | None = None
+    scenario: Scenario,
+    contender: Contender,
+    *,
+    folder: str,
+    seed: int | None = None,
+    option: str | None = None,
 ) -> Scenario:
     """The scenario with this law and seed, its expectations of signals that any law has.
 
@@ -89,11 +99,12 @@ def scenario_under(
         contender: the law.
         folder: where modules of the user's own are looked for first.
         seed: instead of the scenario's.
+        option: named by complaints; `--laws` with the law if it isn't given.
 
     Raises:
         ScenarioError: the law can't be had, or a gain is wrong; it names the option.
     """
-    option = f"--laws {contender.label}"
+    option = option or f"--laws {contender.label}"
     known = _gains_of(contender.law, folder)
     fleet = _under(contender, known, table_of(scenario.control, LAW.key))
     overrides = [Override(option, "control", fleet)]

@@ -6,7 +6,15 @@ from typing import Annotated
 import typer
 
 from fleetloop import numbers
-from fleetloop.options import PartialOption, RunArg, listed
+from fleetloop.options import (
+    AllOption,
+    ByOption,
+    PartialOption,
+    RunArg,
+    ToleranceOption,
+    listed,
+    size_first,
+)
 
 
 def report(run: RunArg, partial: PartialOption = False) -> None:
@@ -76,10 +84,23 @@ def export(
 def diff(
     a: Annotated[Path, typer.Argument(metavar="A", help="A run's folder, or its record.mcap.")],
     b: Annotated[Path, typer.Argument(metavar="B", help="The other run.")],
+    tolerance: ToleranceOption = None,
+    by: ByOption = "first",
+    whole: AllOption = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     partial: PartialOption = False,
 ) -> None:
-    """Compare two runs bit for bit; name the first tick, robot and field that differ."""
+    """Compare two runs bit for bit, or within a tolerance; rank the signals that differ."""
     from fleetloop.results.diff import print_comparison
+    from fleetloop.results.divergence import Tolerance
 
-    raise typer.Exit(print_comparison(a, b, as_json=as_json, partial=partial))
+    status = print_comparison(
+        a,
+        b,
+        as_json=as_json,
+        partial=partial,
+        tolerance=Tolerance.parse(tolerance or ()),
+        size_first=size_first(by),
+        whole=whole,
+    )
+    raise typer.Exit(status)

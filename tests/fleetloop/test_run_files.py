@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from configs.errors import ScenarioError
 from configs.loading import load
 from fleetloop.launch.run import RunOptions, run_scenario
 from fleetloop.record.reader import Record
 from fleetloop.results.diff import compare, print_comparison
+from fleetloop.results.divergence import Tolerance
 from fleetloop.results.report import write_report
 
 
@@ -125,11 +127,11 @@ def test_a_single_bit_is_a_difference_and_so_is_the_sign_of_zero(finished_run: P
     b = Record.open(finished_run / "record.mcap")
     rows = b.controller["r1"]
     rows["s"][0] = -0.0
-    found = compare(a, b)
+    found = compare(a, b).first
     assert (found.tick, found.robot, found.field) == (0, "r1", "s")
     rows["s"][0] = 0.0
     rows["mu"][1999] = np.nextafter(rows["mu"][1999], 1.0)
-    found = compare(a, b)
+    found = compare(a, b).first
     assert (found.tick, found.robot, found.field) == (1999, "r1", "mu")
 
 
@@ -137,5 +139,51 @@ def test_a_shorter_run_differs_where_it_ends(finished_run: Path) -> None:
     a = Record.open(finished_run / "record.mcap")
     b = Record.open(finished_run / "record.mcap")
     b.plant["r1"] = b.plant["r1"][:100]
-    found = compare(a, b)
+    found = compare(a, b).first
     assert (found.tick, found.field) == (100, "number of ticks")
+
+
+def test_runs_of_other_robots_signals_and_ends_are_told_apart(
+    finished_run: Path, tmp_path: Path, capsys
+) -> None:
+    other = tmp_path / "other"
+    changed = ("until_s=1.0", "control.law='adaptive_dsc_robust'", "robot.r2.name='r9'")
+    edges = ("graph.edges=['r1 -> r9']",)
+    options = RunOptions(
+        in_process=True, overrides=(*changed, *edges), out=other, figures=False, as_json=True
+    )
+    run_scenario("two_robots", options)
+    capsys.readouterr()
+    assert print_comparison(finished_run, other, as_json=False) == 1
+    out = capsys.readouterr().out
+    assert "robot (all), record robots: 'r2' in A, 'r9' in B" in out
+    assert "also unlike: tick 500, robot r1, plant number of ticks: 2000 in A, 500 in B" in out
+    assert print_comparison(finished_run, other, as_json=True) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert {one["robot"] for one in said["unlike"]} == {"(all)", "r1"}
+    assert said["signals"][0]["first"]["robot"] == "r1"
+
+
+def test_within_a_tolerance_runs_are_alike_and_an_unknown_signal_is_refused(
+    finished_run: Path, tmp_path: Path, capsys
+) -> None:
+    other = tmp_path / "other"
+    options = RunOptions(
+        in_process=True,
+        overrides=("robot.r2.control.k1=2.001",),
+        out=other,
+        figures=False,
+        as_json=True,
+    )
+    run_scenario("two_robots", options)
+    capsys.readouterr()
+    assert print_comparison(finished_run, other, as_json=False, size_first=True) == 1
+    assert "signals by the size of their difference" in capsys.readouterr().out
+    close = Tolerance.parse(["0.01"])
+    assert print_comparison(finished_run, other, as_json=False, tolerance=close) == 0
+    assert "within the tolerance: 2000 ticks of 2 robots" in capsys.readouterr().out
+    unknown = Tolerance.parse(["no_such=1"])
+    with pytest.raises(
+        ScenarioError, match=r"--tolerance no_such=1: no such signal; there are .*s"
+    ):
+        print_comparison(finished_run, other, as_json=False, tolerance=unknown)
