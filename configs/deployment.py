@@ -20,6 +20,8 @@ from configs import patterns
 from configs.complaints import complaints, refusal
 from configs.connections import OURS, Settings
 from configs.errors import Complaint, Problem, ScenarioError
+from configs.faults.base import Fault
+from configs.faults.plan import targets_of
 from configs.files import expanded
 from configs.parameters import (
     FilePath,
@@ -158,6 +160,16 @@ class Deployment(BaseModel):
             return section.emulated
         return self.is_ours(robot) or section.plant_bus is not None
 
+    def fault_problem(self, fault: Fault, robot: str) -> str | None:
+        """Why a fault can't act on a robot where this places it; None: it can."""
+        if fault.PLACE != "plant":
+            return None
+        if not self.emulates(robot):
+            return f"isn't emulated: {fault.kind} can't act on it"
+        if "wire" in fault.NEEDS and not self.is_ours(robot):
+            return f"the timing of its bus isn't emulated: {fault.kind} can't act on it"
+        return None
+
     def runs_here(self, role: str) -> bool:
         """Whether `fleetloop run` starts this role."""
         return self.roles is None or role in self.roles
@@ -236,6 +248,12 @@ def _problems(deployment: Deployment, scenario: Scenario) -> list[Problem]:
         if user in identities or user.startswith(f"{AGENT.name}-"):
             problems.append(Problem(f"network.guests.{user}", user, "is a role's name"))
     problems += _network_problems(deployment.network)
+    problems += [
+        Problem(f"robot.{robot}", robot, reason)
+        for fault in scenario.fault
+        for robot in targets_of(fault, scenario)
+        if (reason := deployment.fault_problem(fault, robot)) is not None
+    ]
     places: dict[tuple[object, object], str] = {}
     for robot, section in deployment.robot.items():
         key = f"robot.{robot}"

@@ -62,7 +62,7 @@ class FaultDesk:
     Args:
         scenario: of the run.
         schedule: of the run.
-        emulates: whether the plant emulates a robot.
+        fault_problem: why a fault can't act on a robot where the deployment places it.
         tick: how far the run is.
         now: seconds on the launcher's clock of awake time.
     """
@@ -71,14 +71,14 @@ class FaultDesk:
         self,
         scenario: Scenario,
         schedule: Schedule,
-        emulates: Callable[[str], bool],
+        fault_problem: Callable[[Fault, str], str | None],
         tick: Callable[[], int],
         now: Callable[[], float],
     ) -> None:
         self.ledger = FaultLedger(scenario)
         self._scenario = scenario
         self._schedule = schedule
-        self._emulates = emulates
+        self._fault_problem = fault_problem
         self._tick = tick
         self._now = now
         self._publishers: dict[str, Publisher] = {}
@@ -231,9 +231,9 @@ class FaultDesk:
             raise ScenarioError(
                 f"{fault.kind}: can't be ordered during a run: list it in [[fault]]"
             )
-        real = [robot for robot in targets if fault.PLACE == "plant" and not self._emulates(robot)]
-        if real:
-            raise ScenarioError(f"{real[0]}: isn't emulated: {fault.kind} can't act on it")
+        for target in targets:
+            if (problem := self._fault_problem(fault, target)) is not None:
+                raise ScenarioError(f"{target}: {problem}")
 
     def _complete(self, number: int) -> None:
         pending = self._pending.pop(number)

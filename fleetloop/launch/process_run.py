@@ -105,7 +105,7 @@ class ProcessRun:
         self._desk = FaultDesk(
             scenario,
             self._schedule,
-            self._deployment.emulates,
+            self._deployment.fault_problem,
             lambda: self.outcome.ticks,
             self._now,
         )

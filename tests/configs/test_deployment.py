@@ -52,6 +52,34 @@ def test_the_plant_may_have_an_interface_of_its_own_to_the_same_bus() -> None:
     assert placed.plant_bus_of("r1") == tuple(sorted(plant_bus.items()))
 
 
+@pytest.mark.parametrize(
+    ("kind", "emulated", "problem"),
+    [
+        ("push", False, "isn't emulated: push can't act on it"),
+        ("can_drop", False, "isn't emulated: can_drop can't act on it"),
+        ("can_corrupt", True, "the timing of its bus isn't emulated: can_corrupt can't act on it"),
+        ("node_babbling", True, "node_babbling can't act on it"),
+        ("can_drop", True, None),
+        ("bus_cut", True, None),
+        ("localisation_outage", False, None),
+    ],
+)
+def test_a_fault_that_cannot_act_where_a_robot_is_placed_is_refused(
+    kind: str, emulated: bool, problem: str | None
+) -> None:
+    faults = (f'fault=[{{kind="{kind}", at_s=1.0}}]', 'bus.timing="wire"', 'clock.mode="realtime"')
+    data = {"robot": {"r1": {"bus": VCAN, "emulated": emulated}}}
+    scenario = load("two_robots_100hz", faults)
+    if problem is None:
+        check_deployment("where.toml", data, scenario, Path())
+        return
+    with pytest.raises(ScenarioError) as caught:
+        check_deployment("where.toml", data, scenario, Path())
+    (line,) = str(caught.value).splitlines()
+    assert "robot.r1" in line
+    assert problem in line
+
+
 def test_what_is_not_among_the_roles_is_elsewhere() -> None:
     placed = check(roles=["plant", "recorder", "agent/r2"], network=NETWORK)
     assert placed.elsewhere(load("two_robots_100hz")) == ("agent/r1",)

@@ -81,6 +81,11 @@ def test_each_process_is_told_the_faults_that_act_in_it() -> None:
         ('{kind="link_loss", at_s=1.0, edges=["r2 -> r1"]}', "fault.0.edges", "no such edge"),
         ('{kind="under_voltage", at_s=1.0}', "fault.0.kind", "drive.preset = 'realistic'"),
         ('{kind="can_corrupt", at_s=1.0}', "fault.0.kind", "bus.timing = 'wire'"),
+        ('{kind="node_bus_off", at_s=1.0}', "fault.0.kind", "bus.timing = 'wire'"),
+        ('{kind="node_babbling", at_s=1.0}', "fault.0.kind", "bus.timing = 'wire'"),
+        ('{kind="can_drop", at_s=1.0, count=0}', "fault.0.count", "1"),
+        ('{kind="can_delay", at_s=1.0, delay_s=0.0}', "fault.0.delay_s", "greater than 0"),
+        ('{kind="can_drop", at_s=1.0, direction="up"}', "fault.0.direction", "'to_drives'"),
     ],
 )
 def test_a_fault_that_is_wrong_or_cannot_act_is_one_line(fault: str, key: str, right: str) -> None:

@@ -6,19 +6,21 @@ from typing import Any
 import pytest
 
 from bridge.network.fault_orders import FaultAnswer, FaultOrder
+from configs.deployment import Deployment
 from configs.errors import ScenarioError
 from configs.loading import load
 from configs.resolve import schedule
 from configs.roles import processes_of
 from fleetloop.launch.fault_desk import ANSWER_S, REACHED_S, FaultDesk
 
+VCAN = {"interface": "socketcan", "channel": "vcan0"}
 CUT = {"kind": "link_partition", "edges": ["r1 -> r2", "leader -> r1"]}
 
 
 class Bench:
     """A desk whose processes are the test."""
 
-    def __init__(self, *overrides: str, emulated: tuple[str, ...] = ("r1", "r2")) -> None:
+    def __init__(self, *overrides: str, real: tuple[str, ...] = ()) -> None:
         self.scenario = load("two_robots", ("duration_s=20.0", *overrides))
         self.tick, self.now_s = 1000, 0.0
         self.sent: list[tuple[str, FaultOrder]] = []
@@ -26,7 +28,9 @@ class Bench:
         self.desk = FaultDesk(
             self.scenario,
             schedule(self.scenario),
-            emulated.__contains__,
+            Deployment.model_validate(
+                {"robot": {name: {"bus": VCAN} for name in real}}
+            ).fault_problem,
             lambda: self.tick,
             lambda: self.now_s,
         )
@@ -156,7 +160,7 @@ def test_all_that_acts_or_is_planned_is_cleared() -> None:
 
 
 def test_no_order_is_taken_that_no_process_could_carry_out() -> None:
-    bench = Bench(emulated=("r1",))
+    bench = Bench(real=("r2",))
     with pytest.raises(ScenarioError, match="r2: isn't emulated: push can't act on it"):
         bench.inject(kind="push")
     bench.inject(kind="push", robots=["r1"])
