@@ -7,7 +7,7 @@ import typer
 
 from configs.errors import ScenarioError
 from fleetloop import numbers
-from fleetloop.options import ScenarioArg, SetOption, listed
+from fleetloop.options import JunitOption, ScenarioArg, SetOption, listed
 
 _FOR_S, _RECOVER_S, _HOLD_S, _LIMIT_S = 2.0, 5.0, 1.0, 300.0
 
@@ -87,9 +87,10 @@ def campaign(
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="Go on with the campaign of this folder; beside it --jobs, --allow, --json.",
+            help="Go on with the campaign of this folder; with --jobs, --allow, --junit, --json.",
         ),
     ] = None,
+    junit: JunitOption = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print campaign.json on standard output, no matrix.")
     ] = False,
@@ -99,7 +100,7 @@ def campaign(
     from fleetloop.campaign.matrix import Conditions
     from fleetloop.campaign.verdicts import verdicts_named
 
-    ways = command.Ways(jobs, as_json, verdicts_named(allow))
+    ways = command.Ways(jobs, as_json, junit, verdicts_named(allow))
     if resume is not None:
         if scenario is not None:
             raise ScenarioError(f"{scenario}: --resume {resume} has its scenario in its folder")

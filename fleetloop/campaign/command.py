@@ -14,6 +14,7 @@ from configs.loading import folder_of, load
 from configs.scenario import Scenario
 from fleetloop.campaign.branches import Baseline, Branches
 from fleetloop.campaign.folder import Folder, write_tables
+from fleetloop.campaign.junit import write_junit
 from fleetloop.campaign.matrix import Cell, Kinds, cells_of, kinds_of
 from fleetloop.campaign.page import page
 from fleetloop.campaign.plan import MOST_CELLS, Plan
@@ -38,6 +39,7 @@ class Ways:
 
     at_once: int | None = None
     as_json: bool = False
+    junit: Path | None = None
     allowed: frozenset[Verdict] = frozenset({Verdict.HELD, Verdict.RECOVERED})
 
 
@@ -203,6 +205,8 @@ def _finish(
     run_folder.write(folder.path / NUMBERS, to_json(numbers))
     run_folder.write(folder.path / PAGE, page(folder, scenario, results, wall_s))
     write_tables(folder.path, results)
+    if ways.junit is not None:
+        write_junit(ways.junit, scenario.name, folder.baselines.values(), results, ways.allowed)
     if not ways.as_json:
         say(f"page     {folder.path / PAGE}")
     sound = all(one.verdict == "held" for one in folder.baselines.values())

@@ -35,7 +35,15 @@ def write_junit(
     Raises:
         InfrastructureError: it can't be written.
     """
-    suites = [suite(name, one, allow_unchecked) for name, one in outcomes.items()]
+    write_suites(path, [suite(name, one, allow_unchecked) for name, one in outcomes.items()])
+
+
+def write_suites(path: Path, suites: Sequence[ET.Element]) -> None:
+    """Write a report of suites.
+
+    Raises:
+        InfrastructureError: it can't be written.
+    """
     root = ET.Element("testsuites", {"name": "fleetloop", **_totals(suites)})
     root.extend(suites)
     ET.indent(root)
@@ -51,24 +59,29 @@ def suite(name: str, outcome: Outcome, allow_unchecked: bool) -> ET.Element:
         if outcome.get(key) is not None:
             ET.SubElement(properties, "property", {"name": key, "value": _text(outcome[key])})
     class_name = _text(f"fleetloop.{outcome['scenario']}")
-    ran = _case(made, class_name, "run", outcome["took_s"])
+    ran = case(made, class_name, "run", outcome["took_s"])
     for tag, kind, text in _of_run(outcome):
-        _say(ran, tag, kind, text)
+        say(ran, tag, kind, text)
     for expect in outcome["expectations"]:
-        case = _case(made, class_name, expect.get("name") or expect["claim"], 0.0)
+        one = case(made, class_name, expect.get("name") or expect["claim"], 0.0)
         if expect["held"] is False:
-            _say(case, "failure", "expectation", f"{label(expect)}: {finding(expect)}")
+            say(one, "failure", "expectation", f"{label(expect)}: {finding(expect)}")
         elif expect["held"] is None:
             tag = "skipped" if allow_unchecked else "error"
-            _say(case, tag, "not reached", f"{label(expect)}: {finding(expect)}")
-    cases = made.findall("testcase")
-    made.set("tests", str(len(cases)))
-    for attribute, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
-        made.set(attribute, str(sum(case.find(tag) is not None for case in cases)))
-    made.set("time", f"{outcome['took_s']:.3f}")
+            say(one, tag, "not reached", f"{label(expect)}: {finding(expect)}")
+    count(made, outcome["took_s"])
     if outcome.get("started"):
         made.set("timestamp", _text(outcome["started"]))
     return made
+
+
+def count(made: ET.Element, took_s: float) -> None:
+    """Set the totals of a suite of its cases."""
+    cases = made.findall("testcase")
+    made.set("tests", str(len(cases)))
+    for attribute, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+        made.set(attribute, str(sum(one.find(tag) is not None for one in cases)))
+    made.set("time", f"{took_s:.3f}")
 
 
 def _of_run(outcome: Outcome) -> list[tuple[str, str, str]]:
@@ -83,14 +96,16 @@ def _of_run(outcome: Outcome) -> list[tuple[str, str, str]]:
     return []
 
 
-def _case(parent: ET.Element, class_name: str, name: str, took_s: float) -> ET.Element:
+def case(parent: ET.Element, class_name: str, name: str, took_s: float) -> ET.Element:
+    """Add a case to a suite."""
     attributes = {"classname": class_name, "name": _text(name), "time": f"{took_s:.3f}"}
     return ET.SubElement(parent, "testcase", attributes)
 
 
-def _say(case: ET.Element, tag: str, kind: str, text: str) -> None:
+def say(one: ET.Element, tag: str, kind: str, text: str) -> None:
+    """Say of a case that it failed, was an error, or was skipped, and why."""
     first = text.partition("\n")[0]
-    ET.SubElement(case, tag, {"type": kind, "message": _text(first)}).text = _text(text)
+    ET.SubElement(one, tag, {"type": kind, "message": _text(first)}).text = _text(text)
 
 
 def _totals(suites: Sequence[ET.Element]) -> dict[str, str]:

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import psutil
 import pyarrow.parquet
@@ -17,13 +18,14 @@ from support.command_line import fleetloop
 SHORT = ("--for", "0.1", "--recover-within", "0.2", "--hold", "0.1")
 SHORT += ("--set", "duration_s=1.0", "--set", "expect.0.from_s=0.6", "--set", "expect.1.from_s=0.6")
 KINDS = "push,localisation_outage,under_voltage"
-STRONG = ("--param", "push.force_body_N=100", "--set", "expect.0.max_abs=0.02")
+STRONG = ("--param", "push.force_body_N=400")
 
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory: pytest.TempPathFactory):
     folder = tmp_path_factory.mktemp("campaign")
     words = ("--faults", KINDS, "--at", "0.3,0.5", *SHORT, *STRONG, "--out", "out")
+    words += ("--junit", "out.xml")
     return fleetloop(folder, "campaign", "two_robots", *words), folder / "out"
 
 
@@ -47,6 +49,16 @@ def test_files_have_every_cell(campaign) -> None:
     page = (out / "campaign.html").read_text("utf-8")
     assert page.count('class="detail"') == 6
     assert "src=" not in page
+
+
+def test_ci_gets_a_suite_per_kind_and_a_case_per_cell(campaign) -> None:
+    done, out = campaign
+    root = ET.parse(out.parent / "out.xml").getroot()
+    suites = {suite.get("name"): suite for suite in root}
+    assert suites["two_robots: push"].get("tests") == "2"
+    assert suites["two_robots: under_voltage"].get("skipped") == "2"
+    assert suites["two_robots: without a fault"].get("failures") == "0"
+    assert done.returncode == (1 if int(root.get("failures", "0")) else 0)
 
 
 def test_a_cell_gives_the_same_verdict_by_its_command(campaign, tmp_path: Path) -> None:
