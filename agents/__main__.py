@@ -14,8 +14,8 @@ import can
 from agents.agent import Agent
 from agents.guard import Phase
 from agents.inputs import LoggedAgent
-from agents.lockstep import LockstepCounters, LockstepLoop, deliver
-from agents.realtime import RealtimeCounters, RealtimeLoop
+from agents.lockstep import LockstepLoop, deliver, did_not_start
+from agents.realtime import RealtimeLoop
 from agents.subscriptions import Subscriptions
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import open_bus, to_message
@@ -31,7 +31,8 @@ from bridge.network.messages import Notice, Rows
 from bridge.network.reports import AgentReport
 from bridge.network.telemetry import RowBuffer, row_of
 from bridge.network.zenoh_link import POLLED_DEPTH, ZenohLink
-from bridge.process.clock import process_cpu_ns
+from bridge.process.awake import LOOK_S
+from bridge.process.clock import SYSTEM_CLOCK, process_cpu_ns
 from bridge.process.lifecycle import (
     Stop,
     go_realtime,
@@ -67,15 +68,14 @@ def run(brief: AgentBrief, stop: Stop) -> str:
         if brief.detached:
             watch = LauncherWatch(link, brief.network, stop)
             answer_pings(link, brief.network.run, AGENT.process(brief.robot))
-        with open_bus(brief.robot, brief.bus) as bus:
-            return _run(brief, stop, link, bus, watch)
+        return _run(brief, stop, link, watch)
 
 
-def _run(
-    brief: AgentBrief, stop: Stop, link: ZenohLink, bus: can.BusABC, watch: LauncherWatch | None
-) -> str:
+def _run(brief: AgentBrief, stop: Stop, link: ZenohLink, watch: LauncherWatch | None) -> str:
     name, robot = brief.network.run, brief.robot
-    path = link.publisher(keys.path(name, robot))
+    may_be_absent = brief.schedule.on_late != "abort"
+    # A neighbour that comes again has to hear the first path state that is due.
+    path = link.publisher(keys.path(name, robot), steady=may_be_absent)
     telemetry = link.publisher(keys.telemetry(name, robot))
     report = link.publisher(keys.report(name, AGENT.process(robot)))
     rows = RowBuffer(row_of(brief.signals), partial(_put, telemetry))
@@ -88,11 +88,13 @@ def _run(
     agent.guard.announce = lambda event: notice.put(Notice(event).encode())
     link.subscribe(keys.pose(name, robot), "pose")
     subscriptions = Subscriptions(link, brief)
+    for edge in brief.hears if may_be_absent else ():
+        link.subscribe(keys.silence(name, edge.speaker), f"silence/{edge.speaker}")
     for other in brief.located:
         link.subscribe(keys.pose(name, other), f"place/{other}")
-    link.subscribe(keys.go(name), "go")
     if brief.leader_link is not None:
         link.subscribe(keys.leader_speed(name), "leader")
+    link.subscribe(keys.go(name), "go")
 
     hellos = Hellos(brief.schedule.hello_every_s)
     if not brief.rejoins:
@@ -100,11 +102,32 @@ def _run(
         hellos.add(telemetry, Rows(0, 0, b"", False).encode())
     process, refusals = AGENT.process(robot), agent.admission.refusals
     orders = OrderInbox(link, name, process, refusals)
-    run_loop = _realtime if brief.schedule.realtime else _lockstep
-    connections = _Connections(
-        agent, bus, link, subscriptions, path, hellos, rows, report, orders, watch, log
-    )
-    return run_loop(connections, stop)
+    realtime = brief.schedule.realtime
+    if brief.rejoins and not realtime and not _heard_the_go(link, agent, brief, stop):
+        return stop.reason
+    with open_bus(brief.robot, brief.bus) as bus:
+        connections = _Connections(
+            agent, bus, link, subscriptions, path, hellos, rows, report, orders, watch, log
+        )
+        return (_realtime if realtime else _lockstep)(connections, stop)
+
+
+def _heard_the_go(link: Link, agent: Agent, brief: AgentBrief, stop: Stop) -> bool:
+    """Wait for the go of a lockstep run that goes on, once more; False on a stop.
+
+    It is what was subscribed to last: with it all subscriptions are in force. Only then does the
+    controller come to its bus, for which bus time stands still.
+    """
+    deadline = SYSTEM_CLOCK.monotonic_s() + brief.schedule.start_deadline_s
+    while SYSTEM_CLOCK.monotonic_s() < deadline:
+        arrival = link.receive(LOOK_S)
+        if stop.requested:
+            return False
+        if arrival is not None and arrival.tag == "leader":
+            deliver(agent, arrival)
+        if arrival is not None and arrival.tag == "go":
+            return True
+    raise did_not_start(agent)
 
 
 def _put(publisher: Publisher, first: int, count: int, block: bytes, final: bool) -> None:
@@ -144,7 +167,7 @@ class _Connections(NamedTuple):
         self,
         body: Callable[[], None],
         stop: Stop,
-        counters: LockstepCounters | RealtimeCounters,
+        loop: LockstepLoop | RealtimeLoop,
         missing_privileges: Sequence[str] = (),
     ) -> str:
         """Run the loop's body; then stop the wheels, publish the last rows and the report.
@@ -154,6 +177,30 @@ class _Connections(NamedTuple):
         sampler = Sampler()
         began_ns, waited_ns = process_cpu_ns(), processor_wait_ns()
         failure = ""
+
+        def say_last(failure: str = "", early: str = "") -> None:
+            guard = self.agent.guard
+            report = AgentReport(
+                failure=failure,
+                left_early="" if self.agent.closed else early,
+                events=tuple(guard.events),
+                remarks=tuple(self.agent.remarks()),
+                flooders=tuple(self.agent.admission.refusals.floods()),
+                missing_privileges=tuple(missing_privileges),
+                cpu_ns=process_cpu_ns() - began_ns,
+                durations_ns=loop.counters.durations_ns()
+                | {"processor": processor_wait_ns() - waited_ns},
+                profile_ns=sampler.nanoseconds(),
+                stop_reason=guard.stop_reason,
+                messages=self.agent.network.counts() if self.agent.network else {},
+                stop_tick=guard.stop_tick,
+                deadlines=loop.counters.deadlines(),
+            )
+            self.report.put(report.encode())
+            stop.await_release()
+
+        loop.faults.hand_on, loop.faults.heard = self.hand_on, stop.await_heard
+        loop.faults.last_word = say_last
         try:
             with sampler if self.agent.brief.schedule.profile else nullcontext():
                 body()
@@ -166,26 +213,20 @@ class _Connections(NamedTuple):
             self.rows.finish()
             if self.inputs is not None:
                 self.inputs.finish()
-            guard = self.agent.guard
-            report = AgentReport(
-                failure=failure,
-                left_early="" if self.agent.closed else early,
-                events=tuple(guard.events),
-                remarks=tuple(self.agent.remarks()),
-                flooders=tuple(self.agent.admission.refusals.floods()),
-                missing_privileges=tuple(missing_privileges),
-                cpu_ns=process_cpu_ns() - began_ns,
-                durations_ns=counters.durations_ns()
-                | {"processor": processor_wait_ns() - waited_ns},
-                profile_ns=sampler.nanoseconds(),
-                stop_reason=guard.stop_reason,
-                messages=self.agent.network.counts() if self.agent.network else {},
-                stop_tick=guard.stop_tick,
-                deadlines=counters.deadlines(),
-            )
-            self.report.put(report.encode())
-            stop.await_release()
+            say_last(failure, early)
         return early
+
+    def hand_on(self, returns: bool) -> None:
+        """Hand on all rows and inputs; unless a process of this robot returns, they end here."""
+        inputs, schedule = self.inputs, self.agent.brief.schedule
+        if returns:
+            self.rows.hand_on()
+        elif schedule.realtime or schedule.on_late != "abort":
+            self.rows.give_up(schedule.ticks)
+        else:
+            self.rows.finish()
+        if inputs is not None:
+            (inputs.hand_on if returns else inputs.finish)()
 
     def stop_wheels(self) -> None:
         """Disarm the drives, as far as the bus still sends, after a loop that ended early."""
@@ -218,7 +259,7 @@ def _lockstep(connections: _Connections, stop: Stop) -> str:
     if first is None:
         return stop.reason
     settle_memory()
-    return connections.run(partial(loop.run, first, stop), stop, loop.counters)
+    return connections.run(partial(loop.run, first, stop), stop, loop)
 
 
 def _realtime(connections: _Connections, stop: Stop) -> str:
@@ -243,7 +284,7 @@ def _realtime(connections: _Connections, stop: Stop) -> str:
     epoch_ns = loop.await_go(stop)
     if epoch_ns is None:
         return stop.reason
-    return connections.run(partial(loop.run, epoch_ns, stop), stop, loop.counters, missing)
+    return connections.run(partial(loop.run, epoch_ns, stop), stop, loop, missing)
 
 
 def _serve(brief: AgentBrief, stop: Stop) -> None:

@@ -8,6 +8,7 @@
                   `silence_limit_s`, or not newer than the last one of its sender
                   s or v̂ are beyond the reach of the scenario (`configs.reach`)
     pose          its date, likewise; a position or heading beyond the reach of any scenario
+    silence       its tick, likewise; in real time nobody says it
     leader speed  faster than the scenario allows
 
 Ticks below 0 carry start values; they are ignored once control has begun, and late ones are not
@@ -38,6 +39,10 @@ class Admission:
         self.refusals = Refusals()
         self.tick = -schedule.countdown_ticks - 1
         """The tick computed last."""
+        if brief.rejoins and not schedule.realtime:
+            self.tick = brief.resumes_tick - 1
+        # One that is held finds everything that was said meanwhile when it goes on.
+        self._ahead_ticks = schedule.ticks if schedule.on_late == "hold" else _AHEAD_TICKS
         self.now_ns = self.tick * schedule.period_ns
         """Scenario time [ns] by the wall clock; set by the loop in real time."""
         self._schedule = schedule
@@ -77,6 +82,16 @@ class Admission:
             return False
         if fix.tick >= 0:
             self._newest_ns[sender] = fix.t_ns
+        return True
+
+    def admits_silence(self, robot: str, tick: int) -> bool:
+        """Whether an in-neighbour can be silent at a tick; what is implausible is counted."""
+        wrong: tuple[str, str] | None = None
+        if self._schedule.realtime or not self._schedule.shares(tick):
+            wrong = "tick", f"nothing is shared at tick {tick}"
+        if wrong := wrong or self._due(tick):
+            self.refusals.note("silence", robot, *wrong)
+            return False
         return True
 
     def admits_leader_speed(self, speed: LeaderSpeed) -> bool:
@@ -126,7 +141,7 @@ class Admission:
     def _due(self, tick: int, delay_ticks: int = 0) -> tuple[str, str] | None:
         """In lockstep: a reason if the tick is over or too far ahead, None otherwise."""
         ahead = tick - max(self.tick, -1)
-        if ahead > _AHEAD_TICKS:
+        if ahead > self._ahead_ticks:
             return "ahead", f"dated {ahead * self._period_ns * 1e-9:.6g} s ahead"
         if ahead + delay_ticks <= 0:
             return "back", f"tick {tick} came when tick {self.tick} was over"

@@ -23,8 +23,8 @@ its first tick.
 
 A robot that joins late stands until then: in phase DRIVING, torque 0, its law not called. It
 listens, and so that nothing jumps for the others it takes its path variable from what it hears
-(`agents.joining`). After it has left nobody hears it. A controller that was started again, in real
-time, begins STOPPED, with one attempt to arm, and joins as one that is late.
+(`agents.joining`). After it has left nobody hears it. A controller that was started again begins
+STOPPED, with one attempt to arm, and joins as one that is late.
 
 A stopped robot goes on sharing its path variable, so that its neighbours aren't cut off. A dry run
 goes through the same phases without a frame. Its only inputs are frames, messages, tick numbers.
@@ -102,6 +102,8 @@ class Agent:
         """Store the pose of an in-neighbour, for the emulated network."""
         self.receive_path_state = reception.receive_path_state
         """Store the path state of an in-neighbour."""
+        self.receive_silence = reception.receive_silence
+        """Note that an in-neighbour has no path state at a tick."""
         self.receive_leader_speed = reception.receive_leader_speed
         """Store the virtual leader's speed profile."""
         self.missing_to_start = reception.missing_to_start

@@ -15,14 +15,17 @@ class BusClock:
 
     Args:
         feedback_since: whether both encoder frames were received after a bus time [ns].
+        first: the first tick that is due; the first of the countdown, if none is given.
     """
 
     __slots__ = ("_due_ns", "_feedback_since", "_next", "_period_ns")
 
-    def __init__(self, schedule: Schedule, feedback_since: Callable[[int], bool]) -> None:
+    def __init__(
+        self, schedule: Schedule, feedback_since: Callable[[int], bool], first: int | None = None
+    ) -> None:
         self._feedback_since = feedback_since
         self._period_ns = schedule.period_ns
-        self._next = -schedule.countdown_ticks
+        self._next = -schedule.countdown_ticks if first is None else first
         self._due_ns = schedule.bus_time_ns(self._next)
 
     def due(self, now_ns: int) -> int | None:

@@ -16,6 +16,7 @@ from agents.admission import LEADER, LOCALISATION
 from agents.agent import Agent
 from agents.bus_clock import BusClock
 from agents.guard import Phase
+from agents.process_faults import ProcessFaults
 from agents.subscriptions import Subscriptions
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import can_id_of, to_message
@@ -23,11 +24,13 @@ from bridge.frame import Frame
 from bridge.network.barrier import Hellos
 from bridge.network.fault_orders import OrderInbox
 from bridge.network.link import Arrival, Link, Publisher
-from bridge.network.messages import LeaderSpeed, PathState, PoseFix
+from bridge.network.messages import LeaderSpeed, PathState, PoseFix, Silence
 from bridge.process.awake import LOOK_S, AwakeClock
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, launcher_stopped
+from configs.brief import Schedule
 from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
+from configs.roles import PLANT
 
 LISTEN_SHARE = 0.75
 """Part of the tick deadline for the wait for messages: a controller reports a silent peer before
@@ -40,6 +43,7 @@ _KINDS_AND_SENDERS = {
     "pose": ("pose", LOCALISATION),
     "place": ("pose", LOCALISATION),
     "leader": ("speed", LEADER),
+    "silence": ("silence", PLANT.name),
 }
 
 
@@ -86,6 +90,9 @@ class LockstepLoop:
         self._subscriptions = subscriptions
         self._path = path
         self._hellos = hellos
+        self._within_s, self._frames_within_s = _patience_s(self._schedule)
+        self.faults = ProcessFaults(agent.brief, agent.guard.note, clock=clock)
+        """Faults of this process."""
         self.counters = LockstepCounters()
 
     def on_arrival(self, arrival: Arrival) -> None:
@@ -116,13 +123,13 @@ class LockstepLoop:
         counters = self.counters
         message: can.Message | None = first
         asked_ns = self._clock.monotonic_ns()
-        on_frame, clock, schedule = (
-            agent.on_frame,
-            BusClock(self._schedule, agent.feedback_since),
-            self._schedule,
-        )
+        on_frame, schedule, faults = agent.on_frame, self._schedule, self.faults
+        resumes = agent.brief.rejoins
+        first_tick = agent.brief.resumes_tick if resumes else -schedule.countdown_ticks
+        clock = BusClock(schedule, agent.feedback_since, first_tick)
+        faults.skip_to(first_tick)
         subscriptions, orders, bus = self._subscriptions, self._orders, self._bus
-        timeout_s = BUS_SHARE * schedule.tick_deadline_s
+        timeout_s = self._frames_within_s
         while True:
             tick: int | None = None
             if message is not None:
@@ -133,6 +140,8 @@ class LockstepLoop:
                 tick = clock.due_at_end(question_ns)
             if tick is not None:
                 came_ns = self._clock.monotonic_ns()
+                if tick >= faults.due_tick:
+                    faults.begin(tick)
                 if schedule.owes(tick):
                     self._await_messages(tick, stop)
                 heard_ns = self._clock.monotonic_ns()
@@ -141,8 +150,10 @@ class LockstepLoop:
                 self._send(agent.step(tick) if not stop.requested else agent.shut_down())
                 if tick >= subscriptions.next_change:
                     subscriptions.change(tick)
-                if schedule.shares(tick + 1):
-                    self._path.put(agent.share(tick + 1).encode())
+                if schedule.shares(tick + 1) and tick >= faults.mute_tick:
+                    silent = resumes and not agent.speaks(tick + 1)
+                    said = Silence(tick + 1) if silent else agent.share(tick + 1)
+                    self._path.put(said.encode())
                 counters.bus_ns += came_ns - asked_ns
                 counters.listen_ns += heard_ns - came_ns
                 asked_ns = self._clock.monotonic_ns()
@@ -167,7 +178,7 @@ class LockstepLoop:
         """Wait for the messages that are due at this tick, or for a stop."""
         agent = self._agent
         clock: AwakeClock | None = None
-        left_s = within_s = LISTEN_SHARE * self._schedule.tick_deadline_s
+        left_s = within_s = self._within_s
         while (missing := agent.missing(tick)) and not stop.requested:
             # A late look may find the message in the queue; under a flood the queue never ends.
             arrival = self._link.receive(LOOK_S if left_s > 0.0 else 0.0)
@@ -205,6 +216,17 @@ class LockstepLoop:
             ) from error
 
 
+def _patience_s(schedule: Schedule) -> tuple[float, float]:
+    """The longest waits for the messages of a tick and for frames [wall s].
+
+    Where a run goes on without a late controller the plant judges who that is, one after another.
+    """
+    if schedule.on_late == "abort":
+        return LISTEN_SHARE * schedule.tick_deadline_s, BUS_SHARE * schedule.tick_deadline_s
+    within_s = schedule.start_deadline_s + schedule.tick_deadline_s
+    return within_s, within_s + schedule.tick_deadline_s
+
+
 def did_not_start(agent: Agent) -> InfrastructureError:
     """The error of a controller whose run did not start, with the messages that it refused."""
     waited_s = agent.brief.schedule.start_deadline_s
@@ -224,6 +246,8 @@ def deliver(agent: Agent, arrival: Arrival) -> None:
     match kind:
         case "path" if (state := PathState.decode(arrival.payload)) is not None:
             agent.receive_path_state(robot, state)
+        case "path" | "silence" if (silence := Silence.decode(arrival.payload)) is not None:
+            agent.receive_silence(robot, silence.tick)
         case "pose" if (fix := PoseFix.decode(arrival.payload)) is not None:
             agent.receive_pose(fix)
         case "place" if (fix := PoseFix.decode(arrival.payload)) is not None:

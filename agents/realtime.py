@@ -22,6 +22,7 @@ from agents.agent import Agent, Trouble
 from agents.bus_health import BusHealth
 from agents.guard import Phase
 from agents.lockstep import deliver, did_not_start, take_orders
+from agents.process_faults import ProcessFaults
 from agents.subscriptions import Subscriptions
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import can_id_of, to_frame, to_message
@@ -104,6 +105,8 @@ class RealtimeLoop:
         self._power_up_ns = 0
         self._sent_ns = 0  # send time of torques without feedback; 0: none
         self._round_trip_s = 0.0  # of the last torques whose feedback came; NaN: a miss since
+        self.faults = ProcessFaults(agent.brief, agent.guard.note, clock=clock)
+        """Faults of this process."""
         self.counters = RealtimeCounters()
 
     def await_go(self, stop: Stop) -> int | None:
@@ -163,12 +166,16 @@ class RealtimeLoop:
         if agent.brief.rejoins:
             gone = (self._clock.monotonic_ns() - epoch_ns - phase_ns) // period_ns + 1
             tick = min(max(tick, gone), agent.last_tick)
+        faults = self.faults
+        faults.skip_to(tick)
         lateness, subscriptions = self._lateness, self._subscriptions
         distances_m = agent.network.distances_m if agent.network is not None else {}
         self._drop_backlog()
         while agent.phase is not Phase.DONE:
             due_ns = epoch_ns + tick * period_ns + phase_ns
             self._read_until(due_ns)
+            if tick >= faults.due_tick:
+                faults.begin(tick)
             now_ns = self._clock.monotonic_ns()
             late_s = (now_ns - due_ns) * 1e-9
             if lateness.note(tick, late_s):

@@ -4,7 +4,10 @@
     real time     what has arrived; of poses the newest
     emulated      after that, when the emulated edge delivers it (`agents.emulated_network`)
 
-A path state over an edge that doesn't exist at its tick is discarded unseen.
+A path state over an edge that doesn't exist at its tick is discarded unseen. In lockstep a robot
+may be silent at a tick: then nothing of it is due. A controller that re-joins in lockstep is given
+poses from its first tick on, and of other robots what is dated beyond the lookahead: whatever was
+said before it listened is older than that, and is discarded should it arrive.
 """
 
 from collections.abc import Sequence
@@ -16,7 +19,7 @@ from agents.in_edges import InEdges
 from agents.neighbours import Neighbours
 from bridge.netem.channel import Channel
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
-from configs.brief import AgentBrief
+from configs.brief import LEAD_TICKS, AgentBrief
 from configs.leader_speed import speed_at
 
 
@@ -40,11 +43,19 @@ class Reception:
         self._fixes: dict[int, PoseFix] = {}  # by tick, until due
         self._path_states: dict[int, dict[str, PathState]] = {}  # by tick, until due
         self._fix_tick = -1  # of the newest fix of the emulated network
+        self._silent: dict[int, set[str]] = {}  # by tick, until due
+        self._resumes_tick, self._listens_tick = brief.resumes_tick, 0
+        if brief.rejoins and not self._realtime:
+            # A robot at most `LEAD_TICKS` ahead has published the path state of the tick after.
+            self._listens_tick = brief.resumes_tick + LEAD_TICKS + 2
+        self._unspoken = set()  # in-neighbours of whose silences nothing was heard yet
+        if brief.schedule.on_late != "abort":
+            self._unspoken = {edge.speaker for edge in brief.hears}
         self._awaited = {e.speaker for e in brief.hears if e.exists(0) or not self._realtime}
 
     def receive_pose(self, fix: PoseFix) -> None:
         """Store a pose from the localisation system; ticks below 0: the start pose."""
-        if not self.admission.admits_pose(fix):
+        if self._too_old(fix.tick, self._resumes_tick) or not self.admission.admits_pose(fix):
             return
         if fix.tick < 0:
             self.start_fix = fix
@@ -55,12 +66,15 @@ class Reception:
 
     def receive_place(self, robot: str, fix: PoseFix) -> None:
         """Store the pose of an in-neighbour for the emulated network; the controller has no use."""
+        if self._too_old(fix.tick, self._listens_tick):
+            return
         if self.network is not None and self.admission.admits_pose(fix, robot):
             self.network.receive_place(robot, fix)
 
     def receive_path_state(self, robot: str, state: PathState) -> None:
         """Store the path state of an in-neighbour; ticks below 0: its start value."""
-        if not self.edges.exists(robot, state.tick):  # discarded unseen
+        too_old = self._too_old(state.tick, self._listens_tick)
+        if too_old or not self.edges.exists(robot, state.tick):  # discarded unseen
             self._awaited.discard(robot)
             return
         if not self.admission.admits_path_state(robot, state):
@@ -70,6 +84,18 @@ class Reception:
             self._hand_on(robot, state)
         else:
             self._path_states.setdefault(state.tick, {})[robot] = state
+
+    def receive_silence(self, robot: str, tick: int) -> None:
+        """Note that an in-neighbour has no path state at a tick; below 0: only that it is said."""
+        self._unspoken.discard(robot)
+        if tick < 0 or self._too_old(tick, self._listens_tick):
+            return
+        if self.admission.admits_silence(robot, tick):
+            self._silent.setdefault(tick, set()).add(robot)
+
+    def _too_old(self, tick: int, first: int) -> bool:
+        """Whether a message was said before a controller that re-joins listened."""
+        return self._rejoins and tick < first
 
     def receive_leader_speed(self, speed: LeaderSpeed) -> None:
         """Store the virtual leader's speed profile."""
@@ -90,6 +116,7 @@ class Reception:
         if self._rejoins:  # the others have started
             return []
         missing = [f"the path variable of {robot}" for robot in sorted(self._awaited)]
+        missing += [f"the plant's word of {robot}" for robot in sorted(self._unspoken)]
         if self.start_fix is None:
             missing.append("the localisation system")
         if self.leader is None and self._follows_leader:
@@ -100,14 +127,20 @@ class Reception:
         """Messages that are due at this tick by the schedule and have not arrived."""
         schedule, missing = self._schedule, []
         pose_tick = tick - schedule.pose_delay_ticks
-        if schedule.localises(pose_tick) and pose_tick not in self._fixes:
+        owed = schedule.localises(pose_tick) and pose_tick >= self._resumes_tick
+        if owed and pose_tick not in self._fixes:
             missing.append("pose")
         place_tick = tick - schedule.place_delay_ticks
-        if self.network is not None and schedule.localises(place_tick):
+        owed = schedule.localises(place_tick) and place_tick >= self._listens_tick
+        if self.network is not None and owed:
             missing += self.network.missing(place_tick)
-        if schedule.shares(tick):
-            heard = self._path_states.get(tick, {})
-            missing += [f"path state of {r}" for r in self.edges.follow(tick) if r not in heard]
+        if schedule.shares(tick) and tick >= self._listens_tick:
+            heard, silent = self._path_states.get(tick, {}), self._silent.get(tick, ())
+            missing += [
+                f"path state of {r}"
+                for r in self.edges.follow(tick)
+                if r not in heard and r not in silent
+            ]
         return missing
 
     def advance(self, tick: int) -> PoseFix | None:
@@ -146,6 +179,7 @@ class Reception:
 
     def _due(self, tick: int) -> Sequence[PoseFix]:
         """In lockstep: what is due by the schedule, in the order of names, not of arrival."""
+        self._silent.pop(tick, None)
         for robot, state in sorted(self._path_states.pop(tick, {}).items()):
             self._hand_on(robot, state)
         fix = self._fixes.pop(tick - self._schedule.pose_delay_ticks, None)

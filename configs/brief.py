@@ -14,11 +14,13 @@ nanoseconds.
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
+from typing import Literal
 
 from configs.connections import NetworkLink, Settings
 from configs.curves import FormationOffset, ReferencePath
 from configs.edges import InEdge
 from configs.events import when
+from configs.faults.absences import Absence
 from configs.faults.base import PlannedFault
 from configs.host import Host
 from configs.leader_speed import SpeedChange
@@ -31,6 +33,7 @@ from configs.reach import Reach
 from configs.sections import Body, Bus, Coordination, Disturbance, Mounting, Pose
 from configs.signals import Signal
 
+OnLate = Literal["abort", "hold", "drop"]
 LEAD_TICKS = 16
 """In lockstep a bus may be this many ticks ahead of the slowest."""
 
@@ -63,6 +66,7 @@ class Schedule:
     start_deadline_s: float  # longest wait for all processes to be ready [wall s]
     hello_every_s: float = 0.02  # period of each process's hello until then [wall s]
     realtime: bool = False  # all processes keep the wall clock; else the plant owns time
+    on_late: OnLate = "abort"  # in lockstep, of a controller that has gone or doesn't answer
     profile: bool = False  # every process samples where its processor time goes
 
     @property
@@ -185,7 +189,8 @@ class AgentBrief:
     detached: bool = False  # no launcher is its parent: the run's end is when the launcher's
     # token on the network goes
     logs_inputs: bool = False  # for a replay
-    rejoins: bool = False  # in real time, a run that goes on; another process was its controller
+    rejoins: bool = False  # a run that goes on; another process was its controller
+    resumes_tick: int = 0  # in lockstep, of one that re-joins: the first tick that it is asked
 
     def channel_seed(self, source: str) -> str:
         """The seed of the emulated edge from a source to this robot."""
@@ -281,6 +286,7 @@ class PlantBrief:
     wire: WireModel | None  # of every bus; None: ideal, frames take no time
     traffic: bool  # tell the recorder what crosses the buses
     faults: tuple[PlannedFault, ...]  # of bodies, drives, buses and the localisation system
+    absences: tuple[Absence, ...]  # of controllers, in lockstep
     network: NetworkLink
     listeners: tuple[tuple[str, int], ...] = ()  # bus, inherited file descriptor of its socket
     attached: tuple[tuple[str, Settings], ...] = ()  # bus, keyword arguments of can.Bus: not ours

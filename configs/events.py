@@ -53,7 +53,12 @@ KINDS: dict[str, EventKind] = {
     "stalled": EventKind("a process, or its machine, stood still", exact=False),
     "silent": EventKind("a process shows no sign of life", exact=False),
     "cut_off": EventKind("the network to a process, or its machine, went", exact=False),
-    "back": EventKind("a process that was silent or cut off is there again", exact=False),
+    "killed": EventKind("a fault kills the process of a controller"),
+    "frozen": EventKind("a fault freezes the process of a controller"),
+    "held": EventKind("lockstep doesn't wait for a controller until it answers", exact=False),
+    "dropped": EventKind("lockstep doesn't wait for a controller any more", exact=False),
+    "awaited": EventKind("lockstep stands still until a controller is started again", exact=False),
+    "back": EventKind("a process that was silent, cut off, held or dropped is there", exact=False),
     "restarted": EventKind("a controller's process ended and is started again", exact=False),
 }
 """The vocabulary, by name."""

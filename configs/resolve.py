@@ -24,6 +24,7 @@ from configs.connections import OURS, NetworkLink, Settings
 from configs.curves import formation_offset, reference_path
 from configs.drives import Drive
 from configs.emulated_edges import effects_to
+from configs.faults.absences import absences
 from configs.faults.base import PlannedFault
 from configs.faults.plan import faulted_sources, planned_faults
 from configs.leader_speed import SpeedChange
@@ -64,6 +65,7 @@ def schedule(scenario: Scenario, speed: float = 0.0, *, profile: bool = False) -
         or max(START_DEADLINE_S, START_DEADLINE_PER_ROBOT_S * robots),
         hello_every_s=max(HELLO_EVERY_S, HELLO_EVERY_PER_ROBOT_S * robots),
         realtime=clock.mode == "realtime",
+        on_late="abort" if clock.mode == "realtime" else clock.on_late,
         profile=profile,
     )
 
@@ -207,6 +209,7 @@ def plant_brief(
         wire=wire_model(scenario),
         traffic=bool(scenario.bus.record),
         faults=tuple(one for one in planned_faults(scenario) if one.fault.PLACE == "plant"),
+        absences=() if ticks.realtime else absences(planned_faults(scenario), ticks.ticks),
         network=network,
     )
 

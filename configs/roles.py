@@ -29,10 +29,12 @@ class Topic(Enum):
     OWN_TELEMETRY = auto()
     OWN_INPUTS = auto()
     PATHS_OF_IN_NEIGHBOURS = auto()
+    SILENCES_OF_IN_NEIGHBOURS = auto()
     POSES_OF_LOCATED_NEIGHBOURS = auto()  # whose distance changes the emulated network
     LEADER_SPEED = auto()  # of robots with h_i = 1
     EMULATED_POSES = auto()  # of the robots that the plant emulates
     MEASURED_POSES = auto()  # of the robots that it doesn't
+    SILENCES = auto()
     TRUTHS = auto()
     TELEMETRIES = auto()
     INPUTS = auto()
@@ -80,7 +82,13 @@ PLANT = Role(
     brief=PlantBrief,
     forked=True,
     takes_orders=True,
-    puts=(Topic.EMULATED_POSES, Topic.TRUTHS, Topic.TRAFFIC, Topic.ORDERS_OF_CONTROLLERS),
+    puts=(
+        Topic.EMULATED_POSES,
+        Topic.SILENCES,
+        Topic.TRUTHS,
+        Topic.TRAFFIC,
+        Topic.ORDERS_OF_CONTROLLERS,
+    ),
     hears=(Topic.GO, Topic.MEASURED_POSES),
     watches=(LAUNCHER.name,),
 )
@@ -96,6 +104,7 @@ AGENT = Role(
         Topic.OWN_POSE,
         Topic.GO,
         Topic.PATHS_OF_IN_NEIGHBOURS,
+        Topic.SILENCES_OF_IN_NEIGHBOURS,
         Topic.POSES_OF_LOCATED_NEIGHBOURS,
         Topic.LEADER_SPEED,
     ),

@@ -50,6 +50,11 @@ class Clock(Parameters):
         "longest wait within a tick, wall clock; if not given 2 s, or 20 ms for each robot if that"
         " is more",
     )
+    on_late: Literal["abort", "hold", "drop"] = parameter(
+        "abort",
+        "in lockstep, of a controller that has gone or doesn't answer within that: abort: the run"
+        " ends; hold: the others go on until it answers again; drop: the others go on without it",
+    )
     start_deadline_s: Seconds | None = parameter(
         None,
         "longest wait for all processes to be ready; if not given 20 s, or 0.5 s for each"

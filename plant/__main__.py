@@ -18,7 +18,7 @@ from bridge.network.clock_exchange import answer_pings
 from bridge.network.fault_orders import OrderInbox
 from bridge.network.launcher import LauncherWatch
 from bridge.network.link import Arrival, Link, Publisher, waiting
-from bridge.network.messages import Go, Notice, PoseFix, Progress, Rows
+from bridge.network.messages import Go, Notice, PoseFix, Progress, Rows, Silence
 from bridge.network.refused_messages import Refusals
 from bridge.network.reports import PlantReport
 from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer
@@ -38,9 +38,11 @@ from configs.connections import Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError
 from configs.events import Event
 from configs.roles import AGENT, PLANT
+from plant.absent import AbsentControllers
+from plant.counters import PlantCounters
 from plant.faults import fault_events
 from plant.herald import Herald
-from plant.lockstep import LockstepLoop, PlantCounters
+from plant.lockstep import LockstepLoop
 from plant.orders import PlantOrders
 from plant.real_robot import RealRobot
 from plant.realtime import RealtimeLoop
@@ -109,7 +111,12 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
     others = [RealRobot(robot, start) for robot, start in brief.real_robots]
     # In real time all poses are of one instant: they travel together.
     express = not brief.schedule.realtime
-    poses = [link.publisher(keys.pose(name, r.brief.robot), express=express) for r in emulated]
+    leaves_some = brief.schedule.on_late != "abort"
+    poses = [
+        link.publisher(keys.pose(name, r.brief.robot), express=express, steady=leaves_some)
+        for r in emulated
+    ]
+    silences = _silences(brief, link)
     robots = [*(robot.brief.robot for robot in emulated), *(other.robot for other in others)]
     truths = [link.publisher(keys.truth(name, robot)) for robot in robots]
     rows = [RowBuffer(PLANT_ROW, partial(_put_rows, truth)) for truth in truths]
@@ -132,8 +139,12 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
     for robot, pose in zip(emulated, poses, strict=True):
         start = robot.brief.pose
         hellos.add(pose, PoseFix(EARLY, 0, start.x_m, start.y_m, start.theta_rad).encode())
-    for truth in truths:
-        hellos.add(truth, Rows(0, 0, b"", False).encode())
+    early = Silence(EARLY).encode()
+    for publisher, payload in (
+        *((silence, early) for silence in silences.values()),
+        *((truth, Rows(0, 0, b"", False).encode()) for truth in truths),
+    ):
+        hellos.add(publisher, payload)
 
     stalls: list[Stall] = []
     loop: LockstepLoop | RealtimeLoop | None = None
@@ -182,7 +193,8 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         link.declare_live(keys.live(name, PLANT.name))
         _await_go(brief, link, hellos, stop)
         settle_memory()
-        loop = LockstepLoop(brief, emulated, hub, poses, rows, say, taps, orders)
+        absent = AbsentControllers(brief, hub, silences, herald.note)
+        loop = LockstepLoop(brief, emulated, hub, poses, rows, say, taps, absent, orders)
         counters, progress_of, body = loop.counters, loop.progress, loop.run
     sampler = Sampler()
     began_ns, waited_ns = process_cpu_ns(), processor_wait_ns()
@@ -229,6 +241,14 @@ def _orders(brief: PlantBrief, link: ZenohLink, refusals: Refusals) -> PlantOrde
     told = () if brief.schedule.realtime else [robot.robot for robot in brief.robots]
     relays = {robot: link.publisher(keys.order(run, AGENT.process(robot))) for robot in told}
     return PlantOrders(brief.schedule, OrderInbox(link, run, PLANT.name, refusals), relays)
+
+
+def _silences(brief: PlantBrief, link: Link) -> dict[str, Publisher]:
+    """By robot, where the plant says that it has no path state; none if no run goes on without."""
+    if brief.schedule.on_late == "abort":
+        return {}
+    run, robots = brief.network.run, [robot.robot for robot in brief.robots]
+    return {robot: link.publisher(keys.silence(run, robot)) for robot in robots}
 
 
 def _body(body: Callable[[Stop], None], stop: Stop) -> None:

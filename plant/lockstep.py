@@ -5,9 +5,9 @@
                    to its tick k + 1
 
 Robots of different buses meet only in their controllers' messages, for which each controller waits
-by tick. So a bus need not wait for all others at every tick: it may be up to `LEAD_TICKS` ahead
-of the slowest, which keeps all cores at work and changes no value. Held to a speed, all go tick by
-tick together.
+by tick; `plant.absent` has the controllers that a run goes on without. So a bus need not wait for
+all others at every tick: it may be up to `LEAD_TICKS` ahead of the slowest, which keeps all cores
+at work and changes no value. Held to a speed, all go tick by tick together.
 
 Bus time runs from power-up; scenario time is 0 when control starts, after the countdown in which
 the controllers arm their drives and the bodies are held as the scenario puts them. The run ends
@@ -15,7 +15,6 @@ with one closing tick at which the controllers disarm.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
@@ -27,10 +26,13 @@ from bridge.process.awake import LOOK_S, STALL_S
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, launcher_stopped
 from configs.brief import LEAD_TICKS, PlantBrief
+from configs.edges import FOREVER
 from configs.errors import InfrastructureError, PeerLostError
+from plant.absent import AbsentControllers
 from plant.bus.build import build_buses
 from plant.bus.port import ALL, Bus
 from plant.bus.sockets import SocketPort
+from plant.counters import PlantCounters
 from plant.orders import PlantOrders
 from plant.robot import EmulatedRobot
 
@@ -43,28 +45,16 @@ ANSWER_SHARE = 0.9
 silent peer; after it, the launcher names the plant."""
 
 
-@dataclass(slots=True)
-class PlantCounters:
-    """The cost of the run, for the summary."""
-
-    ticks: int = 0
-    wall_ns: int = 0
-    waited_ns: int = 0
-    overruns: int = 0
-    frames: dict[str, int] = field(default_factory=dict)
-    nodes: dict[str, dict[str, int]] = field(default_factory=dict)  # of wires, by bus/node
-
-    def add_nodes(self, bus: str, counts: Mapping[str, dict[str, int]]) -> None:
-        """Add the nodes of a bus."""
-        self.nodes |= {f"{bus}/{node}": of_node for node, of_node in counts.items()}
-
-
 class _Lane:
     """One bus on its way through the ticks."""
 
-    __slots__ = ("asked", "asked_ns", "bus", "done", "robots", "steps", "tick")
+    __slots__ = (
+        *("absent", "asked", "asked_ns", "awaits", "bus", "done", "due_tick", "name", "robots"),
+        *("steps", "tick"),
+    )
 
-    def __init__(self, bus: Bus, tick: int) -> None:
+    def __init__(self, name: str, bus: Bus, tick: int) -> None:
+        self.name = name
         self.bus = bus
         self.steps = bus.steps()
         self.robots = [robot.brief.robot for robot in bus.robots]
@@ -72,6 +62,9 @@ class _Lane:
         self.asked = ALL
         self.asked_ns = 0  # when it was asked to answer; 0: it is not asked
         self.done = False
+        self.absent = False  # whether a controller of it is
+        self.due_tick = FOREVER  # from which on absences have to be looked at
+        self.awaits: list[str] = []  # robots whose controllers have to be on it for its next tick
 
 
 class _Ends(NamedTuple):
@@ -93,6 +86,7 @@ class LockstepLoop:
         rows: Sequence[RowBuffer],
         report: Callable[[Progress], None],
         taps: Mapping[str, Tap],
+        absent: AbsentControllers,
         orders: PlantOrders | None = None,
         *,
         clock: Clock = SYSTEM_CLOCK,
@@ -106,6 +100,7 @@ class LockstepLoop:
         self._limit_s = ANSWER_SHARE * schedule.tick_deadline_s
         self._hub = hub
         self._report = report
+        self._absent = absent
         first = -schedule.countdown_ticks
         ends = {
             robot: _Ends(pose, truth)
@@ -119,8 +114,14 @@ class LockstepLoop:
             brief, robots, lambda name, _: SocketPort(name, hub, hub), begin, taps
         )
         """By name."""
-        self._lanes = {name: _Lane(bus, first) for name, bus in self.buses.items()}
+        self._lanes = {name: _Lane(name, bus, first) for name, bus in self.buses.items()}
+        self._lane_of = {robot: lane for lane in self._lanes.values() for robot in lane.robots}
+        for lane in self._lanes.values():
+            lane.due_tick = absent.due_tick(lane.robots)
+        self._unasked: dict[str, _Lane] = {}  # by name; whose question nobody has to answer
+        self._left = 0  # controllers that were seen to have left
         self._slowest = first
+        self._slowest_ns = 0  # since when it is that tick
         self._at_slowest = len(self._lanes)
         self._held: list[_Lane] = []
         self._start_ns = 0
@@ -130,29 +131,32 @@ class LockstepLoop:
         """Run from the first tick of the countdown to the closing tick, or until told to stop.
 
         Raises:
-            InfrastructureError: a controller did not answer within the tick deadline.
+            InfrastructureError: a controller did not answer within the tick deadline, or one that
+                was to come again did not.
             PeerLostError: a controller left its bus.
         """
         self._start_ns = now_ns = next_report_ns = self._clock.monotonic_ns()
-        hub = self._hub
+        hub, absent = self._hub, self._absent
         for lane in self._lanes.values():
-            self._go_on(lane, now_ns)
+            self._start_tick(lane, now_ns)
         orders = self._orders.waiting if self._orders is not None else ()
         while self._at_slowest and not stop.requested:
             if orders:
                 self._take_orders()
-            answered = hub.collect(WAIT_S)
+            answered = hub.collect(0.0 if self._unasked else WAIT_S)
             after_ns = self._clock.monotonic_ns()
             self.counters.waited_ns += after_ns - now_ns
             if after_ns - now_ns > _STALL_NS or (not answered and launcher_stopped()):
                 self._forgive(after_ns - now_ns)
             for bus in answered:
                 self._go_on(self._lanes[bus], after_ns)
+            if absent.allowed:
+                self._go_on_without(after_ns, answered)
             now_ns = self._clock.monotonic_ns()
             if now_ns - after_ns > _STALL_NS:
                 self._forgive(now_ns - after_ns)
-            if not answered:
-                self._look_for_the_absent(now_ns)
+            if not (answered or absent.allowed):
+                self._look_for_the_late(now_ns)
             elif now_ns >= next_report_ns:
                 next_report_ns = now_ns + REPORT_EVERY_NS
                 self._report(self.progress())
@@ -187,29 +191,50 @@ class LockstepLoop:
             if self._schedule.localises(tick):
                 ends.pose.put(robot.pose_fix(tick, t_ns).encode())
 
+    def _start_tick(self, lane: _Lane, now_ns: int) -> None:
+        """Begin a tick of a bus, unless it first has to wait for a controller to come again."""
+        if lane.tick >= lane.due_tick:
+            lane.awaits = self._absent.begin(lane.robots, lane.tick)
+            self._look_at(lane)
+            if lane.awaits:
+                lane.asked_ns = now_ns
+                return
+        self._go_on(lane, now_ns)
+
     def _go_on(self, lane: _Lane, now_ns: int) -> None:
         """Advance a bus to its next question, or through the end of its tick."""
         asked = next(lane.steps)
         if asked is None:
             self._end_tick(lane, now_ns)
-        else:
-            lane.asked_ns, lane.asked = now_ns, asked
+            return
+        lane.asked_ns, lane.asked = now_ns, asked
+        if lane.absent and not self._hub.owing(lane.name):
+            self._unasked[lane.name] = lane
+
+    def _look_at(self, lane: _Lane) -> None:
+        """Take what is known of the controllers of a bus."""
+        lane.absent = self._absent.any_of(lane.robots)
+        lane.due_tick = self._absent.due_tick(lane.robots)
 
     def _end_tick(self, lane: _Lane, now_ns: int) -> None:
         """A bus from its tick to the next, and on as far as the slowest allows."""
         tick = lane.tick
+        if lane.absent:
+            self._absent.end(lane.robots, tick)
+            self._look_at(lane)
         lane.asked_ns = 0
         lane.tick = tick + 1
         lane.done = tick >= self._ticks
         if tick == self._slowest:
             self._at_slowest -= 1
             if not self._at_slowest:
+                self._slowest_ns = now_ns
                 self._next_tick()
                 self._release(now_ns)
         if lane.done:
             return
         if lane.tick <= self._slowest + self._window:
-            self._go_on(lane, now_ns)
+            self._start_tick(lane, now_ns)
         else:
             self._held.append(lane)
 
@@ -235,7 +260,7 @@ class LockstepLoop:
         if going:
             self._held = [lane for lane in self._held if lane.tick > latest]
             for lane in going:
-                self._go_on(lane, now_ns)
+                self._start_tick(lane, now_ns)
 
     def _pace(self) -> None:
         """Wait for the wall time of the slowest's tick; the buses are served meanwhile."""
@@ -249,11 +274,20 @@ class LockstepLoop:
 
     def _forgive(self, stood_still_ns: int) -> None:
         """Time in which this process, or the router, stood still doesn't count as a delay."""
+        self._slowest_ns += stood_still_ns
         for lane in self._lanes.values():
             if lane.asked_ns:
                 lane.asked_ns += stood_still_ns
 
-    def _look_for_the_absent(self, now_ns: int) -> None:
+    # --- controllers that are late or have gone --------------------------------------------------
+
+    def _look_for_the_late(self, now_ns: int) -> None:
+        """The run ends with the first.
+
+        Raises:
+            InfrastructureError: a controller did not answer within the tick deadline.
+            PeerLostError: a controller left its bus.
+        """
         left = set(self._hub.left())
         limit_ns = int(self._limit_s * 1e9)
         for lane in self._lanes.values():
@@ -267,3 +301,55 @@ class LockstepLoop:
                 raise InfrastructureError(
                     f"{when}: no answer from the controller of {robot} within {self._limit_s:g} s"
                 )
+
+    def _go_on_without(self, now_ns: int, answered: Sequence[str]) -> None:
+        """Go on without who is late or has gone, and with who has come again.
+
+        Raises:
+            InfrastructureError: a controller did not come again.
+        """
+        unasked, self._unasked = self._unasked, {}
+        for lane in unasked.values():
+            self._go_on(lane, now_ns)
+        gone = self._hub.left()[self._left :]
+        self._left += len(gone)
+        for robot in gone:
+            lane = self._lane_of[robot]
+            if lane.tick < self._ticks:
+                self._absent.gone(robot, lane.tick)
+                self._look_at(lane)
+                if lane.asked_ns and not (lane.awaits or self._hub.owing(lane.name)):
+                    self._unasked[lane.name] = lane
+        if answered or unasked or gone:
+            return
+        for lane in self._lanes.values():
+            if lane.awaits:
+                self._await(lane, now_ns)
+            elif lane.asked_ns:
+                self._look_for_late(lane, now_ns)
+
+    def _await(self, lane: _Lane, now_ns: int) -> None:
+        """A bus waits for controllers to come again: time stands still until they are there."""
+        lane.awaits = [robot for robot in lane.awaits if not self._hub.joined(robot)]
+        limit_s = self._schedule.start_deadline_s
+        if not lane.awaits:
+            self._go_on(lane, now_ns)
+        elif now_ns - lane.asked_ns > limit_s * 1e9:
+            raise InfrastructureError(
+                f"{self._schedule.when(lane.tick)}: the controller of"
+                f" {' and '.join(lane.awaits)} did not come again within {limit_s:g} s"
+            )
+
+    def _look_for_late(self, lane: _Lane, now_ns: int) -> None:
+        """Go on without the controllers that a bus at the slowest tick waits for too long.
+
+        Others may be waiting themselves, for the path state of one of these.
+        """
+        owing = self._hub.owing(lane.name)
+        waited_ns = now_ns - max(lane.asked_ns, self._slowest_ns)
+        if owing and lane.tick == self._slowest and waited_ns > self._limit_s * 1e9:
+            self._absent.late(owing, lane.tick)
+            self._look_at(lane)
+            owing = []
+        if not owing:
+            self._unasked[lane.name] = lane

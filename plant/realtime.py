@@ -22,7 +22,8 @@ from bridge.process.lifecycle import Stop
 from configs.brief import PlantBrief
 from plant.bus.build import build_buses, no_begin
 from plant.bus.sockets import SocketPort
-from plant.lockstep import REPORT_EVERY_NS, PlantCounters
+from plant.counters import PlantCounters
+from plant.lockstep import REPORT_EVERY_NS
 from plant.orders import PlantOrders
 from plant.robot import EmulatedRobot
 

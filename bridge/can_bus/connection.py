@@ -120,9 +120,11 @@ class Connection:
     """One client of a bus."""
 
     __slots__ = (
+        "awake",
         "backlog",
         "batched",
         "bus",
+        "excused",
         "held",
         "joined",
         "key",
@@ -135,6 +137,7 @@ class Connection:
         "receive",
         "released",
         "send_now",
+        "since_ns",
         "sock",
         "synchronous",
     )
@@ -149,6 +152,9 @@ class Connection:
         self.released = 0  # frames that left its transmit queue
         self.pending: list[Stamped] = []  # what a synchronous client hears with its next question
         self.joined = self.synchronous = self.batched = self.own = self.owes = False
+        self.excused = False  # bus time doesn't wait for it
+        self.awake = False  # it has answered a question since then
+        self.since_ns = 0  # what it says to questions before this bus time is dropped
         self.held = False  # not read until the frames of its bus are taken
         self.backlog: deque[bytes] = deque()
         self.missing = 0  # frames that were lost behind the backlog

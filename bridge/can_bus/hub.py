@@ -6,7 +6,9 @@
 
 A *batched* client receives and sends the frames of one instant together, in one packet or several.
 A *synchronous* client is batched, and bus time stands still until it has answered every request.
-Only a robot's own controller in lockstep may be synchronous; it shows the secret of its robot.
+Only a robot's own controller in lockstep may be synchronous; it shows the secret of its robot. One
+that is late may be *excused*: bus time goes on without it, and its late answers are known by their
+stamps.
 All other clients (loggers, host code under test) join, leave, crash or stop reading at any time:
 their frames are taken at the next instant, and packets that they don't read are kept within a bound
 (`connection`). A client's frames go to all other clients of its bus, and back to the sender only on
@@ -46,6 +48,7 @@ from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.waiting import readable
 
 UNTAKEN = 100_000
+_NEVER = 1 << 62
 _NOBODY: Mapping[str, Mapping[str, str]] = {}
 
 
@@ -220,6 +223,56 @@ class Hub:
             if robot not in bus.joined_controllers()
         )
 
+    # --- controllers that bus time doesn't wait for ----------------------------------------------
+
+    def owing(self, name: str) -> list[str]:
+        """Robots whose controllers a bus waits for."""
+        bus = self._buses[name]
+        return [client.name for client in bus.clients if client.owes and not client.excused]
+
+    def joined(self, robot: str) -> bool:
+        """Whether the controller of a robot is on its bus."""
+        return self._controller(robot) is not None
+
+    def excuse(self, robot: str) -> None:
+        """Wait for a controller no longer, neither for the answer that it owes nor for others.
+
+        It still hears everything; what it answers is dropped, until it is recalled.
+        """
+        client = self._controller(robot)
+        if client is None or client.excused:
+            return
+        client.bus.owing -= client.owes
+        # Owing, it is never counted again.
+        client.excused = client.owes = True
+        client.awake = False
+        client.since_ns = _NEVER
+
+    def awake(self, robot: str) -> bool:
+        """Whether an excused controller has answered any question meanwhile."""
+        client = self._controller(robot)
+        return client is not None and client.awake
+
+    def recall(self, robot: str) -> None:
+        """Wait for an excused controller again from the next question on, which has a later stamp.
+
+        What it says to earlier questions is dropped.
+        """
+        client = self._controller(robot)
+        if client is not None and client.excused:
+            client.excused = client.owes = False
+            client.since_ns = client.bus.stamp_ns + 1
+
+    def expel(self, robot: str, reason: str) -> None:
+        """End the connection of a controller, if it has one."""
+        client = self._controller(robot)
+        if client is not None:
+            self._server.expel(client, reason)
+
+    def _controller(self, robot: str) -> Connection | None:
+        clients = (client for bus in self._buses.values() for client in bus.clients)
+        return next((it for it in clients if it.synchronous and it.name == robot), None)
+
     def left(self) -> tuple[str, ...]:
         """Robots whose controllers have gone, in the order in which they went."""
         return tuple(self._server.left)
@@ -255,6 +308,10 @@ class Hub:
     def _receive_frames(self, client: Connection, packet: Packet) -> None:
         bus = client.bus
         _, flags, _, stamp_ns, frames, *_ = packet
+        if stamp_ns < client.since_ns:
+            client.awake |= bool(flags & DONE)
+            client.released += len(frames)
+            return
         if frames:
             if bus.queue:
                 submitted = [Submitted(client.key, frame) for frame in frames]

@@ -114,6 +114,11 @@ class ClientServer:
             client.mask = mask
             self._epoll.modify(client.sock.fileno(), mask)
 
+    def expel(self, client: Connection, reason: str) -> None:
+        """Say goodbye to one client and close its socket."""
+        client.send_last(encode_text(BYE, reason))
+        self._drop(client)
+
     def close(self, reason: str) -> None:
         """Say goodbye to all clients and close all sockets. Idempotent."""
         if self._epoll.closed:
@@ -257,9 +262,9 @@ class ClientServer:
             client.bus.clients.remove(client)
             if client.bus.queue:
                 client.bus.departed.append(client.key)
-        if client.owes:
-            client.owes = False
+        if client.owes and not client.excused:
             client.bus.owing -= 1
+        client.owes = False
         if client.synchronous:
             self.left.append(client.name)
 

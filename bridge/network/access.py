@@ -3,9 +3,10 @@
 The graph *is* the network. The router refuses everything that isn't listed (default deny), and each
 process is bound to its identity by a random password that it alone is given. The rights of a role
 are in its row of `configs.roles`: of an agent its own path, rows and inputs to put, and to hear the
-paths of exactly its in-neighbours, its own pose, and leader/speed iff h_i = 1. Every role that a
-run starts also puts progress, notices and its report. Faults are ordered by the launcher alone; in
-lockstep the plant hands orders on to controllers (`bridge.network.fault_orders`). Besides the roles
+paths of exactly its in-neighbours, and that there are none, its own pose, and leader/speed iff
+h_i = 1. Every role that a run starts also puts progress, notices and its report. Faults are ordered
+by the launcher alone; in lockstep the plant hands orders on to controllers
+(`bridge.network.fault_orders`). Besides the roles
 there are guests, clients of buses on other machines: they put their lines up and hear their lines
 down; which buses they may open is the relay's decision.
 
@@ -207,9 +208,11 @@ class _Graph(NamedTuple):
             Topic.OWN_TELEMETRY: (keys.telemetry, [robot]),
             Topic.OWN_INPUTS: (keys.inputs, [robot]),
             Topic.PATHS_OF_IN_NEIGHBOURS: (keys.path, self.hears.get(robot, ())),
+            Topic.SILENCES_OF_IN_NEIGHBOURS: (keys.silence, self.hears.get(robot, ())),
             Topic.POSES_OF_LOCATED_NEIGHBOURS: (keys.pose, self.located.get(robot, ())),
             Topic.EMULATED_POSES: (keys.pose, emulated),
             Topic.MEASURED_POSES: (keys.pose, measured),
+            Topic.SILENCES: (keys.silence, emulated),
             Topic.TRUTHS: (keys.truth, self.robots),
             Topic.TELEMETRIES: (keys.telemetry, self.robots),
             Topic.INPUTS: (keys.inputs, self.robots),

@@ -171,6 +171,11 @@ class InputBuffer:
         """The controller was told to stop."""
         self._add(Kind.STOP, _packed(sent))
 
+    def hand_on(self) -> None:
+        """Hand on what is there."""
+        if self._block:
+            self._flush(final=False)
+
     def finish(self) -> None:
         """Hand on what is left and say that nothing follows."""
         self._flush(final=True)

@@ -1,6 +1,7 @@
 """Zenoh keys of a run, one function each; stable parts left.
 
     fleetloop/<run>/robot/<name>/path        s, v̂_r, t; heard by exactly the out-neighbours
+    fleetloop/<run>/robot/<name>/silence     from the plant: no path state of it at a tick
     fleetloop/<run>/robot/<name>/pose        from the localisation system to the robot
     fleetloop/<run>/robot/<name>/truth       the plant's rows, to the recorder
     fleetloop/<run>/robot/<name>/telemetry   the controller's rows, to the recorder
@@ -34,6 +35,11 @@ _CHUNK = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 def path(run: str, robot: str) -> str:
     """Key of a robot's path variable."""
     return f"{_run(run)}/robot/{_chunk(robot)}/path"
+
+
+def silence(run: str, robot: str) -> str:
+    """Key on which the plant says that a robot has no path state."""
+    return f"{_run(run)}/robot/{_chunk(robot)}/silence"
 
 
 def pose(run: str, robot: str) -> str:

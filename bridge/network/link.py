@@ -50,8 +50,13 @@ class Publisher(Protocol):
 class Link(Protocol):
     """One process's connection to the others."""
 
-    def publisher(self, key: str, *, express: bool = True) -> Publisher:
-        """A publisher on `key`; not express, its messages may travel with others a little later."""
+    def publisher(self, key: str, *, express: bool = True, steady: bool = False) -> Publisher:
+        """A publisher on `key`.
+
+        Not express, its messages may travel with others a little later. A steady one also sends
+        while nobody subscribes: the first message of a subscription that the router knows is not
+        lost because word of it has not come here yet.
+        """
 
     def subscribe(self, key: str, tag: str, *, room_bytes: int = ROOM_BYTES) -> None:
         """Queue what is put on `key`, marked with `tag`, as long as there is room."""

@@ -8,6 +8,7 @@ still be impossible: readers that know the run check that.
 
     message        layout                                        key
     PathState      [1, tick, t_ns, s, v_hat]                     robot/<name>/path
+    Silence        [1, tick]                                     robot/<name>/silence, path
     PoseFix        [1, tick, t_ns, x_m, y_m, theta_rad]          robot/<name>/pose
     LeaderSpeed    [1, [[from_t_ns, speed_m_s, ramp_ns], ...]]   leader/speed
     Rows           [1, first_tick, length, rows, final]          robot/<name>/truth, telemetry;
@@ -27,6 +28,7 @@ from configs.leader_speed import SpeedChange, in_order
 
 MOST_BYTES = {
     "path": 128,
+    "silence": 128,
     "pose": 128,
     "progress": 128,
     "pong": 128,
@@ -64,6 +66,25 @@ class PathState(NamedTuple):
         if fields is None or not (ints(fields[1:3]) and finite(fields[3:])):
             return None
         return cls(fields[1], fields[2], fields[3], fields[4])
+
+
+class Silence(NamedTuple):
+    """In lockstep: a robot has no path state at this tick; its out-neighbours don't wait for it.
+
+    The plant says it of robots whose controllers are absent, a controller until it has re-joined.
+    """
+
+    tick: int
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return pack(*self)
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "Silence | None":
+        """The message in the bytes, None if there is none."""
+        fields = unpack(payload, 2)
+        return cls(*fields[1:]) if fields is not None and ints(fields[1:]) else None
 
 
 class PoseFix(NamedTuple):

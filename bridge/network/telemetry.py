@@ -51,8 +51,19 @@ class RowBuffer:
         if count == BLOCK_TICKS:
             self._flush(final=False)
 
+    def hand_on(self) -> None:
+        """Hand on what is there."""
+        if self._count:
+            self._flush(final=False)
+
     def finish(self) -> None:
         """Hand on what is left and say that nothing follows."""
+        self._flush(final=True)
+
+    def give_up(self, ticks: int) -> None:
+        """Hand on what is left and say that no row of the run's `ticks` follows."""
+        self.hand_on()
+        self._first_tick = ticks
         self._flush(final=True)
 
     def _flush(self, *, final: bool) -> None:

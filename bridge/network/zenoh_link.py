@@ -29,6 +29,26 @@ _PAUSE_S, _LONGEST_PAUSE_S, _PAUSE_SHARE = 50e-6, 2e-3, 0.05
 waits for its last robots leaves them the processor."""
 
 
+class _SteadyPublisher:
+    """Puts undeclared: a declared publisher sends nothing while it knows of no subscriber."""
+
+    def __init__(self, session: zenoh.Session, key: str, *, express: bool) -> None:
+        self._session = session
+        self._key = zenoh.KeyExpr(key)
+        self._express = express
+
+    def put(self, payload: bytes) -> None:
+        """Put one message."""
+        self._session.put(
+            self._key,
+            payload,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            priority=zenoh.Priority.REAL_TIME,
+            express=self._express,
+            allowed_destination=zenoh.Locality.REMOTE,
+        )
+
+
 class ZenohLink:
     """One Zenoh session as a `bridge.network.link.Link`."""
 
@@ -40,8 +60,10 @@ class ZenohLink:
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
         self.receive = self._inbox.receive
 
-    def publisher(self, key: str, *, express: bool = True) -> Publisher:
+    def publisher(self, key: str, *, express: bool = True, steady: bool = False) -> Publisher:
         """A publisher on `key`; a put blocks rather than drops."""
+        if steady:
+            return _SteadyPublisher(self._session, key, express=express)
         return self._session.declare_publisher(
             key,
             congestion_control=zenoh.CongestionControl.BLOCK,

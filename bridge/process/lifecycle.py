@@ -75,6 +75,11 @@ class Stop:
         self.request(reason)
         self.release()
 
+    def await_heard(self) -> None:
+        """Having said something that the launcher answers, stay until then, at most `LINGER_S`."""
+        if readable([self.release_fd], LINGER_S):
+            os.eventfd_read(self.release_fd)
+
     def await_release(self) -> None:
         """Having said the last word, stay until the launcher has it, at most `LINGER_S`.
 
@@ -210,6 +215,16 @@ def launcher_stopped() -> bool:
     except OSError:
         return False
     return stat.rpartition(")")[2].split()[:1] in (["T"], ["t"])
+
+
+def kill_self() -> None:
+    """Kill this process at once, as the kernel does."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def freeze_self() -> None:
+    """Stop this process; returns when it was told to continue (SIGCONT)."""
+    os.kill(os.getpid(), signal.SIGSTOP)
 
 
 def processor_wait_ns() -> int:

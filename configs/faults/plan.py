@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 from configs.edge_checks import no_such_robot
 from configs.emulated_edges import EmulatedEdge, edges_of, named, pattern_problem
 from configs.errors import Problem
+from configs.faults.absences import absences, overlapping
 from configs.faults.base import Fault, PlannedFault, RobotFault
 from configs.faults.messages import LinkFault, PoseOutage
 from configs.faults.powertrains import DriveError, DriveFault
+from configs.faults.processes import ProcessRestart, ProcessStopped
 from configs.netem import LOCALISATION
 from configs.plugins import Recorded, raised
 
@@ -102,6 +104,13 @@ def fault_problems(scenario: "Scenario", *, sound_edges: bool) -> Iterator[Probl
             yield Problem(f"fault.{n}.name", fault.name, "another fault has this name")
         seen |= set() if fault.name is None else {fault.name}
         yield from problems_of(fault, f"fault.{n}", scenario, sound_edges=sound_edges)
+    of_processes = (one for one in scenario.fault if one.PLACE == "process")
+    stopped = absences(one for fault in of_processes for one in plan(fault, "", scenario))
+    if pair := overlapping(stopped):
+        period_s = scenario.clock.control_period_s
+        before, after = (one.from_tick * period_s for one in pair)
+        remedy = f"of {pair[0].robot} is absent from {before:g} s on, and can't be killed or frozen"
+        yield Problem("fault.at_s", after, f"the process {remedy} then")
 
 
 def problems_of(
@@ -121,7 +130,7 @@ def problems_of(
     if fault.at_s >= end_s:
         remedy = f"the run ends before: must be below duration_s = {end_s:g}"
         yield Problem(f"{where}.at_s", fault.at_s, remedy)
-    if reason := _missing_model(fault, scenario):
+    if reason := _missing_model(fault, scenario) or _no_return(fault, scenario):
         yield Problem(f"{where}.kind", fault.kind, reason)
     if isinstance(fault, DriveFault):
         yield from _drive_problems(fault, where, scenario)
@@ -141,6 +150,28 @@ def _drive_problems(fault: DriveFault, where: str, scenario: "Scenario") -> Iter
     elif isinstance(fault, DriveError) and fault.error not in (None, *errors):
         known = ", ".join(errors)
         yield Problem(f"{where}.error", fault.error, f"drives have no such error; known: {known}")
+
+
+def _no_return(fault: Fault, scenario: "Scenario") -> str | None:
+    """Why a process that is to be there again can't be, and what lets it."""
+    stays_away = isinstance(fault, ProcessStopped) and fault.for_s is None
+    if not isinstance(fault, ProcessStopped | ProcessRestart) or stays_away:
+        return None
+    lockstep, policy = scenario.clock.mode == "lockstep", scenario.clock.on_late
+    if lockstep and policy == "abort":
+        return "ends a lockstep run: needs clock.on_late = 'hold' or 'drop', or real time"
+    keeps_its_state = fault.kind == "process_freeze" and not (lockstep and policy == "drop")
+    if scenario.localisation.source == "odometry" and not keeps_its_state:
+        return "odometry alone doesn't know where the robot is after a start: needs fixes"
+    return None
+
+
+def process_fault_problem(scenario: "Scenario") -> str | None:
+    """Why the scenario can't run in one process; None if no fault keeps it from that."""
+    kinds = dict.fromkeys(one.kind for one in scenario.fault if one.PLACE == "process")
+    if not kinds:
+        return None
+    return f"{', '.join(kinds)} can't act in one process: the run over processes has it"
 
 
 def _missing_model(fault: Fault, scenario: "Scenario") -> str | None:

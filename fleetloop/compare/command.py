@@ -11,6 +11,7 @@ from pathlib import Path
 
 from bridge.process.clock import SYSTEM_CLOCK
 from configs.errors import ExitStatus, InfrastructureError, ScenarioError
+from configs.faults.plan import process_fault_problem
 from configs.loading import folder_of, load
 from configs.overrides import Overrides
 from configs.scenario import Scenario
@@ -51,6 +52,8 @@ def compare(source: str, options: CompareOptions) -> int:
         InfrastructureError: a file or a process can't be had.
     """
     scenario = load(source, options.overrides)
+    if problem := process_fault_problem(scenario):
+        raise ScenarioError(f"{source}: {problem}; compare runs in one process: leave them out")
     if scenario.clock.mode == "realtime":
         raise ScenarioError(
             f'{source}: clock.mode = "realtime" would compare the machine, too; add'

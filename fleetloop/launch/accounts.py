@@ -29,6 +29,8 @@ def stats_of(outcome: Outcome, *, realtime: bool, period_s: float) -> RunStats:
     )
     stats.cpu_s["launcher"] = round(outcome.cpu_ns * 1e-9, 3)
     # The plant's first: what it does to a robot at a tick comes before what the controller says.
+    for process, events in outcome.former.items():
+        stats.events += [of_process(process, event) for event in events]
     for process, report in sorted(outcome.reports.items(), key=lambda it: it[0] != PLANT.name):
         _add_report(stats, process, report)
     # What a process said on the way is in its report as well, if it lived to make one.

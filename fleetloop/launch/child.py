@@ -129,6 +129,13 @@ class Child:
         if not self.ended():
             os.kill(self._pid, signal.SIGTERM)
 
+    def wake(self) -> bool:
+        """Let it go on if a signal has stopped it; whether one had."""
+        stopped = not self.ended() and self.state() == _STATES["T"]
+        if stopped:
+            os.kill(self._pid, signal.SIGCONT)
+        return stopped
+
     def kill(self) -> None:
         """Send SIGKILL, if it still runs."""
         if not self.ended():

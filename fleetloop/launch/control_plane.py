@@ -12,7 +12,7 @@ from bridge.network.link import Arrival, Link
 from bridge.network.messages import Progress
 from configs.brief import Schedule
 from configs.events import MAX_EVENTS, Event
-from configs.roles import PLANT, is_observer, short_name
+from configs.roles import AGENT, PLANT, is_observer, short_name
 from fleetloop.launch.child import Child
 from fleetloop.launch.clock_offsets import ClockOffsets
 from fleetloop.launch.machine import WATCH_EVERY_S
@@ -51,6 +51,14 @@ class ControlPlane:
         self.children: list[Child] = []
         self.alive: set[str] = set()
         """Processes with a liveliness token."""
+        self.held: set[str] = set()
+        """Controllers that others don't wait for at present: frozen by a fault, or late."""
+        self.let_go: set[str] = set()
+        """Controllers that the run goes on without: killed by a fault, or dropped by the plant."""
+        self.awaited: dict[str, int] = {}
+        """Controllers that the plant waits for to be started again, and the ticks of that."""
+        self.struck: dict[str, Event] = {}
+        """Controllers that a fault has killed or frozen, and the event."""
         self.ticking = False
         """Whether the plant has begun to tick."""
         self.now = now
@@ -89,14 +97,23 @@ class ControlPlane:
         """The process of that name on this machine, None if it is on another."""
         return next((child for child in self.children if child.name == process), None)
 
+    def lost_controllers(self) -> set[str]:
+        """Controllers that are gone without having said so: their last rows will not come."""
+        return (self.let_go | self.held) - self.struck.keys()
+
     @property
     def actors(self) -> list[Child]:
         """The processes on this machine that take part in the run."""
-        return [child for child in self.children if not is_observer(child.name)]
+        return [
+            child
+            for child in self.children
+            if not is_observer(child.name) and child.name not in self.let_go
+        ]
 
-    def note(self, process: str, kind: str, text: str) -> None:
-        """Record an event of a process that the launcher has observed."""
-        event = Event(self.outcome.ticks, short_name(process), kind, text)
+    def note(self, process: str, kind: str, text: str, tick: int | None = None) -> None:
+        """Record an event of a process that the launcher has observed, now or at a tick."""
+        now = self.outcome.ticks if tick is None else tick
+        event = Event(now, short_name(process), kind, text)
         self._take(self.outcome.events.setdefault(process, []), event)
 
     def process(self, arrival: Arrival) -> None:
@@ -120,6 +137,7 @@ class ControlPlane:
                     self.words.refusals.note("answer", process, "not well formed")
             case "notice":
                 if (event := self.words.event(process, arrival.payload)) is not None:
+                    self._note_absence(process, event)
                     self._take(self.outcome.said.setdefault(process, []), event)
             case _:
                 self._process_report(process, arrival.payload)
@@ -143,6 +161,25 @@ class ControlPlane:
                 self.on_notice(process, f"left the run early: {report.left_early}")
         if (child := self.child(process)) is not None:
             child.release()
+
+    def _note_absence(self, process: str, event: Event) -> None:
+        """Take what plant or controller say of a controller's absence."""
+        role, controller = process.partition("/")[0], AGENT.process(event.source)
+        match role, event.kind:
+            case AGENT.name, "killed" | "frozen":
+                (self.held.add if event.kind == "frozen" else lambda _: None)(process)
+                self.struck[process] = event
+                if (child := self.child(process)) is not None:
+                    child.release()
+            case PLANT.name, "held":
+                self.held.add(controller)
+            case PLANT.name, "dropped":
+                self.let_go.add(controller)
+            case PLANT.name, "awaited":
+                self.awaited[controller] = event.tick
+            case PLANT.name, "back":
+                self.held.discard(controller)
+                self.struck.pop(controller, None)
 
     def _take(self, account: list[Event], event: Event) -> None:
         if len(account) < MAX_EVENTS:

@@ -63,7 +63,7 @@ class Ending:
         self._await_remote_roles(link, DRAIN_S)
         end([child for child in plane.children if child not in (*actors, recorder)])
         if recorder is not None:
-            if outcome.ended != "completed":
+            if outcome.ended != "completed" or plane.lost_controllers():
                 recorder.ask_to_stop()
             self._drain(link, recorder)
         for arrival in waiting(link):

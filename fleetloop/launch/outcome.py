@@ -22,6 +22,8 @@ class Outcome:
     reports: dict[str, Report] = field(default_factory=dict)
     said: dict[str, list[Event]] = field(default_factory=dict)  # by a process, as they came
     faults: list[dict[str, Any]] = field(default_factory=list)  # of `fleetloop.launch.fault_ledger`
+    former: dict[str, list[Event]] = field(default_factory=dict)
+    """By controllers whose process was replaced, as they came."""
     events: dict[str, list[Event]] = field(default_factory=dict)  # of a process, as observed here
     remarks: dict[str, list[str]] = field(default_factory=dict)  # of launcher and router
     clocks: dict[str, dict[str, float]] = field(default_factory=dict)

@@ -28,6 +28,8 @@ from configs.connections import LEASE_S, LOCAL_LEASE_S, NetworkLink
 from configs.deployment import Deployment
 from configs.errors import InfrastructureError
 from configs.events import Event
+from configs.faults.absences import absences
+from configs.faults.plan import planned_faults
 from configs.resolve import leader_brief, schedule
 from configs.roles import LAUNCHER, PLANT, identity_of, processes_of
 from configs.scenario import Scenario
@@ -47,6 +49,7 @@ from fleetloop.launch.fault_desk import FaultDesk
 from fleetloop.launch.fork_server import ForkServer
 from fleetloop.launch.machine import WATCH_EVERY_S, MachineWatch
 from fleetloop.launch.outcome import Outcome
+from fleetloop.launch.process_faults import ProcessFaults, returning
 from fleetloop.launch.remote_roles import RemoteRoles
 from fleetloop.launch.restarts import Restarts
 from fleetloop.launch.spawn import Orders, respawn, spawn
@@ -81,7 +84,7 @@ class ProcessRun:
         self._clock = clock
         self._scenario = scenario
         self._deployment = deployment or Deployment()
-        self._orders = Orders(scenario, self._deployment, record, speed, profile)
+        self._orders = Orders.of(scenario, self._deployment, record, speed, profile=profile)
         self._run = placement.run_name(scenario, self._deployment) or run
         self._processes = processes_of(scenario.names)
         self._schedule = schedule(scenario, speed)
@@ -263,11 +266,21 @@ class ProcessRun:
         """Follow the run until the plant and all controllers have ended."""
         most, folder = self._scenario.host.restarts, sockets.folder_of(self._run)
         requests = {"about": Request({}, self._say_about), **self._desk.requests}
+        absent = absences(planned_faults(self._scenario), self._schedule.ticks)
         with (
-            Restarts(self._plane, most, folder, self._respawned) as restarts,
+            Restarts(
+                self._plane,
+                most,
+                folder,
+                self._respawned,
+                planned=returning(absent, self._schedule),
+                batch=not self._schedule.realtime,
+                resume=self._machine.clock.resume,
+            ) as restarts,
             Door(folder, requests) as door,
         ):
-            return self._follow(link, stop, restarts, door)
+            faults = ProcessFaults(self._plane, self._schedule, absent, restarts)
+            return self._follow(link, stop, restarts, faults, door)
 
     def _say_about(self, respond: Respond) -> None:
         """Tell a client of the door which run this is, and how far."""
@@ -283,7 +296,12 @@ class ProcessRun:
         )
 
     def _follow(
-        self, link: LauncherLink, stop: Stop, restarts: Restarts, door: Door
+        self,
+        link: LauncherLink,
+        stop: Stop,
+        restarts: Restarts,
+        faults: ProcessFaults,
+        door: Door,
     ) -> Failure | None:
         plane, supervision = self._plane, self._supervision
         while not stop.requested:
@@ -295,11 +313,12 @@ class ProcessRun:
             supervision.name_the_frozen()
             supervision.name_the_cut_off()
             restarts.welcome(self._hellos)
+            faults.look(link)
             if (failure := supervision.failure()) is not None:
-                if restarts.replace(failure, link):
+                if faults.account_for(failure, link) or restarts.replace(failure, link):
                     continue
                 return supervision.root_of(failure, link, plane.actors)
-            actors = plane.actors
+            actors = [child for child in plane.actors if child.name not in plane.held]
             if all(child.ended() for child in actors) and self._remote.ended(self._now()):
                 return None
             plant = plane.child(PLANT.name)
@@ -317,10 +336,10 @@ class ProcessRun:
                 return supervision.failure() or silent
         return None
 
-    def _respawned(self, robot: str, fork_server: ForkServer) -> Child:
+    def _respawned(self, robot: str, fork_server: ForkServer, tick: int) -> Child:
         """The process of a controller that was started again."""
         folder = sockets.folder_of(self._run)
-        return respawn(self._orders, self._links, folder, robot, fork_server)
+        return respawn(self._orders, self._links, folder, robot, fork_server, tick)
 
     def _report_refusals(self, link: LauncherLink) -> None:
         """Look for floods now and then; announce what the router refused or cut off."""

@@ -1,7 +1,8 @@
-"""Controllers that are started again in real time: how often, and until when they are awaited.
+"""Controllers that are started again: how often, and until when they are awaited.
 
-killed, crashed    its process is replaced, `host.restarts` times in all, and told leader and clock
-re-joined          its progress comes again
+killed, crashed    in real time: replaced, `host.restarts` times in all, and told leader and clock
+by a fault         as often as the scenario has it (`fleetloop.launch.process_faults`)
+re-joined          its progress comes again; in lockstep, its token
 gave up            it said why it can't go on: that ends the run as ever, and so does one too many
 """
 
@@ -24,7 +25,10 @@ class Restarts:
         plane: of the run; its children are replaced.
         most: how often, all robots together.
         folder: of the run's sockets.
-        respawn: starts the controller of a robot again, by a fork server.
+        planned: how often besides, by faults.
+        batch: see `ForkServer`.
+        resume: told after a start, in which the launcher did nothing else.
+        respawn: starts the controller of a robot again, by a fork server, in lockstep at a tick.
 
     A fork server waits for the next failure, its modules imported. It is a context manager, and
     ends with it.
@@ -35,10 +39,17 @@ class Restarts:
         plane: ControlPlane,
         most: int,
         folder: Path,
-        respawn: Callable[[str, ForkServer], Child],
+        respawn: Callable[[str, ForkServer, int], Child],
+        *,
+        planned: int,
+        batch: bool,
+        resume: Callable[[], None],
     ) -> None:
         self._plane = plane
         self._most = self._left = most
+        self._planned = planned
+        self._batch = batch
+        self._resume = resume
         self._respawn = respawn
         self._since_s: dict[str, float] = {}
         self._folder = folder
@@ -47,7 +58,8 @@ class Restarts:
 
     def _prepare(self) -> None:
         """Start the fork server of the next restart, if there may be one."""
-        self._fork_server = ForkServer(self._folder, batch=False) if self._left else None
+        again = self._left > 0 or self._planned > 0
+        self._fork_server = ForkServer(self._folder, batch=self._batch) if again else None
 
     def __enter__(self) -> Self:
         return self
@@ -65,22 +77,40 @@ class Restarts:
         plane = self._plane
         role, _, robot = failure.name.partition("/")
         child = plane.child(failure.name)
-        fork_server = self._fork_server
-        if not (failure.unexpected and role == AGENT.name) or child is None or fork_server is None:
+        if not (failure.unexpected and role == AGENT.name and self._left) or child is None:
             return False
         self._left -= 1
         count = f"start {self._most - self._left} of {self._most}"
         plane.note(failure.name, "restarted", f"{failure.text}; started again, {count}")
         child.close()
+        plane.children.remove(child)
+        self._start(robot, link, 0)
+        return True
+
+    def start_again(self, robot: str, link: Link, tick: int) -> None:
+        """Start the controller of a robot that a fault has ended, in lockstep at a tick.
+
+        Raises:
+            InfrastructureError: a process can't be had.
+        """
+        self._planned -= 1
+        self._start(robot, link, tick)
+
+    def _start(self, robot: str, link: Link, tick: int) -> None:
+        plane, process = self._plane, AGENT.process(robot)
+        fork_server = self._fork_server or ForkServer(self._folder, batch=self._batch)
         with fork_server:  # has to end, so that the launcher is the parent
-            again = self._respawn(robot, fork_server)
-        plane.children[plane.children.index(child)] = again
+            plane.children.append(self._respawn(robot, fork_server, tick))
         self._prepare()
+        self._resume()
+        plane.alive.discard(process)
+        outcome = plane.outcome
+        said, report = outcome.said.pop(process, []), outcome.reports.pop(process, None)
+        outcome.former.setdefault(process, []).extend(said if report is None else report.events)
         # What came meanwhile is no silence.
         for arrival in waiting(link):
             plane.process(arrival)
-        self._since_s[failure.name] = plane.now()
-        return True
+        self._since_s[process] = plane.now()
 
     def welcome(self, hellos: Hellos) -> None:
         """Say what a controller needs to know as long as one hasn't re-joined."""
@@ -90,5 +120,6 @@ class Restarts:
         now_s = self._plane.now()
         for process, since_s in list(self._since_s.items()):
             silence = self._plane.vitals.silence(process, now_s)
-            if silence is not None and now_s - silence.lasted_s > since_s:
+            heard = silence is not None and now_s - silence.lasted_s > since_s
+            if heard or (self._batch and process in self._plane.alive):
                 del self._since_s[process]

@@ -12,6 +12,7 @@ from configs.connections import NetworkLink
 from configs.deployment import Deployment, load_deployment
 from configs.errors import ExitStatus, FleetloopError, InfrastructureError, ScenarioError
 from configs.events import KINDS, Event, in_order, told
+from configs.faults.plan import process_fault_problem
 from configs.loading import load, to_toml
 from configs.overrides import Overrides
 from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of
@@ -137,6 +138,8 @@ def _run(source: str, options: RunOptions, teller: _Teller) -> int:
         raise ScenarioError(
             f"--speed {options.speed:g}: real time has one speed; for lockstep only"
         )
+    if options.in_process and (problem := process_fault_problem(scenario)):
+        raise ScenarioError(f"{source}: {problem}, without --in-process")
     if options.in_process and options.deployment is not None:
         raise ScenarioError(
             f"--deployment {options.deployment}: --in-process has no buses and no network to place"

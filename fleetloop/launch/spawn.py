@@ -36,6 +36,23 @@ class Orders:
     record: Path
     speed: float
     profile: bool
+    secrets: Mapping[str, str]
+    """By robot: how its bus knows the controller that it waits for; none in real time."""
+
+    @classmethod
+    def of(
+        cls,
+        scenario: Scenario,
+        deployment: Deployment,
+        record: Path,
+        speed: float,
+        *,
+        profile: bool,
+    ) -> "Orders":
+        """Orders with new secrets."""
+        waited_for = () if schedule(scenario).realtime else ours(scenario, deployment)
+        told = {robot: secrets.token_hex(16) for robot in waited_for}
+        return cls(scenario, deployment, record, speed, profile, told)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +63,6 @@ class Place:
     network: NetworkLink
     folder: Path
     robot: str  # of a role per robot
-    secrets: Mapping[str, str]
-    """By robot: how its bus knows the controller that it waits for; none in real time."""
 
 
 def spawn(
@@ -59,13 +74,11 @@ def spawn(
         InfrastructureError: a socket or a process can't be had.
     """
     scenario = orders.scenario
-    waited_for = () if schedule(scenario).realtime else _ours(orders)
-    told = {robot: secrets.token_hex(16) for robot in waited_for}
     for role in STARTED:
         for robot in scenario.names if role.per_robot else ("",):
             if not orders.deployment.runs_here(role.process(robot)):
                 continue
-            place = Place(orders, links[role.identity(robot)], folder, robot, told)
+            place = Place(orders, links[role.identity(robot)], folder, robot)
             brief = BRIEFS[role.name](place)
             if isinstance(brief, PlantBrief):
                 children.append(_start_plant(brief, place, fork_server))
@@ -75,31 +88,39 @@ def spawn(
 
 
 def respawn(
-    orders: Orders, links: Links, folder: Path, robot: str, fork_server: ForkServer
+    orders: Orders,
+    links: Links,
+    folder: Path,
+    robot: str,
+    fork_server: ForkServer,
+    resumes_tick: int = 0,
 ) -> Child:
-    """Start the controller of a robot again, in real time, in a run that goes on.
+    """Start the controller of a robot again in a run that goes on, in lockstep at a tick.
 
     Raises:
         InfrastructureError: a process can't be had.
     """
-    place = Place(orders, links[AGENT.identity(robot)], folder, robot, {})
+    place = Place(orders, links[AGENT.identity(robot)], folder, robot)
     child = Child(fork_server, AGENT.process(robot), AGENT.module)
-    child.tell(replace(_agent(place), rejoins=True))
+    child.tell(replace(_agent(place), rejoins=True, resumes_tick=resumes_tick))
     return child
 
 
-def _ours(orders: Orders) -> tuple[str, ...]:
+def ours(scenario: Scenario, deployment: Deployment) -> tuple[str, ...]:
     """The robots on buses of ours, which the plant of this machine serves."""
-    deployment = orders.deployment
     if not deployment.runs_here(PLANT.name):
         return ()
-    return tuple(robot for robot in orders.scenario.names if deployment.is_ours(robot))
+    return tuple(robot for robot in scenario.names if deployment.is_ours(robot))
 
 
 def _start_plant(brief: PlantBrief, place: Place, fork_server: ForkServer) -> Child:
     """Open the listening sockets of its buses, and hand them to it."""
     orders = place.orders
-    buses = list(dict.fromkeys(orders.scenario.bus_of(robot) for robot in _ours(orders)))
+    buses = list(
+        dict.fromkeys(
+            orders.scenario.bus_of(robot) for robot in ours(orders.scenario, orders.deployment)
+        )
+    )
     with ExitStack() as listening:
         listeners = sockets.listen(place.folder, buses)
         for listener in listeners.values():
@@ -116,15 +137,15 @@ def _plant(place: Place) -> PlantBrief:
         orders.scenario, network=place.network, speed=orders.speed, profile=orders.profile
     )
     brief = placement.robots_of_plant(brief, orders.deployment)
-    return replace(brief, controllers=tuple(place.secrets.items()))
+    return replace(brief, controllers=tuple(place.orders.secrets.items()))
 
 
 def _agent(place: Place) -> AgentBrief:
     orders, robot = place.orders, place.robot
     socket = ""
-    if robot in _ours(orders):
+    if robot in ours(orders.scenario, orders.deployment):
         socket = str(sockets.socket_path(place.folder, orders.scenario.bus_of(robot)))
-    secret = place.secrets.get(robot, "")
+    secret = place.orders.secrets.get(robot, "")
     return agent_brief(
         orders.scenario,
         robot,
@@ -152,9 +173,17 @@ def _recorder(place: Place) -> RecorderBrief:
         str(place.folder),
         ticks.ticks,
         ticks.bus_time_ns(ticks.ticks) + AFTERWARDS_NS,
-        fills_gaps=orders.deployment.may_rejoin or orders.scenario.host.restarts > 0,
+        fills_gaps=_may_have_gaps(orders),
         inputs=orders.scenario.records_inputs,
     )
+
+
+def _may_have_gaps(orders: Orders) -> bool:
+    """Whether controllers may be cut off, absent or started again."""
+    scenario = orders.scenario
+    stops = any(one.PLACE == "process" for one in scenario.fault)
+    goes_on = schedule(scenario).on_late != "abort"
+    return orders.deployment.may_rejoin or scenario.host.restarts > 0 or stops or goes_on
 
 
 def _recorded(orders: Orders) -> tuple[str, ...]:

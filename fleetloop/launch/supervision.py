@@ -68,6 +68,8 @@ class Supervision:
         """The process that the run needs and that the router cut off, None if there is none."""
         plane = self._plane
         for child in plane.children if link.denials.cut_off else ():
+            if child.name in plane.held | plane.let_go:  # it reads nothing
+                continue
             deaf = identity_of(child.name) in link.denials.cut_off
             # In real time the newest message is as good as those that were lost.
             needed = not self._schedule.realtime or child.name == RECORDER.name

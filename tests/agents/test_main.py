@@ -9,6 +9,7 @@ from support.robot_bench import ZERO, Bench, commands, set_points
 from agents.__main__ import _Connections
 from agents.guard import Phase
 from agents.lockstep import LockstepCounters
+from agents.process_faults import ProcessFaults
 from bridge.can_bus.pythoncan import to_frame
 from bridge.drives.odrive.frames import Command
 from bridge.network.barrier import Hellos
@@ -53,7 +54,10 @@ class Ending:
             raise error
 
         with pytest.raises(type(error)):
-            self.connections.run(body, self.stop, LockstepCounters())
+            guard = self.bench.agent.guard
+            faults = ProcessFaults(self.bench.agent.brief, guard.note)
+            loop = SimpleNamespace(counters=LockstepCounters(), faults=faults)
+            self.connections.run(body, self.stop, loop)
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ RESOLVED = {
     "RecorderBrief": {"robots", "start_deadline_s"},
     "RobotBrief": {"bus", "right_node", "left_node", "v_m_s", "omega_rad_s"},
     "Wheels": {"radius_m", "half_track_m"},
-    "Schedule": {"tick_deadline_s", "start_deadline_s"},
+    "Schedule": {"tick_deadline_s", "start_deadline_s", "on_late"},
     "SplinePath": {"closed"},
 }
 """Values that have the name of a key of the file and are settled for one robot or process: of the

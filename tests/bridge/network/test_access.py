@@ -52,6 +52,8 @@ def test_rights_of_a_robot_are_its_graph(plan: access.AccessPlan) -> None:
         keys.path(RUN, "r2"),
         keys.path(RUN, "r3"),
         keys.order(RUN, "agent/r4"),
+        keys.silence(RUN, "r2"),
+        keys.silence(RUN, "r3"),
     }
     assert keys.leader_speed(RUN) in plan.rights["agent-r1"].hears
     assert keys.leader_speed(RUN) not in plan.rights["agent-r2"].hears

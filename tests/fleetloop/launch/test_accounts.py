@@ -34,6 +34,13 @@ def test_what_a_process_said_is_kept_if_it_did_not_live_to_report_it() -> None:
     assert stats.remarks == {"r1": ["odd"]}
 
 
+def test_what_the_process_before_said_comes_first() -> None:
+    killed, again = Event(3, "r1", "killed"), Event(9, "r1", "rejoined")
+    ended = outcome(PlantReport(), AgentReport(events=(again,)))
+    ended.former = {"agent/r1": [killed]}
+    assert stats_of(ended, realtime=True, period_s=0.01).events == [killed, again]
+
+
 def test_a_controller_speaks_of_its_own_robot_only_and_the_plant_of_any() -> None:
     of_r2 = Event(3, "r2", "diverged", "far")
     reports = outcome(PlantReport(events=(of_r2,)), AgentReport(events=(of_r2,)))

@@ -1,0 +1,52 @@
+"""The ticks at which the process of a controller is absent by faults of the scenario.
+
+The plant, which in lockstep waits for no absent controller, and the launcher, which wakes processes
+and starts them again, go by the same list.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from configs.edges import FOREVER
+from configs.faults.base import PlannedFault
+from configs.faults.processes import ProcessRestart, ProcessStopped
+
+
+class Absence(NamedTuple):
+    """The process of one robot's controller doesn't act at these ticks."""
+
+    robot: str
+    from_tick: int
+    to_tick: int | None  # the first tick at which it acts again; None: there is none
+    frozen: bool
+    """Whether the process is there; otherwise it is killed."""
+
+
+def absences(planned: Iterable[PlannedFault], ticks: int = FOREVER) -> tuple[Absence, ...]:
+    """The absences by all faults that kill or freeze, in a run of `ticks`, by tick and robot."""
+    found = []
+    for one in planned:
+        # Killed at a tick, it can't act at that tick any more.
+        next_tick = one.from_tick + 1
+        match one.fault:
+            case ProcessRestart():
+                found.append(Absence(one.target, one.from_tick, next_tick, False))
+            case ProcessStopped(kind=kind):
+                until = None if one.to_tick is None else max(one.to_tick, next_tick)
+                found.append(Absence(one.target, one.from_tick, until, kind == "process_freeze"))
+    found = [
+        one if one.to_tick is None or one.to_tick < ticks else one._replace(to_tick=None)
+        for one in found
+    ]
+    return tuple(sorted(found, key=lambda it: (it.from_tick, it.robot)))
+
+
+def overlapping(absent: Iterable[Absence]) -> tuple[Absence, Absence] | None:
+    """Two absences of one robot at the same time, the earlier first; None if there are none."""
+    newest: dict[str, Absence] = {}
+    for one in absent:
+        before = newest.get(one.robot)
+        if before is not None and (before.to_tick is None or one.from_tick < before.to_tick):
+            return before, one
+        newest[one.robot] = one
+    return None

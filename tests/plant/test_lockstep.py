@@ -1,0 +1,230 @@
+"""Lockstep whose controllers are late, gone, or come again: what the plant does by its policy."""
+
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+
+import pytest
+from support.clocks import ManualClock
+from support.robot_bench import BARE, NOWHERE
+from support.scripted_hub import Controller, ScriptedHub
+
+from bridge.network.messages import Silence
+from bridge.network.telemetry import PLANT_ROW, RowBuffer
+from bridge.process.lifecycle import Stop
+from configs.errors import InfrastructureError, PeerLostError
+from configs.events import Event
+from configs.loading import load
+from configs.resolve import plant_brief
+from plant.absent import AbsentControllers
+from plant.lockstep import ANSWER_SHARE, LockstepLoop
+from plant.robot import emulated_robot
+
+TICKS = 100
+SHARES = 10
+COUNTDOWN = 125
+
+
+class Bench:
+    """A plant of two robots by the test's clock, and their controllers."""
+
+    def __init__(self, on_late: str, *faults: str) -> None:
+        overrides = (f"fault=[{', '.join(faults)}]", f"clock.on_late={on_late!r}")
+        scenario = load("two_robots", (*BARE, "duration_s=0.2", *overrides))
+        brief = plant_brief(scenario, network=NOWHERE)
+        self.clock = ManualClock(10**9)
+        self.hub = ScriptedHub(("r1", "r2"), self.clock)
+        self.silent: dict[str, list[int]] = {"r1": [], "r2": []}
+        self.events: list[Event] = []
+        self.ticks: list[int] = []
+        silences = {robot: SimpleNamespace(put=self._hear(robot)) for robot in self.silent}
+        absent = AbsentControllers(brief, self.hub, silences, self.events.append)
+        nowhere = SimpleNamespace(put=lambda _: None)
+        self.schedule = brief.schedule
+        robots = [emulated_robot(robot) for robot in brief.robots]
+        self.loop = LockstepLoop(
+            brief,
+            robots,
+            self.hub,
+            [nowhere, nowhere],
+            [RowBuffer(PLANT_ROW, lambda *_: None) for _ in robots],
+            lambda state: self.ticks.append(state.tick),
+            {},
+            absent,
+            clock=self.clock,
+        )
+
+    def _hear(self, robot: str) -> Callable[[bytes], None]:
+        def put(payload: bytes) -> None:
+            silence = Silence.decode(payload)
+            assert silence is not None
+            self.silent[robot].append(silence.tick)
+
+        return put
+
+    def controller(self, robot: str) -> Controller:
+        return self.hub.controllers[robot]
+
+    def at(self, robot: str, tick: int, act: Callable[[], object]) -> None:
+        """Do something once, when a controller was asked at a tick, before anybody answers."""
+        before, done = self.hub.script, []
+        asked_ns = self.schedule.bus_time_ns(tick - 1)
+
+        def script() -> None:
+            before()
+            if not done and asked_ns in self.controller(robot).stamps_ns:
+                done.append(act())
+
+        self.hub.script = script
+
+    def stops(self, robot: str, tick: int) -> None:
+        """Let a controller answer no more from a tick on, as one that hangs."""
+        self.at(robot, tick, lambda: setattr(self.controller(robot), "answers", False))
+
+    def run(self) -> None:
+        self.loop.run(Stop())
+
+    def told(self) -> list[tuple[int, str, str]]:
+        return [(event.tick, event.source, event.kind) for event in self.events]
+
+
+@pytest.fixture
+def benches(runtime_folder) -> Iterator[Callable[..., Bench]]:
+    made: list[Bench] = []
+
+    def make(on_late: str, *faults: str) -> Bench:
+        made.append(Bench(on_late, *faults))
+        return made[-1]
+
+    yield make
+    for bench in made:
+        bench.hub.end()
+
+
+def test_without_anybody_late_every_policy_is_the_same(benches) -> None:
+    for policy in ("abort", "hold", "drop"):
+        bench = benches(policy)
+        bench.run()
+        stamps = [bench.schedule.bus_time_ns(tick) for tick in range(-COUNTDOWN, TICKS + 1)]
+        assert bench.controller("r1").stamps_ns == bench.controller("r2").stamps_ns == stamps
+        assert (bench.events, bench.silent) == ([], {"r1": [], "r2": []})
+        bench.hub.end()
+
+
+def test_abort_ends_the_run_with_the_name_of_the_late_one(benches) -> None:
+    bench = benches("abort")
+    bench.stops("r2", 40)
+    began_s = bench.clock.monotonic_s()
+    with pytest.raises(InfrastructureError, match=r"tick 40 .* of r2 within 1\.8 s"):
+        bench.run()
+    limit_s = ANSWER_SHARE * bench.schedule.tick_deadline_s
+    assert limit_s < bench.clock.monotonic_s() - began_s < limit_s + 0.3
+
+
+def test_abort_ends_the_run_with_the_name_of_the_one_that_left(benches) -> None:
+    bench = benches("abort")
+    bench.at("r2", 40, bench.controller("r2").leave)
+    with pytest.raises(PeerLostError, match=r"tick 40 .* r2 left its bus"):
+        bench.run()
+
+
+@pytest.mark.parametrize("policy", ["hold", "drop"])
+def test_the_others_go_on_without_one_that_left(policy: str, benches) -> None:
+    bench = benches(policy)
+    bench.at("r2", 40, bench.controller("r2").leave)
+    bench.run()
+    assert bench.told() == [(40, "r2", "dropped")]
+    # The path state of tick 40 was published before the answer to tick 39.
+    assert bench.silent == {"r1": [], "r2": [50, 60, 70, 80, 90, 100]}
+    assert len(bench.controller("r1").stamps_ns) == COUNTDOWN + TICKS + 1
+
+
+def test_a_dropped_controller_is_told_so_and_costs_one_deadline(benches) -> None:
+    bench = benches("drop")
+    bench.stops("r2", 43)
+    began_s = bench.clock.monotonic_s()
+    bench.run()
+    limit_s = ANSWER_SHARE * bench.schedule.tick_deadline_s
+    assert limit_s < bench.clock.monotonic_s() - began_s < limit_s + 0.5
+    assert bench.told() == [(43, "r2", "dropped")]
+    assert bench.silent["r2"] == [50, 60, 70, 80, 90, 100]
+    late = bench.controller("r2")
+    late.answers = True
+    late.answer()
+    assert late.goodbye == "dropped: it didn't answer in time"
+
+
+def test_a_held_controller_is_waited_for_again_once_it_answers(benches) -> None:
+    bench = benches("hold")
+    late = bench.controller("r2")
+    bench.stops("r2", 43)
+    bench.at("r1", 75, lambda: setattr(late, "answers", True))
+    bench.run()
+    (held, back) = bench.events
+    assert (held.tick, held.source, held.kind) == (43, "r2", "held")
+    assert (back.source, back.kind) == ("r2", "back")
+    # It heard every question, late ones as well, and the plant spoke for it meanwhile.
+    assert len(late.stamps_ns) == COUNTDOWN + TICKS + 1
+    assert bench.silent["r2"] == list(range(50, back.tick + 1, SHARES))
+    assert 60 <= back.tick <= 80
+
+
+def test_who_waits_for_a_late_one_is_not_late_itself(benches) -> None:
+    """r1 is at a later tick and answers no more until r2 is dropped, as if it waited for it."""
+    bench = benches("drop")
+    bench.stops("r2", 40)
+    bench.stops("r1", 50)
+    before = bench.hub.script
+
+    def heard() -> None:
+        before()
+        if bench.silent["r2"]:
+            bench.controller("r1").answers = True
+
+    bench.hub.script = heard
+    bench.run()
+    assert bench.told() == [(40, "r2", "dropped")]
+
+
+def test_a_frozen_controller_is_not_waited_for_from_its_tick_until_its_tick(benches) -> None:
+    fault = "{kind='process_freeze', at_s=0.08, for_s=0.1, robots=['r2']}"
+    bench = benches("hold", fault)
+    late = bench.controller("r2")
+    bench.stops("r2", 40)
+    # Awake when the plant waits for it, at tick 90.
+    bench.at("r1", 91, lambda: setattr(late, "answers", True))
+    began_s = bench.clock.monotonic_s()
+    bench.run()
+    assert bench.told() == [(40, "r2", "held"), (90, "r2", "back")]
+    assert bench.silent["r2"] == [50, 60, 70, 80, 90]
+    assert bench.clock.monotonic_s() - began_s < 0.5
+
+
+KILL = "{kind='process_kill', at_s=0.08, for_s=0.1, robots=['r2']}"
+
+
+def test_time_stands_still_until_a_killed_controller_has_come_again(benches) -> None:
+    bench = benches("drop", KILL)
+    bench.at("r2", 40, bench.controller("r2").leave)
+    before = bench.hub.script
+
+    def come_again() -> None:
+        before()
+        if bench.told()[-1:] == [(90, "r2", "awaited")] and bench.clock.now_ns > 5 * 10**9:
+            bench.hub.again("r2")
+            bench.hub.script = before
+
+    bench.hub.script = come_again
+    bench.run()
+    said = [(40, "dropped"), (90, "awaited"), (90, "back")]
+    assert bench.told() == [(tick, "r2", kind) for tick, kind in said]
+    assert bench.silent["r2"] == [50, 60, 70, 80, 90]
+    stamps = [bench.schedule.bus_time_ns(tick) for tick in range(90, TICKS + 1)]
+    assert bench.controller("r2").stamps_ns == stamps
+    assert bench.ticks[-1] >= 90
+
+
+def test_a_killed_controller_that_does_not_come_again_ends_the_run(benches) -> None:
+    bench = benches("drop", KILL)
+    bench.at("r2", 40, bench.controller("r2").leave)
+    with pytest.raises(InfrastructureError, match=r"tick 90 .* r2 did not come again within 20 s"):
+        bench.run()
