@@ -18,6 +18,8 @@ class ExitStatus(IntEnum):
     """An option, a scenario or a deployment is wrong; nothing was started."""
     INFRASTRUCTURE = 3
     """The machine, a process, a bus or a network failed."""
+    NOTHING = 5
+    """Nothing to do: of `fleetloop test`, no scenario."""
     INTERRUPTED = 130
     """Ended by a signal, as a shell counts Ctrl-C."""
 

@@ -182,9 +182,11 @@ def _count(expect: Expect) -> str:
     least, most = expect.at_least, expect.at_most
     if most == 0:
         return "never"
-    if least is not None and most is not None:
-        return f"{least} times" if least == most else f"{least} to {most} times"
-    return f"at least {least} times" if least is not None else f"at most {most} times"
+    if least is not None and most is not None and least != most:
+        return f"{least} to {most} times"
+    how = "" if least == most else ("at most " if least is None else "at least ")
+    times = most if least is None else least
+    return how + ("once" if times == 1 else f"{times} times")
 
 
 def _when(expect: Expect) -> str:

@@ -1,7 +1,8 @@
 """The command line: `fleetloop VERB ...`. A verb's arguments are in `app.py` of its room.
 
 Exit status: 0 held, 1 an expectation failed or was not reached, two runs differ or a record is cut,
-2 usage or scenario, 3 infrastructure (named), 130 interrupted (`configs.errors.ExitStatus`).
+2 usage or scenario, 3 infrastructure (named), 5 nothing to test, 130 interrupted
+(`configs.errors.ExitStatus`).
 """
 
 import os

@@ -10,6 +10,7 @@ not checked  else, if an expectation was not reached, a robot was cut short, or 
 held         else
 """
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from math import ceil, inf, isnan
@@ -17,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from configs.events import Event
+from configs.events import MAX_EVENTS, Event
 from configs.expect import BOUNDS, COUNTS, Expect, Window, claim, window_of
 from configs.membership import ALWAYS, Membership
 from configs.scenario import Scenario
@@ -62,11 +63,17 @@ class _Part(NamedTuple):
 
 
 def judge(
-    expect: Expect, record: Record, scenario: Scenario, events: Sequence[Event] = ()
+    expect: Expect, record: Record, scenario: Scenario, events: Sequence[Event] | None = None
 ) -> Judged:
     """Compare an expectation with the record; a robot counts while it is a member.
 
     Where one has no rows of its controller, which was started again, the window isn't reached.
+
+    Args:
+        expect: one that was checked against the scenario.
+        record: of the run, complete or not.
+        scenario: of the run.
+        events: all of the run; None: they aren't known, and none of them is reached.
     """
     window = window_of(expect, scenario, scenario.ends_at_s) or Window(0, -1)
     period_s = scenario.clock.control_period_s
@@ -235,15 +242,19 @@ def _of_robot(
 
 
 def _judge_events(
-    expect: Expect, record: Record, window: Window, period_s: float, events: Sequence[Event]
+    expect: Expect,
+    record: Record,
+    window: Window,
+    period_s: float,
+    events: Sequence[Event] | None,
 ) -> Judged:
     """Count events of each robot that is named, or of all sources together."""
-    of_kind = [it for it in events if it.kind == expect.event and _in(window, it, expect)]
-    ends = {robot: len(record.controller[robot]) for robot in record.robots}
+    of_kind = [it for it in events or () if it.kind == expect.event and _in(window, it, expect)]
+    ends = _known_to(record, events)
     counts = []
     for robot in expect.robots or ("",):
         own = [event for event in of_kind if robot in ("", event.source)]
-        seen = ends.get(robot, max(ends.values(), default=0))
+        seen = ends[robot] if robot else min(ends.values(), default=0)
         counts.append(_Count(robot, own, *_compared(expect, len(own), whole=seen > window.last)))
     held = _all_held([count.held for count in counts])
     worst = min(counts, key=lambda count: (count.held is not False, count.margin))
@@ -259,6 +270,19 @@ def _judge_events(
     if held is None:
         judged["seen_to_s"] = _seen_to_s([ends[r] for r in expect.robots or ends], period_s)
     return judged
+
+
+def _known_to(record: Record, events: Sequence[Event] | None) -> dict[str, int]:
+    """The tick before which all events of a robot are known: of too many the last aren't kept."""
+    if events is None:
+        return dict.fromkeys(record.robots, 0)
+    ends = {robot: len(record.controller[robot]) for robot in record.robots}
+    counts = Counter(event.source for event in events)
+    for robot in record.robots:
+        if counts[robot] >= MAX_EVENTS:
+            last = max(event.tick for event in events if event.source == robot)
+            ends[robot] = min(ends[robot], max(last, 0))
+    return ends
 
 
 class _Count(NamedTuple):

@@ -82,7 +82,8 @@ def _summary(folder: Path, record: Record, scenario: Scenario) -> Summary:
     summary = read_summary(folder)
     if summary is None:
         reason = f"the run left no {run_folder.SUMMARY}"
-        return summarise(record, scenario, RunStats("unknown", ended="aborted", reason=reason))
+        stats = RunStats("unknown", ended="aborted", reason=reason, events_known=False)
+        return summarise(record, scenario, stats)
     return summary
 
 

@@ -23,9 +23,6 @@ from fleetloop.suite.listing import BAD, HELD, Listing, account, counts_of, head
 from fleetloop.suite.selection import SUFFIX, selected
 from fleetloop.terminal import say, say_json
 
-NOTHING = 5
-"""Exit status if there was nothing to test, as pytest's."""
-
 
 @dataclass(frozen=True, slots=True)
 class SuiteOptions:
@@ -87,7 +84,7 @@ def run_tests(paths: Sequence[str], options: SuiteOptions) -> int:
     if stop.requested:
         return ExitStatus.INTERRUPTED
     if not outcomes:
-        return NOTHING
+        return ExitStatus.NOTHING
     bad = any(status_of(outcome) in BAD for outcome in outcomes.values())
     return ExitStatus.FAILED if bad else ExitStatus.OK
 

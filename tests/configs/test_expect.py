@@ -42,9 +42,12 @@ def refused(expect: str, *overrides: str) -> str:
             "s eventually within 5 or more before push",
         ),
         ({"event": "stopped", "at_most": 0}, "event stopped never from 0 s"),
+        ({"event": "stopped", "at_most": 2}, "event stopped at most 2 times from 0 s"),
+        ({"event": "stopped", "at_least": 1, "at_most": 1}, "event stopped once from 0 s"),
+        ({"event": "stopped", "at_least": 0, "at_most": 1}, "event stopped 0 to 1 times from 0 s"),
         (
             {"event": "rearmed", "at_least": 1, "robots": ("r2",), "after": "push", "to_s": 2.0},
-            "event rearmed of r2 at least 1 times to 2 s after push",
+            "event rearmed of r2 at least once to 2 s after push",
         ),
     ],
 )

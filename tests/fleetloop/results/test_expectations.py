@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from configs.events import Event
+from configs.events import MAX_EVENTS, Event
 from configs.expect import Expect
 from configs.loading import load
 from configs.resolve import signals_of
@@ -195,6 +195,16 @@ def test_events_of_a_run_that_ended_early_may_still_come() -> None:
     assert judged(short, *EVENTS, event="diverged", at_most=0)["held"] is None
     assert judged(short, *EVENTS, event="diverged", at_least=1)["held"] is None
     assert judged(short, *EVENTS, event="stopped", at_least=1)["held"] is True
+
+
+def test_what_is_not_known_of_events_is_not_reached() -> None:
+    never = Expect(event="stopped", at_most=0)
+    assert judge(never, record(), SCENARIO, None)["held"] is None
+    many = [Event(tick, "r1", "rearming") for tick in range(MAX_EVENTS)]
+    assert judge(never, record(), SCENARIO, many)["held"] is None
+    assert judge(never, record(), SCENARIO, many[1:])["held"] is True
+    early = Expect(event="stopped", at_most=0, to_s=0.5)
+    assert judge(early, record(), SCENARIO, many)["held"] is True
 
 
 def test_a_run_that_ends_before_a_window_says_which() -> None:
