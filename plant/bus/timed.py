@@ -81,8 +81,9 @@ class TimedBus:
         self._hosts: dict[Key, WireHost] = {}
         self._key_of: dict[Node, Key] = {}
         self._states: dict[Node, NodeState] = {}
-        for robot in robots:
-            self._host(robot.brief.robot)
+        if not schedule.realtime:  # then controllers have the names of their robots
+            for robot in robots:
+                self._host(robot.brief.robot)
         self._mail: list[tuple[int, int, WireDrive, Frame]] = []
         self._number = 0
         self._now_ns = 0

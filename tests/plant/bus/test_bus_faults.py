@@ -6,6 +6,7 @@ from support.manual_port import ManualPort
 from support.robot_bench import NOWHERE
 
 from agents.guard import Phase
+from bridge.can_bus.packet import Submitted
 from bridge.drives.odrive.frames import AxisState, Command, identifier
 from bridge.frame import RTR, Frame
 from bridge.network.telemetry import no_tap
@@ -13,6 +14,7 @@ from bridge.wire.node import NodeState
 from configs.faults.kinds import KINDS
 from configs.loading import load
 from configs.resolve import plant_brief
+from plant.bus.build import timed_bus
 from plant.bus.ideal import IdealBus
 from plant.disturbance import BUS_EFFECTS
 from plant.faults import EFFECTS, STRIKES, BusFaults
@@ -402,6 +404,25 @@ def test_in_real_time_a_cut_bus_passes_nothing_either_way() -> None:
     wall = Wall(fault("bus_cut", 0.01, 0.02))
     heard = [(wall.tick() != [], wall.say(REQUEST, after_ns=MS)) for _ in range(4)]
     assert heard == [(True, [ANSWER]), (False, []), (False, []), (True, [ANSWER])]
+
+
+def test_in_real_time_a_client_on_a_cut_wire_is_not_acknowledged_and_its_queue_fills() -> None:
+    changes = (f"fault=[{fault('bus_cut', 0.01, 0.01)}]", 'clock.mode="realtime"', *WIRE)
+    plant = plant_brief(load("two_robots_100hz", changes), network=NOWHERE)
+    robot, port = emulated_robot(plant.robots[0]), ManualPort()
+    bus = timed_bus(plant, "r1", [robot], port, lambda _: None, no_tap)
+    freed = []
+    for tick in range(3):
+        bus.advance(plant.schedule.bus_time_ns(tick))
+        bus.faults.begin(tick)
+        bus.submit([Submitted(1, REQUEST)] * 12)
+        bus.advance(plant.schedule.bus_time_ns(tick) + 8 * MS)
+        told = [*port._freed, *(one for given in port.questions for one in given.freed)]
+        freed.append(sum(count for _, count in told) - sum(freed))
+        counts = bus.node_counts()["1"]
+        assert (counts["errors"] > 0) is (tick > 0)
+    # Twelve are submitted, ten have room and are sent; on the cut wire ten stay; then those are.
+    assert freed == [12, 2, 22]
 
 
 def test_a_fault_that_is_told_its_end_while_it_acts_goes_on_counting() -> None:
