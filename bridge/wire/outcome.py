@@ -37,7 +37,7 @@ from bridge.wire.bits import (
 )
 from bridge.wire.confinement import NodeState
 from bridge.wire.node import ErrorKind, Node
-from bridge.wire.queues import Entry
+from bridge.wire.queues import ERROR_KEY, Entry
 
 _SECOND_NS = 1_000_000_000
 _ARBITRATION_BITS, _ARBITRATION_BITS_EXTENDED = 13, 33
@@ -99,10 +99,19 @@ class Plan:
         return any(s.node is node for s in (*what.senders, *what.fallen, *what.orders))
 
 
-def ordered(orders: Sequence[Sending], starting: Sequence[Sending]) -> Outcome:
-    """Outcome of injected error flags, and of the frame that starts with them."""
+def tied(waiting: Sequence[Sending], winner: Entry) -> list[Sending]:
+    """All that send the winning arbitration field, in their order."""
+    return [sending for sending in waiting if sending.entry.key == winner.key]
+
+
+def ordered(waiting: Sequence[Sending]) -> Outcome:
+    """Outcome of injected error flags, and of the frame that would have started with them."""
+    orders = [sending for sending in waiting if sending.entry.key == ERROR_KEY]
+    others = [sending for sending in waiting if sending.entry.key != ERROR_KEY]
+    starting: Sequence[Sending] = ()
     at = ERROR_FLAG_BITS
-    if starting:
+    if others:
+        starting = tied(others, min(sending.entry for sending in others))
         at = stuffed_bits(starting[0].entry.frame).index("1") + 1
     return Outcome(starting, ERROR_FRAME_BITS, ErrorKind.STUFF, at, orders=orders)
 

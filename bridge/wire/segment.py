@@ -11,16 +11,8 @@ events however often it is asked.
 from bridge.frame_faults import FrameFaults
 from bridge.wire.bits import SUSPEND_BITS
 from bridge.wire.confinement import OFF, NodeState
-from bridge.wire.node import (
-    Delivered,
-    ErrorFrame,
-    ErrorKind,
-    Event,
-    Node,
-    Recovery,
-    StateChanged,
-)
-from bridge.wire.outcome import Outcome, Plan, Sending, cut_short, ordered, outcome
+from bridge.wire.node import Delivered, ErrorFrame, ErrorKind, Event, Node, Recovery, StateChanged
+from bridge.wire.outcome import Outcome, Plan, Sending, cut_short, ordered, outcome, tied
 from bridge.wire.queues import ERROR_KEY, Entry
 
 _SECOND_NS = 1_000_000_000
@@ -205,21 +197,19 @@ class Segment:
 
     def _arbitrate(self, start_ns: int) -> Plan:
         best = entry = None
-        tied = False
+        several = False
         for node in self._ready:
             if node.not_before_ns > start_ns:
                 continue
             head = node.queue.entries[0]
             if entry is None or head[0] < entry[0]:
-                best, entry, tied = node, head, False
+                best, entry, several = node, head, False
             elif head[0] == entry[0]:
-                tied = True
+                several = True
         if best is None or entry is None:
             self._first_ns = min(node.not_before_ns for node in self._ready)
             return self._arbitrate(self._first_ns)
-        if entry.key == ERROR_KEY:
-            return self._plan_error(start_ns, entry)
-        if self._plain and not tied and not self._acting:
+        if self._plain and not several and not self._acting and entry.key != ERROR_KEY:
             plan = Plan(best, entry, start_ns, None, self._bit_rate)
             others = self._others.get(best)
             if others is None:
@@ -227,34 +217,18 @@ class Segment:
                 self._others[best] = others
             plan.heard_by = others
             return plan
-        what = outcome(self._tied(start_ns, entry), self.nodes, self._faults)
-        plan = Plan(*what.senders[0], start_ns, what, self._bit_rate)
-        plan.heard_by = tuple(node for node in self._listeners if not plan.involves(node))
-        return plan
-
-    def _plan_error(self, start_ns: int, entry: Entry) -> Plan:
-        """Injected error flags, and the frame that would have started with them."""
-        orders = self._tied(start_ns, entry)
-        others = [sending for sending in self._heads(start_ns) if sending.entry.key != ERROR_KEY]
-        starting: list[Sending] = []
-        if others:
-            starting = self._tied(start_ns, min(sending.entry for sending in others))
-        what = ordered(orders, starting)
-        plan = Plan(*(starting or orders)[0], start_ns, what, self._bit_rate)
-        plan.heard_by = tuple(node for node in self._listeners if not plan.involves(node))
-        return plan
-
-    def _heads(self, start_ns: int) -> list[Sending]:
-        """What may start, in the order in which the nodes joined."""
-        return [
+        waiting = [
             Sending(node, node.queue.entries[0])
             for node in self.nodes
             if node in self._ready and node.not_before_ns <= start_ns
         ]
-
-    def _tied(self, start_ns: int, winner: Entry) -> list[Sending]:
-        """All that send the winning arbitration field, in the order in which they joined."""
-        return [sending for sending in self._heads(start_ns) if sending.entry.key == winner.key]
+        if entry.key == ERROR_KEY:
+            what = ordered(waiting)
+        else:
+            what = outcome(tied(waiting, entry), self.nodes, self._faults)
+        plan = Plan(*(what.senders or what.orders)[0], start_ns, what, self._bit_rate)
+        plan.heard_by = tuple(node for node in self._listeners if not plan.involves(node))
+        return plan
 
     def _complete(self, plan: Plan, events: list[Event]) -> None:
         """The planned transmission has come to its end, or to its error."""
