@@ -17,13 +17,34 @@ from fleetloop.options import (
 )
 
 
-def report(run: RunArg, partial: PartialOption = False) -> None:
-    """Rebuild report.html and the figures of a run from its record."""
+def report(
+    runs: Annotated[
+        list[Path],
+        typer.Argument(metavar="RUN...", help="A run's folder, or its record.mcap; or several."),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Of several runs: folder of their page, new or empty. Default:"
+            " runs/<time>-overlay.",
+        ),
+    ] = None,
+    partial: PartialOption = False,
+) -> None:
+    """Rebuild report.html and the figures of a run; of several runs, lay them over each other."""
+    from fleetloop.results.overlay import write_overlay
     from fleetloop.results.report import write_report
     from fleetloop.results.run_folder import read_record
     from fleetloop.results.tables import print_report
 
-    print_report(write_report(run, read_record(run, partial=partial)))
+    if out is not None and len(runs) == 1:
+        raise typer.BadParameter("--out is for several runs; the page of one is in its folder")
+    records = [read_record(run, partial=partial) for run in runs]
+    if len(runs) == 1:
+        print_report(write_report(runs[0], records[0]))
+    else:
+        print_report(write_overlay(runs, records, out))
 
 
 def export(

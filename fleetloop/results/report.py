@@ -10,6 +10,7 @@ from importlib import resources
 from io import BytesIO
 from pathlib import Path
 from string import Template
+from typing import NamedTuple
 
 from configs.errors import InfrastructureError, ScenarioError
 from configs.loading import loads
@@ -48,17 +49,35 @@ def write_report(run: Path, record: Record | None = None) -> Path:
     """
     if record is None:
         record = Record.open(run_folder.record_of(run))
+    known = known_of(record)
+    folder = record.path.parent
+    figures = write_figures(folder, all_figures(record, known.scenario))
+    page = folder / PAGE
+    run_folder.write(page, _page(known.summary, known.scenario, record, figures))
+    return page
+
+
+class Known(NamedTuple):
+    """What is known of a run."""
+
+    record: Record
+    scenario: Scenario
+    summary: Summary
+
+
+def known_of(record: Record) -> Known:
+    """What a page says of a run.
+
+    Raises:
+        ScenarioError: nothing is in its record, or its scenario can't be read.
+    """
     path = record.path
     if not any(len(rows) for rows in record.controller.values()):
         raise ScenarioError(f"{path}: not one tick of a controller is in it, nothing to show")
     scenario = loads(f"{path}: {run_folder.SCENARIO}", record.scenario_toml, recorded=True)
     if scenario.names != record.robots:
         raise ScenarioError(f"{path}: rows of {record.robots}, but a scenario of {scenario.names}")
-    summary = _summary(path.parent, record, scenario)
-    figures = write_figures(path.parent, all_figures(record, scenario))
-    page = path.parent / PAGE
-    run_folder.write(page, _page(summary, scenario, record, figures))
-    return page
+    return Known(record, scenario, _summary(path.parent, record, scenario))
 
 
 def write_figures(run: Path, figures: Iterable[Captioned]) -> list[tuple[Captioned, bytes]]:
