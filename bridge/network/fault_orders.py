@@ -88,7 +88,7 @@ class FaultOrder(NamedTuple):
         for target in self.targets:
             if self.ends:
                 schedules[target].clear(self.name, tick)
-            else:
+            elif not schedules[target].knows(self.name, target):  # else it is told again
                 schedules[target].add(self.planned(target, tick, period_s))
         return tick
 

@@ -67,6 +67,8 @@ class ControlPlane:
         self.on_notice = on_notice
         self.on_answer: Callable[[str, bytes], bool] = lambda *_: False
         """Called with a process and its answer to an order; returns whether it is well formed."""
+        self.on_alive: Callable[[str], None] = lambda _: None
+        """Called with a process that is there, or there again."""
 
     def subscribe(self, link: Link, run: str, processes: Iterable[str]) -> None:
         """Subscribe to the messages of these processes."""
@@ -123,6 +125,8 @@ class ControlPlane:
             case "live":
                 there = arrival.payload == b"1"
                 (self.alive.add if there else self.alive.discard)(process)
+                if there:
+                    self.on_alive(process)
                 away_s = self.remote.note_token(process, self.now(), there=there)
                 if away_s is not None:
                     self.note(process, "back", f"there again after {away_s:.1f} s")

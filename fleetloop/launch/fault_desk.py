@@ -64,7 +64,7 @@ class FaultDesk:
         schedule: of the run.
         fault_problem: why a fault can't act on a robot where the deployment places it.
         tick: how far the run is.
-        now: seconds on the launcher's clock of awake time.
+        now_s: seconds on the launcher's clock of awake time.
     """
 
     def __init__(
@@ -73,14 +73,14 @@ class FaultDesk:
         schedule: Schedule,
         fault_problem: Callable[[Fault, str], str | None],
         tick: Callable[[], int],
-        now: Callable[[], float],
+        now_s: Callable[[], float],
     ) -> None:
         self.ledger = FaultLedger(scenario)
         self._scenario = scenario
         self._schedule = schedule
         self._fault_problem = fault_problem
         self._tick = tick
-        self._now = now
+        self._clock_s = now_s
         self._publishers: dict[str, Publisher] = {}
         self._pending: dict[int, _Pending] = {}
         self._reached: list[tuple[int, float, Callable[[], None]]] = []
@@ -90,6 +90,11 @@ class FaultDesk:
             "fault.inject": Request({"fault": dict}, self._inject),
             "fault.clear": Request({"names": list}, self._clear),
         }
+
+    def now(self) -> tuple[int, float]:
+        """How far the run is: tick and scenario time [s]."""
+        tick = self._tick()
+        return tick, self._seconds(tick)
 
     def open(self, link: Link, run: str, processes: Iterable[str]) -> None:
         """Declare what orders and answers need."""
@@ -115,9 +120,26 @@ class FaultDesk:
             self._complete(answer.number)
         return True
 
+    def repeat(self, process: str) -> None:
+        """Tell a controller, which may have been started again, what the scenario doesn't say."""
+        role, _, robot = process.partition("/")
+        tick = self._tick()
+        for entry in self.ledger.differing(tick) if role == AGENT.name else ():
+            targets = targets_to(entry.targets, robot)
+            if entry.fault.PLACE != "agent" or not targets:
+                continue
+            begins = max(entry.from_tick, tick)
+            last = entry.to_tick
+            ticks = None if entry.cleared or last is None else last - begins
+            order = FaultOrder(
+                0, entry.cleared, entry.name, targets, entry.fault, begins, ticks, False
+            )
+            told = process if self._schedule.realtime else PLANT.name
+            self._publishers[told].put(order.encode())
+
     def look(self) -> None:
         """Answer what waits for too long, or for a tick that is reached."""
-        now_s, tick = self._now(), self._tick()
+        now_s, tick = self._clock_s(), self._tick()
         for number, pending in list(self._pending.items()):
             if now_s > pending.deadline_s:
                 within = f"no answer in {ANSWER_S:g} s; whether it acts there is not known"
@@ -203,7 +225,7 @@ class FaultDesk:
             awaited, told = set(told), {PLANT.name: entry.targets}
         limit_s = ANSWER_S + self._schedule.tick_deadline_s
         self._pending[self._number] = _Pending(
-            entry, ends, awaited, self._now() + limit_s, done, not exact
+            entry, ends, awaited, self._clock_s() + limit_s, done, not exact
         )
         for process, targets in told.items():
             self._publishers[process].put(order._replace(targets=targets).encode())
@@ -252,7 +274,7 @@ class FaultDesk:
     def _when_reached(self, pending: _Pending, respond: Callable[[], None]) -> None:
         """Answer once the run has reached a tick; what was ordered for a later one at once."""
         tick = pending.tick if pending.at_once else self._tick()
-        self._reached.append((tick, self._now() + REACHED_S, respond))
+        self._reached.append((tick, self._clock_s() + REACHED_S, respond))
 
     def _seconds(self, tick: int) -> float:
         return round(tick * self._schedule.period_s, 9)

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
-from bridge.network.fault_orders import targets_to
 from configs.errors import ScenarioError
-from configs.faults.base import Fault, PlannedFault
+from configs.faults.base import Fault
 from configs.faults.plan import planned_faults, targets_of
 from configs.scenario import Scenario
 
@@ -87,14 +86,12 @@ class FaultLedger:
             found.append(entry)
         return found
 
-    def messages_to(self, robot: str) -> tuple[PlannedFault, ...]:
-        """All faults of the messages to a robot, for a controller that is started again."""
-        return tuple(
-            PlannedFault(one.name, target, one.fault, one.from_tick, one.to_tick)
-            for one in self._entries.values()
-            for target in targets_to(one.targets, robot)
-            if one.fault.PLACE == "agent"
-        )
+    def differing(self, tick: int) -> list[Entry]:
+        """What a process that only knows the scenario doesn't know: ordered, and cleared."""
+        entries = self._entries.values()
+        going = ("planned", "acting")
+        ordered = [one for one in entries if one.ordered and one.state(tick) in going]
+        return ordered + [one for one in entries if one.cleared and not one.ordered]
 
     def rows(self, tick: int) -> list[dict[str, Any]]:
         """All faults as they are at a tick, for people and programs."""

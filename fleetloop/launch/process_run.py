@@ -33,7 +33,6 @@ from configs.faults.plan import planned_faults
 from configs.resolve import leader_brief, schedule
 from configs.roles import LAUNCHER, PLANT, identity_of, processes_of
 from configs.scenario import Scenario
-from fleetloop.door.requests import Request, Respond
 from fleetloop.door.server import Door
 from fleetloop.launch import open_files, placement
 from fleetloop.launch.child import GAVE_UP, Child, Failure, end, refuse_shadowed_roles
@@ -52,6 +51,7 @@ from fleetloop.launch.outcome import Outcome
 from fleetloop.launch.process_faults import ProcessFaults, returning
 from fleetloop.launch.remote_roles import RemoteRoles
 from fleetloop.launch.restarts import Restarts
+from fleetloop.launch.run_requests import run_requests
 from fleetloop.launch.spawn import Orders, respawn, spawn
 from fleetloop.launch.supervision import CONSEQUENCES_S, Supervision
 
@@ -112,7 +112,7 @@ class ProcessRun:
             lambda: self.outcome.ticks,
             self._now,
         )
-        self._plane.on_answer = self._desk.take
+        self._plane.on_answer, self._plane.on_alive = self._desk.take, self._desk.repeat
         self._hellos = Hellos(self._schedule.hello_every_s, clock=clock)
         self._next_look_s = 0.0
         self._ready_s: float | None = None
@@ -265,7 +265,7 @@ class ProcessRun:
     def _watch(self, link: LauncherLink, stop: Stop) -> Failure | None:
         """Follow the run until the plant and all controllers have ended."""
         most, folder = self._scenario.host.restarts, sockets.folder_of(self._run)
-        requests = {"about": Request({}, self._say_about), **self._desk.requests}
+        requests = run_requests(self._run, self._orders, self._desk)
         absent = absences(planned_faults(self._scenario), self._schedule.ticks)
         with (
             Restarts(
@@ -281,19 +281,6 @@ class ProcessRun:
         ):
             faults = ProcessFaults(self._plane, self._schedule, absent, restarts)
             return self._follow(link, stop, restarts, faults, door)
-
-    def _say_about(self, respond: Respond) -> None:
-        """Tell a client of the door which run this is, and how far."""
-        tick = self.outcome.ticks
-        respond(
-            {
-                "run": self._run,
-                "folder": str(self._orders.record.parent.absolute()),
-                "scenario": self._scenario.name,
-                "tick": tick,
-                "t_s": round(tick * self._schedule.period_s, 9),
-            }
-        )
 
     def _follow(
         self,

@@ -119,3 +119,30 @@ def test_they_are_listed_cleared_and_refused_with_the_reason(tmp_path: Path) -> 
         toml = fleetloop(tmp_path, "fault", "list", "--toml").stdout
         (again,) = tomllib.loads(toml)["fault"]  # the other two never acted
         assert (again["name"], again["at_s"]) == ("push", cleared[1]["from_s"])
+
+
+@pytest.mark.wall_clock
+def test_in_real_time_they_act_at_the_tick_that_is_answered_and_again_after_a_restart(
+    tmp_path: Path,
+) -> None:
+    options = ("--clock", "realtime", "--set", "host.restarts=1", "--set", "expect=[]")
+    args = ("two_robots_100hz", *options, "--duration", "5", "--allow-unchecked")
+    with running(tmp_path / "run", *args) as run, open_run("") as client:
+        push = inject(client, "push", robots=["r1"], force_body_N=1.0, for_s=0.5)
+        delay = inject(client, "link_delay", edges=["r1 -> r2"], delay_s=0.1)
+        run.child("r2").kill()
+        _, out = run.end()
+    summary = run.summary()
+    changes = [
+        (one["source"], one["text"], one["tick"])
+        for one in summary["events"]
+        if one["kind"] == "fault_applied"
+    ]
+    assert ("r1", "push", push["from_tick"]) in changes
+    # The report of the first controller was lost with it, not what it had announced.
+    told = re.findall(
+        r"^r2: tick (\d+) .*: fault_applied: link_delay on r1 -> r2$", out, re.MULTILINE
+    )
+    first, again = sorted({int(tick) for tick in told})
+    assert first == delay["from_tick"], out
+    assert again > first

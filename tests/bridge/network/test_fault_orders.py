@@ -86,6 +86,8 @@ def test_it_acts_on_its_targets_from_a_tick_on_as_a_listed_fault_does() -> None:
     assert [it.event for it in one.due(50)] == [Event(50, "r1", "fault_applied", "shove (push)")]
     (planned,) = one.acting
     assert (planned.from_tick, planned.to_tick, planned.fault.at_s) == (50, 60, 0.1)
+    assert order().act(schedules, 52, 0.002) == 52  # told again: nothing changes
+    assert one.due(52) == []
     assert order()._replace(ends=True).act(schedules, 55, 0.002) == 55
     assert [it.event for it in one.due(55)] == [Event(55, "r1", "fault_cleared", "shove (push)")]
     assert "r2: nothing here" in str(order().act({"r1": one}, 70, 0.002))

@@ -6,7 +6,7 @@ from configs.errors import ScenarioError
 from configs.faults.ordered import fresh_name, ordered_fault
 from configs.loading import load
 
-SCENARIO = load("two_robots")
+SCENARIO = load("two_robots", ("duration_s=20.0",))
 
 
 def refused(**table) -> str:

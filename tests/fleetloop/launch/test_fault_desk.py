@@ -159,6 +159,28 @@ def test_all_that_acts_or_is_planned_is_cleared() -> None:
             bench.ask("fault.clear", names=[name])
 
 
+def test_a_controller_that_is_there_again_is_told_what_the_scenario_does_not_say() -> None:
+    listed = 'fault=[{kind="link_delay", at_s=1.0, edges=["r1 -> r2"]}]'
+    bench = Bench("clock.mode='realtime'", listed)
+    bench.inject(kind="link_loss", edges=["r1 -> r2"], for_s=1.0, name="lossy")
+    bench.answer("agent/r2", 1100)
+    bench.inject(kind="push")
+    bench.answer("plant", 1100)
+    bench.ask("fault.clear", names=["link_delay"])
+    bench.answer("agent/r2", 1100)
+    bench.sent.clear()
+    bench.tick = 1200
+    for process in ("plant", "recorder", "agent/r1"):
+        bench.desk.repeat(process)
+    assert bench.sent == []
+    bench.desk.repeat("agent/r2")
+    told = [(process, it.name, it.ends, it.from_tick, it.ticks) for process, it in bench.sent]
+    assert told == [
+        ("agent/r2", "lossy", False, 1200, 400),
+        ("agent/r2", "link_delay", True, 1200, None),
+    ]
+
+
 def test_no_order_is_taken_that_no_process_could_carry_out() -> None:
     bench = Bench(real=("r2",))
     with pytest.raises(ScenarioError, match="r2: isn't emulated: push can't act on it"):
