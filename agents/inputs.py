@@ -26,7 +26,7 @@ class LoggedAgent(Agent):
         super().__init__(brief, rows)
         self._log = log
         self._start_messages: dict[tuple[Kind, str], bytes] = {}
-        log.begin(rejoins=brief.rejoins)
+        log.begin(rejoins=brief.rejoins, resumes_tick=brief.resumes_tick)
         on_frame, log_frame = self.on_frame, log.frame
 
         def logged_frame(can_id: int, data: bytes | bytearray, now_ns: int) -> None:

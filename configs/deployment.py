@@ -162,6 +162,8 @@ class Deployment(BaseModel):
 
     def fault_problem(self, fault: Fault, robot: str) -> str | None:
         """Why a fault can't act on a robot where this places it; None: it can."""
+        if fault.PLACE == "process" and not self.runs_here(AGENT.process(robot)):
+            return f"its controller isn't started by the run: {fault.kind} can't act on it"
         if fault.PLACE != "plant":
             return None
         if not self.emulates(robot):

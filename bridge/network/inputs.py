@@ -6,7 +6,8 @@ of all others that of the newest tick.
     head      payload's length u32   kind u8   time i64                     little endian
 
     kind      payload
-    BEGIN     rejoins u8                              a controller was started, perhaps again
+    BEGIN     rejoins u8, first tick i64              a controller was started, perhaps again;
+                                                      the tick: of one that re-joins in lockstep
     FRAME     identifier u32, data                    from the bus
     PATH      in-neighbour, NUL, `PathState`          as over the network
     POSE      NUL, `PoseFix`
@@ -41,6 +42,7 @@ _IDENTIFIER = struct.Struct("<I")
 _FULL_FRAME = struct.Struct("<IBqI8s")
 _FULL_DATA = 8
 _TICK = struct.Struct("<q")
+_BEGIN = struct.Struct("<?q")
 _CLOCK = struct.Struct("<qdd")
 _SENT = struct.Struct("<IB")
 _NUL = b"\0"
@@ -70,6 +72,17 @@ class Input(NamedTuple):
     kind: Kind
     time_ns: int
     payload: bytes
+
+    def begin(self) -> tuple[bool, int]:
+        """Of a BEGIN, whether the controller re-joins, and its first tick if it does in lockstep.
+
+        Raises:
+            InputsError: it is of another version.
+        """
+        if len(self.payload) != _BEGIN.size:
+            raise InputsError("the log begins as none of this version")
+        rejoins, resumes_tick = _BEGIN.unpack(self.payload)
+        return rejoins, resumes_tick
 
     def frame(self) -> Frame:
         """The frame of a FRAME."""
@@ -135,9 +148,9 @@ class InputBuffer:
         self._first = 0
         self._now_ns = 0
 
-    def begin(self, *, rejoins: bool) -> None:
+    def begin(self, *, rejoins: bool, resumes_tick: int = 0) -> None:
         """A controller begins."""
-        self._add(Kind.BEGIN, bytes([rejoins]))
+        self._add(Kind.BEGIN, _BEGIN.pack(rejoins, resumes_tick))
 
     def frame(self, can_id: int, data: bytes | bytearray, at_ns: int) -> None:
         """A frame was received."""

@@ -64,7 +64,8 @@ def play(brief: AgentBrief, logs: Sequence[InputLog]) -> Replay:
         begin = next(inputs, None)
         if begin is None or begin.kind is not Kind.BEGIN:
             raise InputsError("the log doesn't begin with the begin of a controller")
-        agent = Agent(replace(brief, rejoins=begin.payload == b"\1"), rows)
+        rejoins, resumes_tick = begin.begin()
+        agent = Agent(replace(brief, rejoins=rejoins, resumes_tick=resumes_tick), rows)
         try:
             for entry in inputs:
                 _give(agent, entry, replay)

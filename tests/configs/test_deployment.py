@@ -80,6 +80,19 @@ def test_a_fault_that_cannot_act_where_a_robot_is_placed_is_refused(
     assert problem in line
 
 
+def test_the_process_of_a_controller_on_another_machine_is_not_the_runs_to_kill() -> None:
+    here = ["plant", "recorder", "agent/r2"]
+    data = {"roles": here, "network": NETWORK}
+    for robot, acts in (("r1", False), ("r2", True)):
+        fault = f'fault=[{{kind="process_kill", at_s=1.0, robots=["{robot}"]}}]'
+        scenario = load("two_robots_100hz", (fault,))
+        if acts:
+            check_deployment("where.toml", data, scenario, Path())
+            continue
+        with pytest.raises(ScenarioError, match=r"isn't started by the run: process_kill can't"):
+            check_deployment("where.toml", data, scenario, Path())
+
+
 def test_what_is_not_among_the_roles_is_elsewhere() -> None:
     placed = check(roles=["plant", "recorder", "agent/r2"], network=NETWORK)
     assert placed.elsewhere(load("two_robots_100hz")) == ("agent/r1",)

@@ -7,6 +7,7 @@ import pytest
 from support.processes import completed
 
 from fleetloop.record.reader import Record
+from fleetloop.replay.command import ReplayOptions, replay_run
 from fleetloop.results.summary_file import read_summary
 
 pytestmark = pytest.mark.system
@@ -72,12 +73,14 @@ def test_a_killed_controller_comes_again_to_the_same_record_each_time(tmp_path: 
         "{kind='process_kill', at_s=0.3, for_s=0.1, robots=['r2']}",
         "{kind='process_restart', at_s=0.6, robots=['r1']}",
     )
-    args = (*LOCKSTEP, *BOTH_WAYS, *faults, *on_late("drop"))
+    args = (*LOCKSTEP, *BOTH_WAYS, *faults, *on_late("drop"), "--record-inputs")
     for name in "abc":
         status, out = completed(tmp_path / name, *args)
         assert status == 0, out
     records = {(tmp_path / name / "record.mcap").read_bytes() for name in "abc"}
     assert len(records) == 1
+    for robot in ("r1", "r2"):  # both processes of each
+        assert replay_run(tmp_path / "a", ReplayOptions(robot=robot)) == 0
     said = [(150, "killed"), (150, "dropped"), (200, "awaited"), (200, "back")]
     assert sorted(kinds(tmp_path / "a", "r2")[:4]) == sorted(said)
     assert kinds(tmp_path / "a", "r2")[4][1] == "rejoined"

@@ -81,11 +81,20 @@ def test_a_log_that_is_cut_anywhere_gives_the_entries_before() -> None:
         assert len(cut) < len(whole)
 
 
+def test_a_begin_says_whether_and_where_a_controller_goes_on() -> None:
+    kept = Kept()
+    kept.buffer.begin(rejoins=False)
+    kept.buffer.begin(rejoins=True, resumes_tick=250)
+    assert [entry.begin() for entry in entries(kept.log())] == [(False, 0), (True, 250)]
+    with pytest.raises(InputsError, match="none of this version"):
+        Input(Kind.BEGIN, 0, b"\1").begin()
+
+
 def test_an_unknown_kind_is_named_with_its_place() -> None:
     kept = Kept()
     kept.buffer.begin(rejoins=False)
     log = kept.log()
-    assert list(entries(log)) == [Input(Kind.BEGIN, 0, b"\0")]
+    assert list(entries(log)) == [Input(Kind.BEGIN, 0, bytes(9))]
     with pytest.raises(InputsError, match=f"byte {len(log)}: no entry has the kind 200"):
         list(entries(log + bytes(4) + b"\xc8" + bytes(8)))
 
