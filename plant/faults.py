@@ -200,7 +200,7 @@ STRIKES: Mapping[str, Strike] = {
 class BusFaults:
     """The faults of the robots on one bus."""
 
-    __slots__ = ("_robots", "_ticks", "disturbances", "schedule")
+    __slots__ = ("_robots", "_ticks", "disturbances", "schedule", "struck")
 
     def __init__(
         self, planned: Iterable[PlannedFault], robots: Sequence[EmulatedRobot], ticks: Schedule
@@ -210,6 +210,8 @@ class BusFaults:
         self.disturbances = Disturbances(robots)
         """Faults of the bus itself: of its frames and CAN controllers."""
         self.schedule = FaultSchedule(one for one in planned if one.target in self._robots)
+        self.struck: Callable[[], None] = lambda: None
+        """Called when something has struck: drives may be due at other times than they said."""
 
     def begin(self, tick: int) -> None:
         """Let the faults of a tick act, bodies being where they are at that instant."""
@@ -226,11 +228,12 @@ class BusFaults:
                     begun_ns = planned.from_tick * self._ticks.period_ns
                     EFFECTS[planned.fault.kind](effects, planned.fault, begun_ns)
             self._robots[name].apply(effects)
-        bus_ns = self._ticks.bus_time_ns(tick)
-        for change in changes:
-            planned = change.planned
-            if planned.fault.kind in STRIKES:
-                STRIKES[planned.fault.kind](self._robots[planned.target], planned.fault, bus_ns)
+        strikes = [c.planned for c in changes if c.planned.fault.kind in STRIKES]
+        for planned in strikes:
+            strike, robot = STRIKES[planned.fault.kind], self._robots[planned.target]
+            strike(robot, planned.fault, self._ticks.bus_time_ns(tick))
+        if strikes:
+            self.struck()
         self.disturbances.follow(self.schedule.acting, changes)
 
 

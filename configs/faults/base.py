@@ -1,5 +1,6 @@
 """What all faults have in common, and a fault as a process receives it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
@@ -21,6 +22,8 @@ class Fault(Parameters):
     """Whether it happens at a tick, and has no end."""
     NEEDS: ClassVar[frozenset[Model]] = frozenset()
     """Models without which it has no effect."""
+    NOTHING: ClassVar[Mapping[str, float]] = {}
+    """Values of parameters with which, all together, it changes nothing."""
 
     kind: str
     name: Name | None = parameter(None, "KIND, or KIND_2 and so on, if not given")
@@ -28,9 +31,12 @@ class Fault(Parameters):
     for_s: Seconds | None = parameter(None, "to the end if not given")
 
     def __post_init__(self) -> None:
-        """Refuse a duration where there is none."""
+        """Refuse a duration where there is none, and what changes nothing."""
         if self.INSTANT and self.for_s is not None:
             raise ValueError("for_s: happens at an instant, leave it out")
+        if self.NOTHING and all(getattr(self, key) == it for key, it in self.NOTHING.items()):
+            values = " and ".join(f"{key} = {it:g}" for key, it in self.NOTHING.items())
+            raise ValueError(f"changes nothing with {values}")
 
     @property
     def parameters(self) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Faults of messages: poses of the localisation system, and links between robots."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
@@ -16,6 +17,7 @@ Angle_rad = Annotated[float, Ge(-3.2), Le(3.2)]
 class PoseOffset(RobotFault):
     """Poses are off: all of them while it lasts (bias), or a single one (jump)."""
 
+    NOTHING: ClassVar[Mapping[str, float]] = {"x_m": 0.0, "y_m": 0.0, "theta_rad": 0.0}
     x_m: Finite = 0.1
     y_m: Finite = 0.0
     theta_rad: Angle_rad = 0.0
@@ -40,6 +42,7 @@ class PoseJump(PoseOffset):
 class PoseDrift(RobotFault):
     """Poses drift away at these rates, and are right again afterwards."""
 
+    NOTHING: ClassVar[Mapping[str, float]] = {"x_m_s": 0.0, "y_m_s": 0.0, "theta_rad_s": 0.0}
     kind: Literal["localisation_drift"]
     x_m_s: Finite = 0.02
     y_m_s: Finite = 0.0

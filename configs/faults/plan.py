@@ -10,10 +10,9 @@ from configs.errors import Problem
 from configs.faults.absences import absences, overlapping
 from configs.faults.base import Fault, PlannedFault, RobotFault
 from configs.faults.messages import LinkFault, PoseOutage
-from configs.faults.powertrains import DriveError, DriveFault
 from configs.faults.processes import ProcessRestart, ProcessStopped
+from configs.faults.sense import sense_problems
 from configs.netem import LOCALISATION
-from configs.plugins import Recorded, raised
 
 if TYPE_CHECKING:
     from configs.scenario import Scenario
@@ -132,24 +131,7 @@ def problems_of(
         yield Problem(f"{where}.at_s", fault.at_s, remedy)
     if reason := _missing_model(fault, scenario) or _no_return(fault, scenario):
         yield Problem(f"{where}.kind", fault.kind, reason)
-    if isinstance(fault, DriveFault):
-        yield from _drive_problems(fault, where, scenario)
-
-
-def _drive_problems(fault: DriveFault, where: str, scenario: "Scenario") -> Iterator[Problem]:
-    """What the protocol knows of its emulated drives; its code may be a user's."""
-    drive = scenario.drive
-    if isinstance(scenario.drive_choice.parameters, Recorded):
-        return
-    try:
-        reason, errors = drive.fault_problem(fault.kind), drive.errors()
-    except Exception as error:
-        reason, errors = f"its check: {raised(error)}", ()
-    if reason:
-        yield Problem(f"{where}.kind", fault.kind, reason)
-    elif isinstance(fault, DriveError) and fault.error not in (None, *errors):
-        known = ", ".join(errors)
-        yield Problem(f"{where}.error", fault.error, f"drives have no such error; known: {known}")
+    yield from sense_problems(fault, where, scenario)
 
 
 def _no_return(fault: Fault, scenario: "Scenario") -> str | None:

@@ -1,12 +1,12 @@
 """Faults of drives, motors, encoders and the supply."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
 from annotated_types import Ge, Gt, Le
 
 from configs.faults.base import Model, RobotFault, WheelFault
-from configs.netem import Probability
 from configs.parameters import parameter
 
 
@@ -80,6 +80,7 @@ class EncoderJump(WheelFault):
     """The encoder's position jumps, once and for good."""
 
     INSTANT: ClassVar[bool] = True
+    NOTHING: ClassVar[Mapping[str, float]] = {"shaft_rev": 0.0}
     kind: Literal["encoder_jump"]
     shaft_rev: Annotated[float, Ge(-1e6), Le(1e6)] = 0.1
 
@@ -97,4 +98,4 @@ class EncoderSlip(WheelFault):
     """The encoder loses this share of its counts in either direction; only an index finds them."""
 
     kind: Literal["encoder_slip"]
-    share: Probability = 0.01
+    share: Annotated[float, Gt(0), Le(1)] = 0.01

@@ -90,6 +90,7 @@ class TimedBus:
         self._transmitted: list[Transmitted] = []
         self._stirred: dict[Key, None] = {}  # clients whose queues have changed
         faults.disturbances.disturb = self._disturb
+        faults.struck = self._note_due
         self.crossed = 0
         """Frames that ended on the wire, drives' and clients'."""
 
@@ -318,6 +319,10 @@ class TimedBus:
         host = self._hosts[key] = WireHost(node)
         self._key_of[node] = key
         return host
+
+    def _note_due(self) -> None:
+        for drive in self._drives:
+            drive.due_ns = drive.drive.next_due_ns
 
     def _disturb(self, disturbance: Disturbance) -> None:
         """Let this act from now on."""

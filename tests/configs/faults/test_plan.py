@@ -2,11 +2,11 @@
 
 import pytest
 from support.robot_bench import NOWHERE
-from support.scenario_text import SMALL, problems
+from support.scenario_text import SMALL, changed, problems
 
 from configs.faults.kinds import CLASSES, KINDS
 from configs.faults.plan import fault_window, planned_faults
-from configs.loading import load
+from configs.loading import load, loads
 from configs.resolve import agent_brief, plant_brief
 from configs.scenario import Scenario
 
@@ -86,6 +86,13 @@ def test_each_process_is_told_the_faults_that_act_in_it() -> None:
         ('{kind="can_drop", at_s=1.0, count=0}', "fault.0.count", "1"),
         ('{kind="can_delay", at_s=1.0, delay_s=0.0}', "fault.0.delay_s", "greater than 0"),
         ('{kind="can_drop", at_s=1.0, direction="up"}', "fault.0.direction", "'to_drives'"),
+        ('{kind="drive_error", at_s=1.0, error="HICCUP"}', "fault.0.error", "known: DRV_FAULT,"),
+        ('{kind="push", at_s=1.0, force_body_N=0.0}', "fault.0", "changes nothing with"),
+        ('{kind="friction", at_s=1.0, factor=1.0}', "fault.0", "changes nothing with factor = 1"),
+        ('{kind="wheel_slip", at_s=1.0, ratio=0.0}', "fault.0.ratio", "greater than 0"),
+        ('{kind="localisation_bias", at_s=1.0, x_m=0.0}', "fault.0", "changes nothing with x_m"),
+        ('{kind="payload", at_s=1.0, robots=["r1"], mass_kg=-2.3}', "mass_kg", "r1 has 2.3"),
+        ('{kind="payload", at_s=1, robots=["r2"], inertia_kg_m2=-0.02}', "inertia", "r2 has 0.01"),
     ],
 )
 def test_a_fault_that_is_wrong_or_cannot_act_is_one_line(fault: str, key: str, right: str) -> None:
@@ -99,3 +106,47 @@ def test_two_faults_of_one_name_are_refused() -> None:
     (line,) = problems(SMALL, twice)
     assert "fault.1.name" in line
     assert "another fault has this name" in line
+
+
+def sense(fault: str, *overrides: str) -> list[str]:
+    return problems(SMALL, f"fault=[{fault}]", *overrides)
+
+
+def taken(fault: str, *overrides: str) -> bool:
+    return bool(loads("small", changed(SMALL, f"fault=[{fault}]", *overrides)).fault)
+
+
+def test_loads_count_together_while_they_act_together() -> None:
+    gone = '{kind="payload", at_s=1.0, robots=["r1"], mass_kg=-2.0}'
+    held = '{kind="payload", at_s=0.5, for_s=1.0, robots=["r1"], mass_kg=1.0}'
+    more = '{kind="payload", at_s=%s, for_s=0.2, robots=["r1"], mass_kg=-1.0}'
+    assert taken(f"{gone}, {held}")
+    assert taken(f"{gone}, {held}, {more % 1.2}")
+    lines = sense(f"{gone}, {held}, {more % 1.4}")
+    assert len(lines) == 2
+    assert all("r1 has 2.3, of which 3 or more would go" in line for line in lines)
+
+
+def test_what_a_scenario_leaves_without_effect_is_refused() -> None:
+    (line,) = sense('{kind="drive_watchdog", at_s=1.0}', "drive.watchdog_s=0.0")
+    assert "needs drive.watchdog_s above 0" in line
+    (line,) = sense('{kind="localisation_jump", at_s=1.0}', 'localisation.source="odometry"')
+    assert "poses aren't used" in line
+    undamped = "robot.r1.body.damping_left_wheel_N_m_s=0.0"
+    (line,) = sense('{kind="friction", at_s=1.0, wheel="left"}', undamped)
+    assert "r1's body.damping_left_wheel_N_m_s is 0" in line
+    for fault, right in (
+        ('{kind="under_voltage", at_s=1.0, voltage_V=25.0}', "below supply.voltage_V = 24"),
+        ('{kind="over_voltage", at_s=1.0, voltage_V=23.0}', "above supply.voltage_V = 24"),
+    ):
+        (line,) = sense(fault, 'drive.preset="realistic"')
+        assert right in line
+
+
+def test_a_protocol_says_which_faults_its_drives_can_have() -> None:
+    plain = 'drive.protocol="support.second_drive:ROW"'
+    assert taken('{kind="drive_error", at_s=1.0, error="LOST_PHASE"}', plain)
+    (line,) = sense('{kind="drive_error", at_s=1.0, error="DRV_FAULT"}', plain)
+    assert "known: OVER_LOAD, LOST_PHASE" in line
+    (line,) = sense('{kind="drive_watchdog", at_s=1.0}', plain)
+    assert "these drives have no watchdog" in line

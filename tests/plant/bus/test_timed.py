@@ -9,7 +9,7 @@ from support.manual_port import ManualPort, Question
 
 from bridge.can_bus.packet import Submitted
 from bridge.drives.odrive import frames as f
-from bridge.drives.odrive.frames import AxisState, Command, identifier
+from bridge.drives.odrive.frames import AxisState, Command, RebootAction, identifier
 from bridge.frame import ERR, Frame
 from bridge.network.telemetry import no_tap
 from bridge.wire.node import NodeState
@@ -265,3 +265,15 @@ def test_frames_of_seven_robots_on_one_bus_come_to_each_in_its_turn() -> None:
         assert stamps == sorted(stamps)
     nodes = [node for robot in plant.robots for node in (robot.right_node, robot.left_node)]
     assert nodes == list(range(14))
+
+
+def test_a_drive_that_was_gone_for_good_is_back_after_a_reboot() -> None:
+    fault = 'fault=[{kind="drive_reboot", at_s=0.01, robots=["r1"], wheel="right"}]'
+    driven = Driven(lambda _: [], fault, "drive.boot_s=0.02")
+    driven.ticks(1)
+    right, _ = driven.robot.drives
+    right.restart(RebootAction.ENTER_DFU_MODE, 1 * MS)
+    driven.ticks(driven.schedule.countdown_ticks + 10 - 1)
+    for heard in (set(), {0x001, 0x009}):
+        said = {passed.frame.can_id for ask in driven.ticks(20) for passed in ask.transmitted}
+        assert said & {0x001, 0x009} == heard
