@@ -54,8 +54,9 @@ class RanInProcess:
         return dict(zip([signal.name for signal in signals], map(list, columns), strict=True))
 
     def events_of(self, robot: str) -> list[str]:
-        """Kinds of a robot's events, in order."""
-        return [event.kind for event in self.events if event.source == robot]
+        """Kinds of a robot's events, in order, without those of faults."""
+        own = [event.kind for event in self.events if event.source == robot]
+        return [kind for kind in own if not kind.startswith("fault")]
 
     def distance(self, robot: str) -> Column:
         """Distance of a robot from its reference at each tick [m]."""
