@@ -55,7 +55,7 @@ def by_kind_and_time(results: Sequence[Result]) -> dict[str, dict[float, list[Re
 def text_of(result: Result) -> str:
     """A cell: its letter, and of one that recovered the time."""
     letter = LETTERS[result.verdict]
-    return letter if result.settle_s is None else f"{letter} {result.settle_s:.2f}"
+    return letter if result.settle_s is None else f"{letter} {result.settle_s:.3g}"
 
 
 def print_matrix(folder: Folder, scenario: Scenario, results: Sequence[Result]) -> None:

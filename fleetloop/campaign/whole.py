@@ -22,7 +22,7 @@ from fleetloop.results import run_folder
 
 @dataclass(frozen=True, slots=True)
 class WholeRun:
-    """A job: one cell over processes. Its folder goes when it is judged."""
+    """A job: one cell over processes; tells its `Result`. Its folder goes when it is judged."""
 
     told: Told
     source: str
@@ -33,8 +33,15 @@ class WholeRun:
     conditions: Conditions
     folder: Path
 
-    def work(self, tell: Tell, stop: Stop) -> Result | None:
-        """Run and judge; None if it was told to stop."""
+    def work(self, tell: Tell, stop: Stop) -> bool:
+        """Run and judge."""
+        result = self._result(tell, stop)
+        if result is not None:
+            tell(result)
+        return True
+
+    def _result(self, tell: Tell, stop: Stop) -> Result | None:
+        """The result; None if it was told to stop."""
         scenario = self.told.scenario()
         scenario = scenario.model_copy(
             update={"seed": self.cell.seed, "bus": replace(scenario.bus, record=())}

@@ -99,6 +99,17 @@ def test_a_campaign_that_was_killed_goes_on_and_computes_no_cell_twice(tmp_path:
     assert len(cells) == len({(cell["kind"], cell["at_s"]) for cell in cells}) == 6
 
 
+@pytest.mark.system
+def test_a_fault_of_a_process_is_a_whole_run_over_processes(tmp_path: Path) -> None:
+    words = ("--faults", "process_freeze,process_slow", "--at", "0.3", *SHORT)
+    done = fleetloop(tmp_path, "campaign", "two_robots", *words, "--out", "out")
+    slow = next(line for line in done.stdout.splitlines() if "process_slow" in line)
+    assert slow.split() == ["process_slow", "H"], done.stderr
+    assert "needs clock.on_late = 'hold' or 'drop'" in done.stdout
+    assert "--in-process" not in (tmp_path / "out" / "campaign.csv").read_text("utf-8")
+    assert not (tmp_path / "out" / "run").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
