@@ -69,6 +69,8 @@ class Branches:
     seed: int
     cells: tuple[tuple[Cell, Fault], ...]
     conditions: Conditions
+    longest_s: float
+    """End of the longest cell: the scenario has to hold without a fault for as long."""
     baseline: Baseline | None
     """If it is known."""
     at_once: int
@@ -82,7 +84,9 @@ class Branches:
         scenario = scenario.model_copy(update={"seed": self.seed, "bus": bus})
         found = self.baseline
         if found is None:
-            found = baseline_of(scenario, tell, stop)
+            until_s = max(scenario.ends_at_s, self.longest_s)
+            longest = scenario.model_copy(update={"until_s": until_s})
+            found = baseline_of(longest, tell, stop)
             if found is None:
                 return True
             tell(found)

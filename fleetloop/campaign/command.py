@@ -15,7 +15,7 @@ from configs.scenario import Scenario
 from fleetloop.campaign.branches import Baseline, Branches
 from fleetloop.campaign.folder import Folder, write_tables
 from fleetloop.campaign.junit import write_junit
-from fleetloop.campaign.matrix import Cell, Kinds, cells_of, kinds_of
+from fleetloop.campaign.matrix import Cell, Kinds, cells_of, kinds_of, windows
 from fleetloop.campaign.page import page
 from fleetloop.campaign.plan import MOST_CELLS, Plan
 from fleetloop.campaign.progress import Meter
@@ -132,6 +132,7 @@ class _Work:
         whole = [cell for cell in self.left if KINDS[cell.kind].PLACE == "process"]
         branching = [cell for cell in self.left if KINDS[cell.kind].PLACE != "process"]
         seeds = {cell.seed for cell in self.left}
+        longest_s = self._longest_s()
         branches = [
             Branches(
                 told,
@@ -140,6 +141,7 @@ class _Work:
                 seed,
                 tuple((cell, self._fault(cell)) for cell in branching if cell.seed == seed),
                 plan.conditions,
+                longest_s,
                 folder.baselines.get(seed),
                 self.ways.at_once or pool.processors(),
                 plan.limit_s,
@@ -165,6 +167,17 @@ class _Work:
                 if cell.seed in folder.baselines
             ]
             self._work([(job, [job.cell]) for job in runs], _WHOLE_LIMIT_S)
+
+    def _longest_s(self) -> float:
+        """End of the longest cell, if nothing is kept before the scenario expects it."""
+        scenario, plan = self.scenario, self.folder.plan
+        latest_s = [expect.from_s for expect in scenario.expect]
+        ends_s = [
+            windows(scenario, latest_s, replace(fault, at_s=at_s), plan.conditions).ends_at_s
+            for fault in self.faults.values()
+            for at_s in plan.times_s
+        ]
+        return max(ends_s, default=0.0)
 
     def _fault(self, cell: Cell) -> Fault:
         return replace(self.faults[cell.kind], at_s=cell.at_s)

@@ -61,7 +61,8 @@ def text_of(result: Result) -> str:
 def print_matrix(folder: Folder, scenario: Scenario, results: Sequence[Result]) -> None:
     """Print the matrix, its legend, and why cells are refused or in error."""
     console = ResultConsole(file=sys.stdout, highlight=False)
-    table = Table(title=title(folder, scenario), box=table_box(), padding=(0, 1, 0, 0))
+    console.print(title(folder, scenario), soft_wrap=True, markup=False)
+    table = Table(box=table_box(), padding=(0, 1, 0, 0))
     table.add_column("fault", no_wrap=True)
     for at_s in folder.plan.times_s:
         table.add_column(f"{at_s:g} s", no_wrap=True)

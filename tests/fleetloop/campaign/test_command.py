@@ -99,6 +99,16 @@ def test_a_campaign_that_was_killed_goes_on_and_computes_no_cell_twice(tmp_path:
     assert len(cells) == len({(cell["kind"], cell["at_s"]) for cell in cells}) == 6
 
 
+def test_a_scenario_that_fails_without_a_fault_is_said_and_fails_the_campaign(
+    tmp_path: Path,
+) -> None:
+    never = ("--set", "expect.1.max=-0.04")
+    words = ("--faults", "push", "--at", "0.3", *SHORT, *never, "--out", "out")
+    done = fleetloop(tmp_path, "campaign", "two_robots", *words, "--allow", "failed")
+    assert done.returncode == 1
+    assert "WITHOUT A FAULT, seed 1: failed: y_e_m" in done.stdout
+
+
 @pytest.mark.system
 def test_a_fault_of_a_process_is_a_whole_run_over_processes(tmp_path: Path) -> None:
     words = ("--faults", "process_freeze,process_slow", "--at", "0.3", *SHORT)
