@@ -10,7 +10,7 @@ from importlib import resources
 from io import BytesIO
 from pathlib import Path
 from string import Template
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from configs.errors import InfrastructureError, ScenarioError
 from configs.loading import loads
@@ -33,6 +33,8 @@ from fleetloop.results.tables import (
 )
 
 PAGE = "report.html"
+MOST_EVENTS = 200
+"""Of a page; summary.json has all."""
 FIGURES = "figures"
 
 
@@ -135,10 +137,22 @@ def _page(
         expectations=table_tag(
             ("", "expectation"), ((mark(item), claim(item)) for item in summary["expectations"])
         ),
+        events=_events(summary.get("events", [])),
         figures="\n".join(figure_tag(item, data) for item, data in figures),
         facts=table_tag(("", ""), _facts(summary)),
         scenario=escape(record.scenario_toml),
     )
+
+
+def _events(events: Sequence[dict[str, Any]]) -> str:
+    """The events of a run as a section; nothing without any."""
+    rows = [
+        (f"{it['t_s']:.6g} s", ": ".join(filter(None, (it["source"], it["kind"], it["text"]))))
+        for it in events[:MOST_EVENTS]
+    ]
+    if len(events) > len(rows):
+        rows.append(("", f"and {len(events) - len(rows)} more in {run_folder.SUMMARY}"))
+    return f'<h2>Events</h2><div class="wide">{table_tag(("t", ""), rows)}</div>' if rows else ""
 
 
 def _facts(summary: Summary) -> Iterable[tuple[str, str]]:

@@ -95,6 +95,13 @@ class _ClockOffset(BaseModel):
     drift_ms: float
 
 
+class _Event(BaseModel):
+    t_s: float
+    source: str
+    kind: str
+    text: str
+
+
 class _Stall(BaseModel):
     t_s: float
     lasted_s: float
@@ -142,6 +149,7 @@ class _Summary(BaseModel):
     record_lost: str
     stopped_robots: dict[str, str]
     notices: dict[str, list[str]]
+    events: list[_Event] = []
     network: dict[str, _Edge] | None = None
     overruns: int
     frames_per_bus: dict[str, int]

@@ -4,7 +4,7 @@ import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
-from fleetloop.results.outcome import Outcome
+from fleetloop.results.outcome import REFUSED, Outcome
 from fleetloop.results.tables import finding, label, mark, trouble_lines
 from fleetloop.terminal import say
 
@@ -87,9 +87,10 @@ def account(source: str, outcome: Outcome, overrides: Sequence[str] = ()) -> lis
 
 
 def command(source: str, outcome: Outcome, overrides: Sequence[str] = ()) -> str:
-    """The command that runs a scenario as it ran."""
-    parts = ["fleetloop", "run", source]
-    if not outcome.get("processes"):
+    """The command that runs a scenario as it ran; that checks it, if it was refused."""
+    refused = outcome["verdict"] == REFUSED
+    parts = ["fleetloop", "check" if refused else "run", source]
+    if not (refused or outcome.get("processes")):
         parts.append("--in-process")
     for override in overrides:
         parts += ["--set", override]

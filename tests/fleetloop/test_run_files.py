@@ -94,6 +94,7 @@ def test_page_summary_and_terminal_say_the_same_of_what_went_wrong(
             continue  # its reason is there
         assert f"r1: {notice}" in printed
         assert f"r1: {notice}" in page
+    assert '<td class="text">0 s</td><td class="text">r1: diverged: its motion' in page
     # Results come before the figures are made.
     assert printed.index("verdict  failed") < printed.index("report ")
 

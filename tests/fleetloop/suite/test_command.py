@@ -17,6 +17,8 @@ from bridge.process.lifecycle import Stop
 from fleetloop.suite.cases import Bounds, case_of, run_cases
 from fleetloop.suite.command import SuiteOptions, run_tests
 
+pytestmark = pytest.mark.system
+
 
 def scenario(path: Path, *changes: tuple[str, str]) -> Path:
     text = resources.files("configs").joinpath("two_robots.toml").read_text("utf-8")

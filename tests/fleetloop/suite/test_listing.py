@@ -1,6 +1,6 @@
 """What is said of outcomes."""
 
-from configs.errors import InfrastructureError
+from configs.errors import InfrastructureError, ScenarioError
 from fleetloop.results.outcome import of_error, unbegun
 from fleetloop.suite.listing import account, command, counts_of, status_of
 
@@ -34,7 +34,9 @@ def test_an_account_has_what_failed_where_by_how_much_and_how_to_run_it_again() 
         "again   fleetloop run 'bench/a b.toml' --in-process --set seed=2",
         "run     runs/a",
     ]
-    assert command("a.toml", {"processes": True}) == "fleetloop run a.toml"
+    assert command("a.toml", RAN | {"processes": True}) == "fleetloop run a.toml"
+    refused = of_error("a.toml", ScenarioError("a.toml: not a TOML file"))
+    assert command("a.toml", refused, ("seed=2",)) == "fleetloop check a.toml --set seed=2"
 
 
 def test_an_outcome_has_one_status() -> None:
