@@ -26,21 +26,14 @@ def connections(peers: Container[str]) -> Iterator[tuple[str, socket.socket]]:
     A peer is "address:port", IPv6 addresses in brackets, as in Zenoh's locators.
     """
     found = set()
-    for descriptor in os.scandir("/proc/self/fd"):
+    for connection in _sockets():
         with contextlib.suppress(OSError):
-            if not stat.S_ISSOCK(descriptor.stat().st_mode):
-                continue
-            connection = socket.socket(fileno=os.dup(int(descriptor.name)))
-            try:
-                inet = connection.family in (socket.AF_INET, socket.AF_INET6)
-                peer = _place(connection.getpeername()) if inet else ""
-            except OSError:
-                peer = ""
+            host, port = connection.getpeername()[:2]
+            peer = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
             if peer in peers and peer not in found:  # which Zenoh may have more descriptors of
                 found.add(peer)
-                yield peer, connection
-            else:
-                connection.close()
+                # Not its own dup(), which would make it, and so Zenoh's, a blocking one.
+                yield peer, socket.socket(fileno=os.dup(connection.fileno()))
 
 
 def never_linger(session: zenoh.Session) -> object:
@@ -51,21 +44,37 @@ def never_linger(session: zenoh.Session) -> object:
 
     def on_link(event: zenoh.LinkEvent) -> None:
         if event.kind == zenoh.SampleKind.PUT:
-            close_at_once(event.link.dst.partition("/")[2])
+            _close_at_once(event.link)
 
-    listener: object = session.info.declare_link_events_listener(
-        Callback(on_link, indirect=False), history=True
-    )
+    listener: object = session.info.declare_link_events_listener(Callback(on_link, indirect=False))
+    for link in session.info.links():
+        _close_at_once(link)
     return listener
 
 
-def close_at_once(peer: str) -> None:
-    """Let close(2) of the connections to this peer return at once."""
-    for _, connection in connections({peer}):
-        with connection, contextlib.suppress(OSError):
-            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _AT_ONCE)
+def _close_at_once(link: zenoh.Link) -> None:
+    """Let close(2) return at once for a link; the ports of both ends are enough to find it."""
+    ports = [_port(link.src), _port(link.dst)]
+    for connection in _sockets():
+        with contextlib.suppress(OSError):
+            ends = connection.getsockname(), connection.getpeername()
+            if [str(port) for _, port, *_ in ends] == ports:
+                connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _AT_ONCE)
 
 
-def _place(address: tuple[str, int]) -> str:
-    host, port = address[:2]
-    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+def _port(locator: str) -> str:
+    """Of an end of a link: "7447" of "tls/10.0.0.1:7447"."""
+    return locator.rpartition(":")[2]
+
+
+def _sockets() -> Iterator[socket.socket]:
+    """This process's TCP sockets, which stay open when the object here goes."""
+    for name in os.listdir("/proc/self/fd"):  # noqa: PTH208
+        with contextlib.suppress(OSError):
+            if stat.S_ISSOCK(os.fstat(int(name)).st_mode):
+                found = socket.socket(fileno=int(name))
+                try:
+                    if found.family in (socket.AF_INET, socket.AF_INET6):
+                        yield found
+                finally:
+                    found.detach()

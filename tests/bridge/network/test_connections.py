@@ -1,5 +1,6 @@
 """Sockets of Zenoh's in this process: none makes the thread that closes it wait for its peer."""
 
+import os
 import socket
 import struct
 from pathlib import Path
@@ -43,3 +44,17 @@ def test_no_connection_lingers_at_either_end_nor_one_that_is_made_again(tmp_path
                 again.declare_live(TOKEN)
                 assert client.receive(BOUND_S).payload == b"1"
                 assert (lingering(client), lingering(again)) == ([False], [False])
+
+
+def test_looking_at_a_connection_leaves_it_nonblocking_as_zenoh_has_it() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        host, port = server.getsockname()
+        with socket.create_connection((host, port)) as ours:
+            ours.setblocking(False)
+            for peer, connection in connections({f"{host}:{port}"}):
+                assert peer == f"{host}:{port}"
+                connection.close()
+                break
+            else:
+                raise AssertionError("not found")
+            assert not os.get_blocking(ours.fileno())
