@@ -277,3 +277,17 @@ def test_a_drive_that_was_gone_for_good_is_back_after_a_reboot() -> None:
     for heard in (set(), {0x001, 0x009}):
         said = {passed.frame.can_id for ask in driven.ticks(20) for passed in ask.transmitted}
         assert said & {0x001, 0x009} == heard
+
+
+@pytest.mark.parametrize("kind", ["can_drop", "can_duplicate", "can_delay", "can_corrupt"])
+def test_a_client_has_all_its_credit_again_whatever_became_of_its_frames(kind: str) -> None:
+    sent = {tick: torques(0.1, 0.1) for tick in range(-240, -200)}
+    driven = Driven(lambda tick: sent.get(tick, []), "bus.restart_s=0.01")
+    driven.tick()
+    inject(driven.bus.wire, frame_fault(kind, direction="to_drives", count=33))
+    freed = [count for ask in driven.ticks(100) for _, count in ask.freed]
+    host = driven.bus._hosts["r1"].node
+    assert sum(freed) == 80
+    assert host.queue.entries == []
+    # Destroyed 32 times in a row it went bus-off, with what it had queued.
+    assert (host.counters.refused > 0) is (kind == "can_corrupt")
