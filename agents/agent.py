@@ -23,11 +23,9 @@ its first tick.
 
 A robot that joins late stands until then: in phase DRIVING, torque 0, its law not called. It
 listens, and so that nothing jumps for the others it takes its path variable from what it hears
-(`agents.joining`). After it has left nobody hears it. A controller that was started again begins
-STOPPED, with one attempt to arm, and joins as one that is late.
-
-A stopped robot goes on sharing its path variable, so that its neighbours aren't cut off. A dry run
-goes through the same phases without a frame. Its only inputs are frames, messages, tick numbers.
+(`agents.joining`). A controller that was started again begins STOPPED, with one attempt to arm, and
+joins as one that is late. A stopped robot goes on sharing its path variable, so that its neighbours
+aren't cut off. A dry run goes through the same phases without a frame.
 """
 
 from collections.abc import Sequence

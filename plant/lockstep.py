@@ -26,13 +26,12 @@ from bridge.process.awake import LOOK_S, STALL_S
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, launcher_stopped
 from configs.brief import LEAD_TICKS, PlantBrief
-from configs.edges import FOREVER
 from configs.errors import InfrastructureError, PeerLostError
 from plant.absent import AbsentControllers
 from plant.bus.build import build_buses
-from plant.bus.port import ALL, Bus
 from plant.bus.sockets import SocketPort
 from plant.counters import PlantCounters
+from plant.lane import Lane
 from plant.orders import PlantOrders
 from plant.robot import EmulatedRobot
 
@@ -43,28 +42,6 @@ _STALL_NS = int((LOOK_S + STALL_S) * 1e9)
 ANSWER_SHARE = 0.9
 """Part of the tick deadline that the plant waits for answers: before that, controllers name a
 silent peer; after it, the launcher names the plant."""
-
-
-class _Lane:
-    """One bus on its way through the ticks."""
-
-    __slots__ = (
-        *("absent", "asked", "asked_ns", "awaits", "bus", "done", "due_tick", "name", "robots"),
-        *("steps", "tick"),
-    )
-
-    def __init__(self, name: str, bus: Bus, tick: int) -> None:
-        self.name = name
-        self.bus = bus
-        self.steps = bus.steps()
-        self.robots = [robot.brief.robot for robot in bus.robots]
-        self.tick = tick
-        self.asked = ALL
-        self.asked_ns = 0  # when it was asked to answer; 0: it is not asked
-        self.done = False
-        self.absent = False  # whether a controller of it is
-        self.due_tick = FOREVER  # from which on absences have to be looked at
-        self.awaits: list[str] = []  # robots whose controllers have to be on it for its next tick
 
 
 class _Ends(NamedTuple):
@@ -114,16 +91,16 @@ class LockstepLoop:
             brief, robots, lambda name, _: SocketPort(name, hub, hub), begin, taps
         )
         """By name."""
-        self._lanes = {name: _Lane(name, bus, first) for name, bus in self.buses.items()}
+        self._lanes = {name: Lane(name, bus, first) for name, bus in self.buses.items()}
         self._lane_of = {robot: lane for lane in self._lanes.values() for robot in lane.robots}
         for lane in self._lanes.values():
             lane.due_tick = absent.due_tick(lane.robots)
-        self._unasked: dict[str, _Lane] = {}  # by name; whose question nobody has to answer
+        self._unasked: dict[str, Lane] = {}  # by name; whose question nobody has to answer
         self._left = 0  # controllers that were seen to have left
         self._slowest = first
         self._slowest_ns = 0  # since when it is that tick
         self._at_slowest = len(self._lanes)
-        self._held: list[_Lane] = []
+        self._held: list[Lane] = []
         self._start_ns = 0
         self.counters = PlantCounters()
 
@@ -191,7 +168,7 @@ class LockstepLoop:
             if self._schedule.localises(tick):
                 ends.pose.put(robot.pose_fix(tick, t_ns).encode())
 
-    def _start_tick(self, lane: _Lane, now_ns: int) -> None:
+    def _start_tick(self, lane: Lane, now_ns: int) -> None:
         """Begin a tick of a bus, unless it first has to wait for a controller to come again."""
         if lane.tick >= lane.due_tick:
             lane.awaits = self._absent.begin(lane.robots, lane.tick)
@@ -201,7 +178,7 @@ class LockstepLoop:
                 return
         self._go_on(lane, now_ns)
 
-    def _go_on(self, lane: _Lane, now_ns: int) -> None:
+    def _go_on(self, lane: Lane, now_ns: int) -> None:
         """Advance a bus to its next question, or through the end of its tick."""
         asked = next(lane.steps)
         if asked is None:
@@ -211,12 +188,12 @@ class LockstepLoop:
         if lane.absent and not self._hub.owing(lane.name):
             self._unasked[lane.name] = lane
 
-    def _look_at(self, lane: _Lane) -> None:
+    def _look_at(self, lane: Lane) -> None:
         """Take what is known of the controllers of a bus."""
         lane.absent = self._absent.any_of(lane.robots)
         lane.due_tick = self._absent.due_tick(lane.robots)
 
-    def _end_tick(self, lane: _Lane, now_ns: int) -> None:
+    def _end_tick(self, lane: Lane, now_ns: int) -> None:
         """A bus from its tick to the next, and on as far as the slowest allows."""
         tick = lane.tick
         if lane.absent:
@@ -328,7 +305,7 @@ class LockstepLoop:
             elif lane.asked_ns:
                 self._look_for_late(lane, now_ns)
 
-    def _await(self, lane: _Lane, now_ns: int) -> None:
+    def _await(self, lane: Lane, now_ns: int) -> None:
         """A bus waits for controllers to come again: time stands still until they are there."""
         lane.awaits = [robot for robot in lane.awaits if not self._hub.joined(robot)]
         limit_s = self._schedule.start_deadline_s
@@ -340,7 +317,7 @@ class LockstepLoop:
                 f" {' and '.join(lane.awaits)} did not come again within {limit_s:g} s"
             )
 
-    def _look_for_late(self, lane: _Lane, now_ns: int) -> None:
+    def _look_for_late(self, lane: Lane, now_ns: int) -> None:
         """Go on without the controllers that a bus at the slowest tick waits for too long.
 
         Others may be waiting themselves, for the path state of one of these.

@@ -1,8 +1,10 @@
 """The statistics of a run over processes, from the reports of its processes."""
 
 from bridge.network.reports import AgentReport, PlantReport, Report
+from bridge.network.router import LauncherLink
 from bridge.process.awake import AFTERMATH_S
-from configs.roles import AGENT, PLANT, short_name
+from configs.roles import AGENT, LAUNCHER, PLANT, short_name
+from fleetloop.launch.control_plane import ControlPlane
 from fleetloop.launch.message_reader import of_process
 from fleetloop.launch.outcome import Outcome
 from fleetloop.results.summary import RunStats
@@ -91,3 +93,21 @@ def _blame_stalls(outcome: Outcome, stats: RunStats, plant: PlantReport, period_
                     f"{reason}; the plant, or its machine, stalled for {stall.lasted_s:.2f} s at"
                     f" t = {stall.tick * period_s:g} s"
                 )
+
+
+def complete(plane: ControlPlane, link: LauncherLink) -> None:
+    """Add what router, clocks and the launcher's own reading say of a run that has ended."""
+    outcome, words = plane.outcome, plane.words
+    if refusals := link.denials.notes():
+        outcome.remarks["router"] = refusals
+    outcome.clocks = plane.clocks.account()
+    outcome.refused = link.denials.counts()
+    words.note_dropped(link.dropped())
+    if refusals := words.refusals.lines():
+        outcome.remarks[LAUNCHER.name] = refusals
+    # A process that floods the others is the cause of whatever was too late.
+    said = {name for report in outcome.reports.values() for name in report.flooders}
+    floods = sorted(said.union(words.refusals.floods()))
+    floods += [f"{user} (cut off by the router)" for user in sorted(link.denials.flooders)]
+    if floods and outcome.ended == "aborted":
+        outcome.reason += f"; flooded by {', '.join(floods)}"

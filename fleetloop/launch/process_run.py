@@ -13,7 +13,7 @@ failures, `fleetloop.launch.ending` ends the processes.
 """
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from bridge.can_bus import sockets
@@ -35,6 +35,7 @@ from configs.roles import LAUNCHER, PLANT, identity_of, processes_of
 from configs.scenario import Scenario
 from fleetloop.door.server import Door
 from fleetloop.launch import open_files, placement
+from fleetloop.launch.accounts import complete
 from fleetloop.launch.child import GAVE_UP, Child, Failure, end, refuse_shadowed_roles
 from fleetloop.launch.clock_offsets import (
     EVERY_S,
@@ -148,7 +149,9 @@ class ProcessRun:
                 ending = self._clock.monotonic_s()
                 self._ending.end(link, stop, failure)
                 self.outcome.teardown_s = self._clock.monotonic_s() - ending
-            self._complete_account(link)
+            self.outcome.machine = self._machine.report()
+            self.outcome.faults = self._desk.ledger.rows(self.outcome.ticks)
+            complete(self._plane, link)
         finally:
             end(self._plane.children, grace_s=0.0)
         return self.outcome
@@ -336,28 +339,6 @@ class ProcessRun:
             link.look_for_floods(max(self.outcome.ticks, 0), now_s)
         for text in link.denials.news():
             self._plane.on_notice("router", text)
-
-    def _complete_account(self, link: LauncherLink) -> None:
-        """Add what machine, router and the launcher's own reading say of the run."""
-        outcome, words = self.outcome, self._plane.words
-        outcome.machine = self._machine.report()
-        outcome.faults = self._desk.ledger.rows(outcome.ticks)
-        if refusals := link.denials.notes():
-            outcome.remarks["router"] = refusals
-        outcome.clocks = self._plane.clocks.account()
-        outcome.refused = link.denials.counts()
-        words.note_dropped(link.dropped())
-        if refusals := words.refusals.lines():
-            outcome.remarks[LAUNCHER.name] = refusals
-        self._blame_floods(link.denials.flooders)
-
-    def _blame_floods(self, cut_off: Iterable[str]) -> None:
-        """A process that floods the others is the cause of whatever was too late."""
-        said = {name for report in self.outcome.reports.values() for name in report.flooders}
-        floods = sorted(said.union(self._plane.words.refusals.floods()))
-        floods += [f"{user} (cut off by the router)" for user in sorted(cut_off)]
-        if floods and self.outcome.ended == "aborted":
-            self.outcome.reason += f"; flooded by {', '.join(floods)}"
 
 
 def _with_refusals(absent: Sequence[str], link: LauncherLink) -> str:

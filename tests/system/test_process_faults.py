@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.processes import completed
+from support.processes import completed, running
 
 from fleetloop.record.reader import Record
 from fleetloop.replay.command import ReplayOptions, replay_run
@@ -117,6 +117,21 @@ def test_a_frozen_controller_that_was_dropped_is_replaced(tmp_path: Path) -> Non
     said = [(150, "frozen"), (150, "dropped"), (250, "awaited"), (250, "back")]
     assert sorted(kinds(tmp_path / "a", "r2")[:4]) == sorted(said)
     assert kinds(tmp_path / "a", "r2")[4][1] == "rejoined"
+
+
+def test_a_run_goes_on_without_a_controller_that_dies_by_accident(tmp_path: Path) -> None:
+    args = ("two_robots", "--set", "expect=[]", *BOTH_WAYS, *on_late("drop"))
+    with running(tmp_path / "a", *args, bus_time_s=0.5) as run:
+        run.child("r2").kill()
+        status, out = run.end()
+        assert run.survivors() == []
+    assert status == 1, out
+    said = read_summary(tmp_path / "a")
+    assert said["verdict"] == "not checked"
+    assert said["cut_short"].keys() == {"r2"}
+    texts = {it["text"] for it in said["events"] if it["kind"] == "dropped"}
+    assert texts == {"agent/r2 was killed by SIGKILL", "its controller has left its bus"}
+    assert len(Record.open(tmp_path / "a" / "record.mcap").controller["r1"]) == 2000
 
 
 def test_under_abort_a_killed_controller_ends_the_run_with_its_fault(tmp_path: Path) -> None:
