@@ -154,7 +154,7 @@ class Connection:
         self.joined = self.synchronous = self.batched = self.own = self.owes = False
         self.excused = False  # bus time doesn't wait for it
         self.awake = False  # it has answered a question since then
-        self.since_ns = 0  # what it says to questions before this bus time is dropped
+        self.since_ns = -1  # what it says to questions before this bus time is dropped; -1: none
         self.held = False  # not read until the frames of its bus are taken
         self.backlog: deque[bytes] = deque()
         self.missing = 0  # frames that were lost behind the backlog
