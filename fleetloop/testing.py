@@ -107,6 +107,24 @@ class EmulatedPlant:
         """
         return float(self._ask("poses")["t_s"])
 
+    def inject(self, kind: str, **keys: Any) -> str:
+        """Apply a fault, with the keys of [[fault]]: `robots=["r1"], for_s=2.0, wheel="left"`.
+
+        Without `at_s` it acts at once, without `robots` on all of this plant. Returns its name.
+
+        Raises:
+            PlantError: it can't act, or the plant has ended; the text says why.
+        """
+        return str(self._ask(f"inject {json.dumps({'kind': kind, **keys})}")["fault"]["name"])
+
+    def clear(self, name: str) -> None:
+        """End a fault that was injected.
+
+        Raises:
+            PlantError: there is none of this name, or the plant has ended.
+        """
+        self._ask(f"clear {name}")
+
     def stop(self) -> str:
         """End the plant; return its standard error. Idempotent."""
         stdin, stdout, stderr = self._pipes()
@@ -145,7 +163,10 @@ class EmulatedPlant:
             stdin.flush()
         except (OSError, ValueError) as error:
             raise PlantError(f"the plant has ended: {self.stop().strip() or error}") from error
-        return self._answer(ANSWER_S)
+        answer = self._answer(ANSWER_S)
+        if "error" in answer:
+            raise PlantError(answer["error"])
+        return answer
 
     def _answer(self, within_s: float) -> dict[str, Any]:
         """Its next line, waiting at most so long."""

@@ -5,12 +5,26 @@ that is put before such a pose arrives before it; so the tick at which that pose
 one at which all controllers have the order, however far they are now.
 """
 
+from collections import deque
 from collections.abc import Iterable, Mapping
+from typing import Any, Protocol
 
-from bridge.network.fault_orders import FaultOrder, OrderInbox, targets_to
+from bridge.network.fault_orders import FaultOrder, targets_to
 from bridge.network.link import Publisher
 from configs.brief import Schedule
 from plant.bus.port import Bus
+
+
+class Inbox(Protocol):
+    """Where orders arrive."""
+
+    waiting: deque[Any]
+
+    def take(self) -> list[FaultOrder]:
+        """The orders that have come."""
+
+    def answer(self, order: FaultOrder, tick: int | str) -> None:
+        """Say the tick at which an order acts, or why it doesn't."""
 
 
 class PlantOrders:
@@ -22,9 +36,7 @@ class PlantOrders:
         relays: to the controller of each robot; none in real time.
     """
 
-    def __init__(
-        self, schedule: Schedule, inbox: OrderInbox, relays: Mapping[str, Publisher]
-    ) -> None:
+    def __init__(self, schedule: Schedule, inbox: Inbox, relays: Mapping[str, Publisher]) -> None:
         self._schedule = schedule
         self._inbox = inbox
         self._relays = relays

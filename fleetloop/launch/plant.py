@@ -4,7 +4,9 @@ No controllers, no network, no countdown: the bodies are free from the start, an
 bus may arm its drives and drive. It ends with a signal, after `--duration`, or with its standard
 input if that is served: then each line asks, and is answered by a line of JSON.
 
-    poses      bus time, and of each robot pose, speeds and the torques that act on its wheels
+    poses           bus time, and of each robot pose, speeds and the torques that act on its wheels
+    inject TABLE    a fault with the keys of [[fault]], as JSON; answered with its name and tick
+    clear NAME      ends a fault that was injected
 
 With `--join` it is the plant of a run whose deployment has the role elsewhere, for example on the
 machine with the CAN adapters.
@@ -37,6 +39,7 @@ from configs.roles import PLANT
 from configs.scenario import Scenario
 from configs.signals import PLANT_SIGNALS
 from fleetloop.launch import open_files, placement
+from fleetloop.launch.plant_faults import PlantFaults
 from fleetloop.signals import stop_on_signals
 from fleetloop.terminal import note, say
 from plant.__main__ import PLANT_PRIORITY, join
@@ -115,7 +118,8 @@ def run_plant(source: str, options: PlantOptions) -> int:
         end: DrivePort = hub
         try:
             end = join(hub, brief.attached)
-            _run(brief, hub, end, _buses(brief, folder), options, stop)
+            faults = PlantFaults(scenario, brief.schedule, [r.robot for r in brief.robots])
+            _run(brief, hub, end, _buses(brief, folder), options, stop, faults)
         finally:
             end.close(stop.reason or "the plant has ended")
     return ExitStatus.OK
@@ -179,15 +183,19 @@ def _run(
     buses: dict[str, Settings],
     options: PlantOptions,
     stop: Stop,
+    faults: PlantFaults,
 ) -> None:
     robots = [emulated_robot(robot) for robot in brief.robots]
     nowhere = _Nowhere()
     watch = _Watch(robots, brief.schedule.period_ns)
     rows = [RowBuffer(PLANT_ROW, lambda *_: None) for _ in robots]
-    loop = RealtimeLoop(brief, robots, end, hub, [nowhere] * len(robots), rows, watch.look, {})
+    poses = [nowhere] * len(robots)
+    loop = RealtimeLoop(brief, robots, end, hub, poses, rows, watch.look, {}, orders=faults.orders)
     missing = go_realtime(PLANT_PRIORITY)
     if options.serve_stdin:
-        threading.Thread(target=_serve_stdin, args=(robots, loop, stop), daemon=True).start()
+        threading.Thread(
+            target=_serve_stdin, args=(robots, loop, faults, stop), daemon=True
+        ).start()
     _say_ready(brief, buses, as_json=options.as_json)
     with settled_memory():
         loop.run(SYSTEM_CLOCK.monotonic_ns() + GO_AHEAD_NS, stop)
@@ -217,15 +225,37 @@ def _say_ready(brief: PlantBrief, buses: dict[str, Settings], *, as_json: bool) 
     note("drives and physics in real time; Ctrl-C ends")
 
 
-def _serve_stdin(robots: Sequence[EmulatedRobot], loop: RealtimeLoop, stop: Stop) -> None:
+def _serve_stdin(
+    robots: Sequence[EmulatedRobot], loop: RealtimeLoop, faults: PlantFaults, stop: Stop
+) -> None:
     """Answer requests until standard input ends, and the plant with it."""
     for line in sys.stdin:
-        match line.strip():
-            case "poses":
-                say(json.dumps(_poses(robots, loop)))
-            case other:
-                say(json.dumps({"error": f"{other[:40]!r}: no such request; known: poses"}))
+        request, _, words = line.strip().partition(" ")
+        try:
+            match request:
+                case "poses":
+                    answer = _poses(robots, loop)
+                case "inject":
+                    answer = faults.inject(_table(words), loop.progress().tick)
+                case "clear":
+                    answer = faults.clear(words)
+                case other:
+                    known = "poses, inject, clear"
+                    answer = {"error": f"{other[:40]!r}: no such request; known: {known}"}
+        except ScenarioError as error:
+            answer = {"error": str(error)}
+        say(json.dumps(answer))
     stop.request("standard input has ended")
+
+
+def _table(text: str) -> dict[str, Any]:
+    try:
+        table = json.loads(text)
+    except (ValueError, RecursionError):
+        table = None
+    if not isinstance(table, dict):
+        raise ScenarioError("inject: takes a table of [[fault]] as JSON")
+    return table
 
 
 def _poses(robots: Sequence[EmulatedRobot], loop: RealtimeLoop) -> dict[str, Any]:

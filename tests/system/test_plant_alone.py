@@ -241,3 +241,22 @@ def test_bus_time_keeps_the_wall_clocks_pace(fleetloop_plant) -> None:
     passed_s = after[1] - before[1]
     assert passed_s <= after[2] - before[0] + PERIOD_S
     assert passed_s > 0.5 * (after[0] - before[2])
+
+
+def test_a_fault_is_injected_and_cleared_and_refused_with_the_reason(fleetloop_plant) -> None:
+    plant = fleetloop_plant("two_robots", robots=["r1"], overrides=["robot.r1.v_m_s=0.0"])
+    name = plant.inject("push", force_body_N=50.0)
+    deadline = time.monotonic() + 10.0
+    while plant.poses()["r1"].v_m_s < 0.1:
+        assert time.monotonic() < deadline
+    plant.clear(name)
+    for words, said in (
+        (("pusch",), "did you mean push"),
+        (("push", "r2"), "r2: nothing here that it can act on"),
+        (("link_loss",), "a plant on its own has no controllers"),
+    ):
+        kind, *robots = words
+        with pytest.raises(PlantError, match=said):
+            plant.inject(kind, **({"robots": robots} if robots else {}))
+    with pytest.raises(PlantError, match="nobody: no fault to clear; there are: push"):
+        plant.clear("nobody")
