@@ -120,10 +120,9 @@ class Agent:
             brief, self._neighbours, self._edges, self._coordinator, self._coordination
         )
         self._leaves = brief.membership.leaves_tick
-        self._located = False  # by a fix
+        self._located = self._diverged = False  # by a fix; the next path variable is beyond reach
         self.feedback_since = self._drives.feedback_since
         """Whether both encoder frames were received after a bus time [ns]."""
-        self._diverged = False  # the next path variable is beyond reach
         self._reach = brief.reach
         self._records_ages = any(signal.name.startswith(AGE_PREFIX) for signal in brief.signals)
         self._encoder_check = EncoderCheck(brief.host.encoder_mismatch_limit_wheel_rad, self._h)
@@ -141,8 +140,7 @@ class Agent:
     def _pose_history(self, brief: AgentBrief) -> int:
         """Longest age of a fix [ticks]: the odometry since then is kept for that long."""
         if self.network is not None and self.network.carries_poses:
-            oldest_ns = min(brief.host.pose_age_limit_ns, MOST_DELAY_NS)
-            oldest = oldest_ns // brief.schedule.period_ns
+            oldest = min(brief.host.pose_age_limit_ns, MOST_DELAY_NS) // brief.schedule.period_ns
             return max(oldest, POSE_HISTORY_TICKS, brief.schedule.pose_delay_ticks)
         return POSE_HISTORY_TICKS if brief.schedule.realtime else brief.schedule.pose_delay_ticks
 

@@ -37,12 +37,8 @@ from fleetloop.door.server import Door
 from fleetloop.launch import open_files, placement
 from fleetloop.launch.accounts import complete
 from fleetloop.launch.child import GAVE_UP, Child, Failure, end, refuse_shadowed_roles
-from fleetloop.launch.clock_offsets import (
-    EVERY_S,
-    START_EVERY_S,
-    WAITED_S,
-    too_far_apart,
-)
+from fleetloop.launch.clock_gate import ClockGate
+from fleetloop.launch.clock_offsets import EVERY_S, START_EVERY_S
 from fleetloop.launch.control_plane import ControlPlane
 from fleetloop.launch.ending import DRAIN_S, Ending
 from fleetloop.launch.fault_desk import FaultDesk
@@ -116,7 +112,7 @@ class ProcessRun:
         self._plane.on_answer, self._plane.on_alive = self._desk.take, self._desk.repeat
         self._hellos = Hellos(self._schedule.hello_every_s, clock=clock)
         self._next_look_s = 0.0
-        self._ready_s: float | None = None
+        self._clocks = ClockGate(scenario, self._deployment, self._plane.clocks, self._now)
         self._links: dict[str, NetworkLink] = {}
 
     @property
@@ -228,40 +224,14 @@ class ProcessRun:
                     f"not ready within {ticks.start_deadline_s:g} s: {_with_refusals(absent, link)}"
                 )
             clocks.ask(START_EVERY_S)
-            if ready and not gone and self._clocks_known():
-                self._refuse_clocks()
+            if ready and not gone and self._clocks.known():
+                self._clocks.refuse()
                 gone = True
                 epoch_ns = wall_of(self._clock.monotonic_ns() + countdown_ns, self._clock)
                 hellos.add(go, Go(epoch_ns, ticks.ticks).encode())
             self._plane.receive(link, min(hellos.say(), WATCH_EVERY_S))
             self._report_refusals(link)
         return None
-
-    def _clocks_known(self) -> bool:
-        """Whether the clocks of other machines are known, or were waited for long enough."""
-        if self._ready_s is None:
-            self._ready_s = self._now()
-        return self._plane.clocks.enough() or self._now() > self._ready_s + WAITED_S
-
-    def _refuse_clocks(self) -> None:
-        """Refuse a run whose machines' clocks are too far apart.
-
-        Raises:
-            InfrastructureError: they are; the text names them.
-        """
-        network, clocks = self._deployment.network, self._plane.clocks
-        clocks.at_start = clocks.offsets()
-        if network is None or not self._schedule.realtime:
-            return
-        changes = leader_brief(self._scenario).speed_changes
-        speed_m_s = max(abs(change.speed_m_s) for change in changes)
-        hops = placement.hops(self._scenario, self._deployment)
-        far = too_far_apart(clocks.at_start, hops, speed_m_s, network.clock_tolerance_m)
-        if far:
-            raise InfrastructureError(
-                f"{'; '.join(far)}: more than network.clock_tolerance_m ="
-                f" {network.clock_tolerance_m:g}; keep the machines' clocks together (chrony, PTP)"
-            )
 
     # --- run ---------------------------------------------------------------------------------
 

@@ -143,7 +143,7 @@ def test_a_stop_before_the_end_is_an_input_too() -> None:
 def test_a_controller_that_was_started_again_says_so_first() -> None:
     logged = Logged(*REALTIME, "host.restarts=1", rejoins=True)
     first, *_ = logged.entries()
-    assert (first.kind, first.payload) == (Kind.BEGIN, b"\1")
+    assert (first.kind, first.begin()) == (Kind.BEGIN, (True, 0))
 
 
 def test_start_messages_that_say_the_same_again_are_logged_once() -> None:
