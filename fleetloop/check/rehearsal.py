@@ -6,7 +6,7 @@ short scenarios are rehearsed to their end.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,10 +16,9 @@ from configs.connections import NetworkLink
 from configs.errors import FleetloopError
 from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of
 from configs.scenario import Scenario
-from configs.signals import Signal
 from fleetloop.check.finding import Finding
 from fleetloop.in_process import InProcessRun
-from fleetloop.record.writer import Source
+from fleetloop.record.memory import MemoryRecord
 from fleetloop.settling import LOST_M, SETTLE_BAND
 
 WORK_S = 1.5
@@ -29,30 +28,6 @@ _TICK_S, _SUBSTEP_S, _WIRE_S = 40e-6, 20e-6, 250e-6
 FINAL_S = 4.0
 """Its end, where errors should be small: shorter than a run's, as a rehearsal is."""
 _TITLE = "rehearsal"
-
-
-@dataclass(slots=True)
-class _Notebook:
-    """Keeps the controllers' rows."""
-
-    blocks: dict[str, list[bytes]] = field(default_factory=dict)
-
-    def add(self, robot: str, source: Source, first_tick: int, rows: bytes) -> None:  # noqa: ARG002
-        if source == "controller":
-            self.blocks.setdefault(robot, []).append(rows)
-
-    def end(self, robot: str, source: Source) -> None:
-        pass
-
-    def traffic(self, bus: str, frames: bytes) -> None:
-        pass
-
-    def inputs(self, robot: str, first: int, block: bytes, final: bool) -> None:
-        pass
-
-    def rows(self, robot: str, signals: Sequence[Signal]) -> np.ndarray:
-        layout = np.dtype([(signal.name, "<f8") for signal in signals])
-        return np.frombuffer(b"".join(self.blocks.get(robot, [])), layout)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +68,7 @@ def rehearse(scenario: Scenario) -> list[Finding]:
 def rehearsal(scenario: Scenario, until_s: float) -> Rehearsal:
     """Run a scenario in this process up to a time; it ends when all robots have stopped."""
     part = _part(scenario, until_s)
-    notebook = _Notebook()
+    memory = MemoryRecord()
     network = NetworkLink("in-process", "", "", "")
     stop = Stop()
 
@@ -106,13 +81,16 @@ def rehearsal(scenario: Scenario, until_s: float) -> Rehearsal:
             plant_brief(part, network=network),
             [agent_brief(part, name, network=network, bus=()) for name in part.names],
             leader_brief(part),
-            notebook,
+            memory,
             watch,
         )
         run.run(stop)
     except FleetloopError as error:
         return Rehearsal({}, {}, str(error))
-    rows = {robot.name: notebook.rows(robot.name, signals_of(part, robot)) for robot in part.robot}
+    rows = {
+        robot.name: memory.rows(robot.name, "controller", signals_of(part, robot))
+        for robot in part.robot
+    }
     return Rehearsal(rows, run.stopped_robots)
 
 

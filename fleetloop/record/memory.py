@@ -36,14 +36,15 @@ class MemoryRecord:
         return Record(
             Path("record in memory"),
             tuple(signals),
-            {robot: self._rows(robot, "plant", PLANT_SIGNALS) for robot in signals},
-            {robot: self._rows(robot, "controller", own) for robot, own in signals.items()},
+            {robot: self.rows(robot, "plant", PLANT_SIGNALS) for robot in signals},
+            {robot: self.rows(robot, "controller", own) for robot, own in signals.items()},
             signals,
             scenario_toml,
             "",
         )
 
-    def _rows(self, robot: str, source: Source, signals: Sequence[Signal]) -> np.ndarray:
+    def rows(self, robot: str, source: Source, signals: Sequence[Signal]) -> np.ndarray:
+        """The rows of one source so far, by signal."""
         matrix = np.frombuffer(b"".join(self.blocks.get((robot, source), [])), "<f8")
         matrix = matrix.reshape(-1, len(signals))
         rows = np.zeros(len(matrix), row_type(tuple(signals)))
