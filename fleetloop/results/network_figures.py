@@ -86,7 +86,9 @@ def edge_states(record: Record, scenario: Scenario) -> Figure:
         if edge[0] != LOCALISATION
     }
     known = [mean for mean in means.values() if np.isfinite(mean)]
-    scale = Normalize(0.0, max(known, default=1.0))
+    oldest_mean = max(known, default=0.0)
+    # In real time a message may be dated ahead of the clock of its hearer.
+    scale = Normalize(0.0, oldest_mean if oldest_mean > 0.0 else 1.0)
     styles = {
         edge: EdgeStyle(to_hex(_MAP(0.85 * scale(mean))), f"{mean:.3g} s")
         if np.isfinite(mean)
