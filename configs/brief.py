@@ -322,4 +322,4 @@ class RecorderBrief:
     ticks: int  # of the run: no rows are of later ones
     last_frame_ns: int  # bus time after which no frame ends
     fills_gaps: bool = False  # sources may be cut off or start again: missing rows aren't numbers
-    inputs: bool = False  # controllers log theirs
+    logged_inputs: bool = False  # controllers log theirs

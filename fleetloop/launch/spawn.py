@@ -174,7 +174,7 @@ def _recorder(place: Place) -> RecorderBrief:
         ticks.ticks,
         ticks.bus_time_ns(ticks.ticks) + AFTERWARDS_NS,
         fills_gaps=_may_have_gaps(orders),
-        inputs=orders.scenario.records_inputs,
+        logged_inputs=orders.scenario.records_inputs,
     )
 
 

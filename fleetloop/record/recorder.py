@@ -59,7 +59,7 @@ class _Recorder:
         self._gaps: Counter[str] = Counter()  # blocks in a row that leave one, by source
         sources = {f"{kind}/{r}" for r in brief.robots for kind in ("plant", "controller")}
         sources |= {f"can/{bus}" for bus in brief.buses}
-        inputs = {f"inputs/{robot}" for robot in brief.robots if brief.inputs}
+        inputs = {f"inputs/{robot}" for robot in brief.robots if brief.logged_inputs}
         sizes = zip(brief.robots, (row_of(one).size for one in brief.controllers), strict=True)
         self._row_sizes = {f"controller/{robot}": size for robot, size in sizes}
         self._row_sizes |= {f"plant/{robot}": PLANT_ROW.size for robot in brief.robots}
@@ -222,12 +222,12 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
             brief.period_ns,
             buses=brief.buses,
             formats=brief.bus_formats,
-            inputs=brief.robots if brief.inputs else (),
+            inputs=brief.robots if brief.logged_inputs else (),
         ) as record,
     ):
         name = brief.network.run
         recorder = _Recorder(brief, record)
-        for robot in brief.robots if brief.inputs else ():  # heard once its rows are
+        for robot in brief.robots if brief.logged_inputs else ():  # heard once its rows are
             link.subscribe(keys.inputs(name, robot), f"inputs/{robot}", room_bytes=ROOM_BYTES)
         for robot in brief.robots:
             link.subscribe(keys.truth(name, robot), f"plant/{robot}", room_bytes=ROOM_BYTES)

@@ -14,7 +14,7 @@ from configs.parameters import Parameters
 from configs.scenario import Scenario
 
 RESOLVED = {
-    "AgentBrief": {"offset", "s_0", "bus"},
+    "AgentBrief": {"offset", "s_0", "bus", "seed"},
     "ChannelModel": {"source", "seed"},
     "DriveLink": {"right_node", "left_node"},
     "HostLimits": {
