@@ -43,12 +43,21 @@ def targets_of(fault: Fault, scenario: "Scenario") -> list[str]:
 
 def plan(fault: Fault, name: str, scenario: "Scenario") -> list[PlannedFault]:
     """A fault as it acts on each of its targets."""
-    period_s = scenario.clock.control_period_s
-    first = ceil(fault.at_s / period_s - 1e-6)
-    last = None if fault.for_s is None else ceil((fault.at_s + fault.for_s) / period_s - 1e-6)
+    first, last = _ticks_of(fault, scenario)
     return [
         PlannedFault(name, target, fault, first, last) for target in targets_of(fault, scenario)
     ]
+
+
+def _ticks_of(fault: Fault, scenario: "Scenario") -> tuple[int, int | None]:
+    """The first tick at which a fault acts, and the first at which it doesn't any more."""
+    first = _first_tick(fault.at_s, scenario)
+    return first, None if fault.for_s is None else _first_tick(fault.at_s + fault.for_s, scenario)
+
+
+def _first_tick(t_s: float, scenario: "Scenario") -> int:
+    """The first tick at or after a time."""
+    return ceil(t_s / scenario.clock.control_period_s - 1e-6)
 
 
 def planned_faults(scenario: "Scenario") -> list[PlannedFault]:
@@ -126,9 +135,14 @@ def problems_of(
             if problem := pattern_problem(text, edges, scenario.names):
                 yield Problem(f"{where}.edges", text, problem)
     end_s = max(scenario.duration_s, scenario.ends_at_s)
-    if fault.at_s >= end_s:
+    first, last = _ticks_of(fault, scenario)
+    if first >= _first_tick(end_s, scenario):
         remedy = f"the run ends before: must be below duration_s = {end_s:g}"
         yield Problem(f"{where}.at_s", fault.at_s, remedy)
+    if last == first:
+        period_s = scenario.clock.control_period_s
+        remedy = f"no tick from {fault.at_s:g} s on for so long: they are {period_s:g} s apart"
+        yield Problem(f"{where}.for_s", fault.for_s, remedy)
     if reason := _missing_model(fault, scenario) or _no_return(fault, scenario):
         yield Problem(f"{where}.kind", fault.kind, reason)
     yield from sense_problems(fault, where, scenario)

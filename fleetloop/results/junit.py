@@ -8,6 +8,7 @@ skipped      not reached, if that was allowed
 """
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -58,12 +59,16 @@ def suite(name: str, outcome: Outcome, allow_unchecked: bool) -> ET.Element:
     for key in ("scenario", "verdict", "mode", "seed", "folder"):
         if outcome.get(key) is not None:
             ET.SubElement(properties, "property", {"name": key, "value": _text(outcome[key])})
-    class_name = _text(f"fleetloop.{outcome['scenario']}")
+    class_name = _class_name(name)
     ran = case(made, class_name, "run", outcome["took_s"])
     for tag, kind, text in _of_run(outcome):
         say(ran, tag, kind, text)
+    taken: Counter[str] = Counter()
     for expect in outcome["expectations"]:
-        one = case(made, class_name, expect.get("name") or expect["claim"], 0.0)
+        called = expect.get("name") or expect["claim"]
+        taken[called] += 1
+        again = "" if taken[called] == 1 else f" ({taken[called]})"
+        one = case(made, class_name, called + again, 0.0)
         if expect["held"] is False:
             say(one, "failure", "expectation", f"{label(expect)}: {finding(expect)}")
         elif expect["held"] is None:
@@ -73,6 +78,12 @@ def suite(name: str, outcome: Outcome, allow_unchecked: bool) -> ET.Element:
     if outcome.get("started"):
         made.set("timestamp", _text(outcome["started"]))
     return made
+
+
+def _class_name(name: str) -> str:
+    """The class of the cases of a suite: its path with dots, as readers tell cases apart by it."""
+    parts = Path(name.removesuffix(".toml")).parts
+    return _text(".".join(("fleetloop", *(part for part in parts if part not in ("/", "..")))))
 
 
 def count(made: ET.Element, took_s: float) -> None:

@@ -17,7 +17,7 @@ from configs.errors import ExitStatus
 from fleetloop.results import run_folder
 from fleetloop.results.junit import write_junit
 from fleetloop.results.outcome import Outcome
-from fleetloop.signals import stop_on_signals
+from fleetloop.signals import interruptible, stop_on_signals
 from fleetloop.suite.cases import Bounds, Case, case_of, run_cases
 from fleetloop.suite.listing import BAD, HELD, Listing, account, counts_of, header, status_of
 from fleetloop.suite.selection import SUFFIX, selected
@@ -64,12 +64,9 @@ def run_tests(paths: Sequence[str], options: SuiteOptions) -> int:
         listing.show(case.source, outcome)
 
     outcomes: dict[str, Outcome] = {}
+    cases = [] if created is None else _cases(sources, created.path, options)
     with stop_on_signals() as stop:
         if created is not None:
-            cases = [
-                case_of(source, folder, options.overrides, processes=options.processes)
-                for source, folder in zip(sources, _folders(sources, created.path), strict=True)
-            ]
             bounds = Bounds(options.timeout_s, options.total_s, at_once)
             outcomes = run_cases(cases, options.overrides, bounds, stop, on_done)
             with contextlib.suppress(OSError):
@@ -87,6 +84,19 @@ def run_tests(paths: Sequence[str], options: SuiteOptions) -> int:
         return ExitStatus.NOTHING
     bad = any(status_of(outcome) in BAD for outcome in outcomes.values())
     return ExitStatus.FAILED if bad else ExitStatus.OK
+
+
+@interruptible
+def _cases(sources: Sequence[str], parent: Path, options: SuiteOptions) -> list[Case]:
+    """Load all; a signal ends it at once, also inside a module of the user's own."""
+    try:
+        return [
+            case_of(source, folder, options.overrides, processes=options.processes)
+            for source, folder in zip(sources, _folders(sources, parent), strict=True)
+        ]
+    except BaseException:
+        parent.rmdir()
+        raise
 
 
 def _document(

@@ -2,9 +2,9 @@
 
 a file            as it is, whatever its name
 a name            of a shipped scenario
-a folder          every *.toml below it that is a scenario: it has `schema` and `robot`; a
-*.fleetloop.toml and what is no TOML at all count, too. Not in folders of runs,
-nor in those whose names begin with a dot
+a folder          every *.toml below it that is meant as a scenario: it has `schema` and a key
+that only scenarios have; a *.fleetloop.toml and what is no TOML at all count, too.
+Not in folders of runs, nor in those whose names begin with a dot
 """
 
 import re
@@ -12,13 +12,17 @@ import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from configs.deployment import Deployment
 from configs.errors import ScenarioError
 from configs.files import text_of
 from configs.loading import shipped
+from configs.scenario import Scenario
 
 SUFFIX = ".fleetloop.toml"
 _MOST_BYTES = 1 << 24
 _RUN_FILES = ("record.mcap", "summary.json")
+_SCENARIO_ONLY = Scenario.model_fields.keys() - Deployment.model_fields.keys()
+"""Keys by which a scenario differs from a deployment, which has a `schema` as well."""
 _TOKEN = re.compile(r"\s*(\(|\)|[^\s()]+)")
 Match = Callable[[str], bool]
 
@@ -65,7 +69,9 @@ def _is_scenario(file: Path) -> bool:
         data = tomllib.loads(text_of(file, "PATH", _MOST_BYTES))
     except (ScenarioError, tomllib.TOMLDecodeError):
         return True  # it says what is wrong with it
-    return "schema" in data and "robot" in data
+    return "schema" in data and (
+        bool(_SCENARIO_ONLY & data.keys()) or isinstance(data.get("robot"), list)
+    )
 
 
 def matcher(expression: str) -> Match:

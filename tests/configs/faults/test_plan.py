@@ -72,6 +72,8 @@ def test_each_process_is_told_the_faults_that_act_in_it() -> None:
         ('{kind="push"}', "fault.0.at_s", "must be given"),
         ('{kind="push", at_s=-1.0}', "fault.0.at_s", "0"),
         ('{kind="push", at_s=30.0}', "fault.0.at_s", "the run ends before"),
+        ('{kind="push", at_s=29.9995}', "fault.0.at_s", "the run ends before"),
+        ('{kind="push", at_s=1.0003, for_s=0.0001}', "fault.0.for_s", "no tick from 1.0003 s"),
         ('{kind="push", at_s=1.0, for_s=0.0}', "fault.0.for_s", "greater than 0"),
         ('{kind="push", at_s=1.0, force_N=1.0}', "fault.0.force_N", "did you mean force_body_N?"),
         ('{kind="push", at_s=1.0, robots=["r9"]}', "fault.0.robots", "known: r1, r2"),

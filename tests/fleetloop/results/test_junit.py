@@ -53,6 +53,18 @@ def test_each_expectation_is_a_case_and_the_run_is_one(finished_run: Path, tmp_p
     assert root[0][1].attrib["classname"] == "fleetloop.two_robots"
 
 
+def test_cases_of_scenarios_with_one_name_differ_by_their_paths(
+    finished_run: Path, tmp_path: Path
+) -> None:
+    outcome = outcome_of(finished_run, "expect=[{signal='x_e_m', max_abs=1e3}]")
+    outcome["expectations"] *= 2
+    write_junit(tmp_path / "a.xml", dict.fromkeys(("bench/a.toml", "bench/b.toml"), outcome))
+    found = valid((tmp_path / "a.xml").read_bytes()).iter("testcase")
+    names = [(it.attrib["classname"], it.attrib["name"]) for it in found]
+    assert len(set(names)) == 6
+    assert ("fleetloop.bench.b", "x_e_m within ±1000 from 0 s (2)") in names
+
+
 def test_what_was_not_reached_is_an_error_unless_it_is_allowed(
     uneven_run: Path, tmp_path: Path
 ) -> None:

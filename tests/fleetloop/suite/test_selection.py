@@ -16,7 +16,8 @@ def test_a_folder_gives_its_scenarios_and_nothing_that_is_something_else(tmp_pat
         "a.fleetloop.toml": "[deployment]\n",
         "broken.toml": "schema = ",
         "pyproject.toml": "[project]\n",
-        "place.toml": "schema = 1\n[network]\n",
+        "place.toml": "schema = 1\n[network]\n[robot.r1]\n",
+        "misspelt.toml": "schema = 1\nname = 'm'\n[[robots]]\n",
         "deeper/c.toml": SCENARIO,
         ".hidden/d.toml": SCENARIO,
         "runs/one/scenario.toml": SCENARIO,
@@ -26,7 +27,7 @@ def test_a_folder_gives_its_scenarios_and_nothing_that_is_something_else(tmp_pat
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     found = [str(Path(it).relative_to(tmp_path)) for it in selected([str(tmp_path)])]
-    assert found == ["a.fleetloop.toml", "b.toml", "broken.toml", "deeper/c.toml"]
+    assert found == ["a.fleetloop.toml", "b.toml", "broken.toml", "deeper/c.toml", "misspelt.toml"]
     one = str(tmp_path / "pyproject.toml")
     assert selected([one, "two_robots", one]) == [one, "two_robots"]
 
