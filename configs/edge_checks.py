@@ -11,6 +11,15 @@ def no_such_robot(names: Sequence[str]) -> str:
     return f"no such robot; known: {', '.join(dict.fromkeys(names))}"
 
 
+def robot_problems(names: Sequence[str], key: str, robots: Sequence[str]) -> Iterator[Problem]:
+    """Problems of a list of robots: one that isn't there, one that is named twice."""
+    for n, robot in enumerate(robots):
+        if robot not in names:
+            yield Problem(key, robot, no_such_robot(names))
+        elif robot in robots[:n]:
+            yield Problem(key, robot, "is named twice")
+
+
 def edge_problem(
     names: Sequence[str], key: str, text: str, *, links: bool = False
 ) -> Iterator[Problem]:
@@ -25,13 +34,6 @@ def edge_problem(
             yield Problem(key, text, f"{robot}: {no_such_robot(known)}")
     if edge[0] == edge[1]:
         yield Problem(key, text, "a robot doesn't hear itself")
-
-
-def link_problems(names: Sequence[str], key: str, robots: Sequence[str]) -> Iterator[Problem]:
-    """Problems of a list of robots that hear the leader."""
-    for robot in robots:
-        if robot not in names:
-            yield Problem(key, robot, no_such_robot(names))
 
 
 def multiple_problem(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
-from configs.edge_checks import no_such_robot
+from configs.edge_checks import robot_problems
 from configs.errors import Problem
 from configs.events import KINDS
 from configs.expect import BOUNDS, COUNTS, REFERENCES, Expect, Window, window_of
@@ -42,9 +42,7 @@ def expect_problems(scenario: "Scenario", *, sound_edges: bool) -> Iterator[Prob
             remedy = "a signal is given as well: one of both, each in an [[expect]] of its own"
             yield Problem(f"{where}.event", expect.event, remedy)
             continue
-        for robot in expect.robots or ():
-            if robot not in scenario.names:
-                yield Problem(f"{where}.robots", robot, no_such_robot(scenario.names))
+        yield from robot_problems(scenario.names, f"{where}.robots", expect.robots or ())
         if expect.event is not None:
             yield from _of_event(where, expect, expect.event)
         elif expect.signal is not None:

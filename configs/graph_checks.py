@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping
 
-from configs.edge_checks import edge_problem, link_problems
+from configs.edge_checks import edge_problem, robot_problems
 from configs.edges import LEADER, LEAST_WEIGHT, MOST_WEIGHT, Edge, edge_text, parse_edge
 from configs.errors import Problem
 from configs.graph import Graph
@@ -35,7 +35,7 @@ def _sources(scenario: Scenario) -> Iterator[Problem]:
 
 def _links(scenario: Scenario) -> Iterator[Problem]:
     leader = scenario.graph.leader
-    yield from link_problems(scenario.names, "graph.leader", leader or ())
+    yield from robot_problems(scenario.names, "graph.leader", leader or ())
     if leader is not None and not leader and not scenario.graph.switch:
         yield Problem("graph.leader", [], "at least one robot must hear the leader")
 

@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Iterator
 
-from configs.edge_checks import edge_problem, link_problems, multiple_problem
+from configs.edge_checks import edge_problem, multiple_problem, robot_problems
 from configs.errors import Problem
 from configs.graph_section import Switch
 from configs.scenario import Scenario
@@ -20,7 +20,7 @@ def switch_problems(scenario: Scenario) -> Iterator[Problem]:
         yield from _times(f"graph.switch.{n}", switch, scenario)
         for key, text in texts_of(switch):
             yield from edge_problem(scenario.names, f"graph.switch.{n}.{key}", text, links=True)
-        yield from link_problems(scenario.names, f"graph.switch.{n}.leader", switch.leader or ())
+        yield from robot_problems(scenario.names, f"graph.switch.{n}.leader", switch.leader or ())
     starts = [switch.at_s for switch in switches]
     if any(b <= a for a, b in itertools.pairwise(starts)):
         yield Problem("graph.switch", starts, "at_s must increase")

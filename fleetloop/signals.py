@@ -33,6 +33,28 @@ def stop_on_signals() -> Iterator[Stop]:
             signal.signal(number, handler)
 
 
+@contextmanager
+def limited(seconds: float, what: str) -> Iterator[None]:
+    """Raise `TimeoutError`, in the words of `what`, within code that takes longer than so long.
+
+    Of Python, in the main thread; a call into C ends first. Elsewhere there is no limit.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(_: int, __: FrameType | None) -> None:
+        raise TimeoutError(f"{what}: not done within {seconds:g} s")
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
 def interruptible(verb: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
     """Ctrl-C and SIGTERM raise `KeyboardInterrupt` while this verb runs."""
 

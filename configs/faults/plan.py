@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from math import ceil
 from typing import TYPE_CHECKING
 
-from configs.edge_checks import no_such_robot
+from configs.edge_checks import robot_problems
 from configs.emulated_edges import EmulatedEdge, edges_of, named, pattern_problem
 from configs.errors import Problem
 from configs.faults.absences import absences, overlapping
@@ -126,9 +126,7 @@ def problems_of(
 ) -> Iterator[Problem]:
     """Why one fault can't act in this scenario."""
     if isinstance(fault, RobotFault):
-        for robot in fault.robots or ():
-            if robot not in scenario.names:
-                yield Problem(f"{where}.robots", robot, no_such_robot(scenario.names))
+        yield from robot_problems(scenario.names, f"{where}.robots", fault.robots or ())
     if isinstance(fault, LinkFault) and sound_edges:
         edges = edges_of(scenario.topology)
         for text in fault.edges:

@@ -26,6 +26,7 @@ from configs.overrides import Overrides
 from configs.scenario import Scenario
 from fleetloop import packages
 from fleetloop.results.outcome import Outcome, of_error, unbegun
+from fleetloop.signals import limited
 
 GRACE_S = 5.0
 """For a run that was asked to end."""
@@ -55,12 +56,20 @@ class Case:
     refused: ScenarioError | None = None
 
 
-def case_of(source: str, folder: Path, overrides: Overrides, *, processes: bool) -> Case:
-    """A scenario as it will run; `processes`: over processes also where that isn't needed."""
+def case_of(
+    source: str, folder: Path, overrides: Overrides, *, processes: bool, within_s: float
+) -> Case:
+    """A scenario as it will run; `processes`: over processes also where that isn't needed.
+
+    One that takes longer to load, as with a module of the user's own that never ends, is refused.
+    """
     try:
-        scenario = load(source, overrides)
+        with limited(within_s, f"{source}: to load it"):
+            scenario = load(source, overrides)
     except ScenarioError as error:
         return Case(source, folder, refused=error)
+    except TimeoutError as error:
+        return Case(source, folder, refused=ScenarioError(str(error)))
     return Case(source, folder, alone=processes or needs_processes(scenario))
 
 

@@ -91,7 +91,13 @@ def _cases(sources: Sequence[str], parent: Path, options: SuiteOptions) -> list[
     """Load all; a signal ends it at once, also inside a module of the user's own."""
     try:
         return [
-            case_of(source, folder, options.overrides, processes=options.processes)
+            case_of(
+                source,
+                folder,
+                options.overrides,
+                processes=options.processes,
+                within_s=min(options.timeout_s, options.total_s),
+            )
             for source, folder in zip(sources, _folders(sources, parent), strict=True)
         ]
     except BaseException:

@@ -57,6 +57,12 @@ from support.scenario_text import SMALL, problems
         ("robot.r1.mounting.right_sign=2", "robot.r1.mounting.right_sign", "-1"),
         ("graph={edges=['r1 > r2']}", "graph.edges", "r1 -> r2"),
         ("graph={edges=['r1 -> r9']}", "graph.edges", "known: r1, r2"),
+        ("graph={edges=['r1 -> r2'], leader=['r1', 'r1']}", "graph.leader", "is named twice"),
+        (
+            "expect=[{signal='s', max=1.0, robots=['r1', 'r1']}]",
+            "expect.0.robots",
+            "is named twice",
+        ),
         ("graph={edges=['r1 -> r1']}", "graph.edges", "doesn't hear itself"),
         ("graph={edges=[], leader=['r1','r2']}", "graph.edges", "no root"),
         ("graph={edges=['r2 -> r1'], leader=['r1']}", "graph.leader", "does not reach r2"),

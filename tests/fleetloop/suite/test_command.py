@@ -56,6 +56,19 @@ def test_a_folder_is_run_side_by_side_and_every_verdict_is_told(
     assert (suites.attrib["failures"], suites.attrib["errors"]) == ("1", "1")
 
 
+def test_a_module_that_never_ends_its_import_is_an_error_and_the_others_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "endless.py").write_text("while True:\n    pass\n")
+    law = ("[control]", '[control]\nlaw = "endless:Law"')
+    scenario(tmp_path / "a_loop.toml", law)
+    scenario(tmp_path / "b_sound.toml")
+    assert run_tests([str(tmp_path)], SuiteOptions(out=tmp_path / "runs", timeout_s=10.0)) == 1
+    out = capsys.readouterr().out
+    assert "1 error, 1 held in " in out.splitlines()[-1]
+    assert "not done within 10 s" in out
+
+
 def test_without_scenarios_there_is_nothing_to_test(tmp_path: Path) -> None:
     assert run_tests([str(tmp_path)], SuiteOptions()) == 5
     assert list(tmp_path.iterdir()) == []
@@ -66,7 +79,10 @@ def test_a_run_that_takes_too_long_is_ended_and_what_waits_when_all_is_over_is_n
 ) -> None:
     long = scenario(tmp_path / "a.toml", ("duration_s = 0.2", "duration_s = 1e5"))
     other = scenario(tmp_path / "b.toml")
-    cases = [case_of(str(p), tmp_path / p.stem, (), processes=False) for p in (long, other)]
+    cases = [
+        case_of(str(p), tmp_path / p.stem, (), processes=False, within_s=60.0)
+        for p in (long, other)
+    ]
     (late,) = run_cases(cases[:1], (), Bounds(1.0, 600.0, 1), Stop()).values()
     assert (late["verdict"], late["exit_status"]) == ("aborted", 3)
     assert late["reason"] == "took longer than --timeout 1 s"
