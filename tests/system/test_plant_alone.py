@@ -220,9 +220,8 @@ def test_a_duration_ends_it_and_json_is_what_can_bus_takes() -> None:
 
 
 def test_an_unknown_request_is_answered_with_those_that_are_known(fleetloop_plant) -> None:
-    assert fleetloop_plant("two_robots")._ask("dance") == {
-        "error": "'dance': no such request; known: poses"
-    }
+    with pytest.raises(PlantError, match="'dance': no such request; known: poses, inject, clear"):
+        fleetloop_plant("two_robots")._ask("dance")
 
 
 def test_bus_time_keeps_the_wall_clocks_pace(fleetloop_plant) -> None:
