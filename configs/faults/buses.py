@@ -22,7 +22,7 @@ class FrameFault(RobotFault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrameChange(FrameFault):
-    """Frames are lost, or doubled."""
+    """Frames are lost (drop), or come twice (duplicate)."""
 
     kind: Literal["can_drop", "can_duplicate"]
 
