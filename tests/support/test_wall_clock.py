@@ -69,6 +69,19 @@ def test_has_no_excuse(tmp_path):
     leave(tmp_path, stalls=0)
     assert False
 
+once = []
+
+@pytest.mark.system
+def test_of_processes_on_a_machine_that_stood_still(tmp_path):
+    once.append(1)
+    leave(tmp_path, stalls=len(once) == 1)
+    assert len(once) == 2
+
+@pytest.mark.system
+def test_of_processes_has_no_excuse(tmp_path):
+    leave(tmp_path, stalls=0)
+    assert False
+
 def test_signals_are_as_ever():
     import signal, subprocess, sys
     code = "import signal; print(signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGHUP))"
@@ -82,7 +95,7 @@ def test_a_stall_is_an_excuse_and_children_get_the_default_signals_back(tmp_path
     here = Path(__file__).parents[1]
     (tmp_path / "test_it.py").write_text(TESTS.replace("{quiet!r}", repr(QUIET)))
     (tmp_path / "conftest.py").write_text((here / "conftest.py").read_text("utf-8"))
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = wall_clock\n")
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n wall_clock\n system\n")
 
     def ignore() -> None:
         for number in (signal.SIGINT, signal.SIGHUP):  # as in the background of a script
@@ -96,6 +109,8 @@ def test_a_stall_is_an_excuse_and_children_get_the_default_signals_back(tmp_path
         timeout=60,
         preexec_fn=ignore,
     )
-    assert "1 failed, 2 passed" in done.stdout, done.stdout + done.stderr
+    assert "2 failed, 3 passed" in done.stdout, done.stdout + done.stderr
     assert "TRIED AGAIN test_it.py::test_stalls_once: the machine stalled for 1.00 s" in done.stdout
-    assert re.search(r"FAILED \S*test_it\.py::test_has_no_excuse", done.stdout)
+    assert "TRIED AGAIN test_it.py::test_of_processes_on_a_machine" in done.stdout
+    for test in ("test_has_no_excuse", "test_of_processes_has_no_excuse"):
+        assert re.search(rf"FAILED \S*test_it\.py::{test}", done.stdout)

@@ -1,6 +1,7 @@
 """Tests whose promise is about the wall clock: tried again if it was the machine that broke it.
 
     @pytest.mark.wall_clock     left out with -m "not wall_clock"
+    @pytest.mark.system         its processes have deadlines: once more if the machine stood still
 
 Whether the machine stalled, the runs of the test say themselves, in the summaries that they left:
 `machine`, what the launcher saw of it, the notices of controllers, and `waits_s`, how long
@@ -19,7 +20,7 @@ from typing import Any
 
 import pytest
 
-TRIES = 4
+TRIES, SYSTEM_TRIES = 4, 2
 LATE_S = 0.05
 """A wait of the launcher that ends so much later than asked for isn't a quiet machine's."""
 WAITING_SHARE = 0.05
@@ -62,6 +63,14 @@ def why_again(folder: Path | None) -> str:
     return "; ".join(filter(None, said))
 
 
+def stood_still(folder: Path | None) -> str:
+    """How long the machine stood still in runs that left these files, "" if it didn't."""
+    files = folder.rglob("summary.json") if folder is not None else ()
+    machines = (json.loads(file.read_text("utf-8")).get("machine") or {} for file in files)
+    longest_s = max((it["longest_stall_s"] for it in machines if it.get("stalls")), default=0.0)
+    return f"the machine stalled for {longest_s:.2f} s" if longest_s else ""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Give tests of the wall clock time for all their tries."""
     for item in items:
@@ -71,17 +80,21 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> object:
-    """Call a test of the wall clock, up to `TRIES` times."""
-    if pyfuncitem.get_closest_marker("wall_clock") is None:
+    """Call a test of the wall clock up to `TRIES` times, one of processes `SYSTEM_TRIES`."""
+    if pyfuncitem.get_closest_marker("wall_clock") is not None:
+        tries, excuse = TRIES, why_again
+    elif pyfuncitem.get_closest_marker("system") is not None:
+        tries, excuse = SYSTEM_TRIES, stood_still
+    else:
         return None
     names = pyfuncitem._fixtureinfo.argnames
     arguments = {name: pyfuncitem.funcargs[name] for name in names}
     folder: Path | None = pyfuncitem.funcargs.get("tmp_path")
-    for left in reversed(range(TRIES)):
+    for left in reversed(range(tries)):
         try:
             pyfuncitem.obj(**arguments)
         except (AssertionError, subprocess.TimeoutExpired, pytest.fail.Exception) as error:
-            why = why_again(folder)
+            why = excuse(folder)
             if not left or not why or str(error).startswith("Timeout"):
                 raise
             pyfuncitem.user_properties.append(("tried again", why))
