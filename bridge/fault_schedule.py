@@ -7,7 +7,7 @@ then others begin, each in the order in which they came.
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from configs.edges import FOREVER
+from configs.edges import FOREVER, hearer
 from configs.events import Event
 from configs.faults.base import PlannedFault
 
@@ -24,9 +24,9 @@ class Change(NamedTuple):
     def event(self) -> Event:
         """The change as an event of its robot: of a link, of the one that hears it."""
         name, target, fault, *_ = self.planned
-        source, arrow, robot = target.rpartition(" -> ")
+        robot = hearer(target)
         kind = "" if name == fault.kind else f" ({fault.kind})"
-        where = f" on {source}{arrow}{robot}" if arrow else ""
+        where = "" if robot == target else f" on {target}"
         what = "fault_applied" if self.acts else "fault_cleared"
         return Event(self.tick, robot, what, f"{name}{kind}{where}")
 
@@ -85,12 +85,11 @@ class FaultSchedule:
         """The changes at a tick; `acting` is then what acts from it on."""
         if tick < self.next_tick:
             return []
-        ended = [one for one in self._acting if one.to_tick is not None and one.to_tick <= tick]
-        begun = [one for one in self._waiting if one.from_tick <= tick]
-        self._acting = [one for one in self._acting if one not in ended]
-        self._waiting = [one for one in self._waiting if one not in begun]
+        ended = [one for one in self._acting if _is_over(one, tick)]
+        self._acting = [one for one in self._acting if not _is_over(one, tick)]
         # Of a controller that was started again some are over.
-        begun = [one for one in begun if one.to_tick is None or one.to_tick > tick]
+        begun = [one for one in self._waiting if one.from_tick <= tick and not _is_over(one, tick)]
+        self._waiting = [one for one in self._waiting if one.from_tick > tick]
         self._acting += [one for one in begun if not one.fault.INSTANT]
         changes = [Change(tick, one, False) for one in ended]
         changes += [Change(tick, one, True) for one in begun]
@@ -102,3 +101,7 @@ class FaultSchedule:
         begins = [one.from_tick for one in self._waiting]
         ends = [one.to_tick for one in self._acting if one.to_tick is not None]
         self.next_tick = min((*begins, *ends), default=FOREVER)
+
+
+def _is_over(one: PlannedFault, tick: int) -> bool:
+    return one.to_tick is not None and one.to_tick <= tick

@@ -78,6 +78,12 @@ def edge_text(edge: Edge) -> str:
     return " -> ".join(edge)
 
 
+def hearer(target: str) -> str:
+    """The robot that a target concerns: of an edge the one that hears, of a robot itself."""
+    edge = parse_edge(target)
+    return target if edge is None else edge[1]
+
+
 def presence(windows: Windows | None, ticks: int) -> tuple[float, int]:
     """The part of a run's ticks in which an edge exists, and its longest absence [ticks]."""
     if windows is None:

@@ -23,6 +23,7 @@ from configs.brief import (
 from configs.connections import OURS, NetworkLink, Settings
 from configs.curves import formation_offset, reference_path
 from configs.drives import Drive
+from configs.edges import hearer
 from configs.emulated_edges import effects_to
 from configs.faults.absences import absences
 from configs.faults.base import PlannedFault
@@ -130,7 +131,7 @@ def agent_faults(scenario: Scenario, name: str) -> tuple[PlannedFault, ...]:
     return tuple(
         one
         for one in planned_faults(scenario)
-        if one.fault.PLACE != "plant" and name in (one.target, one.target.rpartition(" -> ")[2])
+        if one.fault.PLACE != "plant" and hearer(one.target) == name
     )
 
 

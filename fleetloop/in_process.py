@@ -19,6 +19,7 @@ from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer, row_of
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, settled_memory
 from configs.brief import AgentBrief, LeaderBrief, PlantBrief
+from configs.edges import hearer
 from configs.events import Event
 from configs.faults.base import PlannedFault
 from fleetloop.record.writer import Source
@@ -300,9 +301,8 @@ class InProcessRun:
             (bus,) = {r.brief.bus for r in self._robots if r.brief.robot == planned.target}
             self._buses[bus].faults.schedule.add(planned)
             return
-        hearer = planned.target.rpartition(" -> ")[2]
         for agent in self._agents:
-            if agent.brief.robot == hearer:
+            if agent.brief.robot == hearer(planned.target):
                 agent.faults.schedule.add(planned)
 
     def _tick(self, tick: int) -> None:

@@ -14,7 +14,7 @@ that all of them have it before the tick at which it is due.
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, NamedTuple, get_type_hints
 
 from bridge.fault_schedule import FaultSchedule
@@ -23,6 +23,7 @@ from bridge.network.packing import ints, pack, printable, unpack
 from bridge.network.refused_messages import Refusals
 from bridge.network.zenoh_link import ZenohLink
 from configs.conformity import conforms
+from configs.edges import hearer
 from configs.faults.base import Fault, PlannedFault
 from configs.faults.kinds import KINDS
 from configs.parameters import as_tuples
@@ -74,8 +75,7 @@ class FaultOrder(NamedTuple):
     def planned(self, target: str, tick: int, period_s: float) -> PlannedFault:
         """The fault as it acts on one target from a tick on."""
         until = None if self.ticks is None else tick + self.ticks
-        values = {one.name: getattr(self.fault, one.name) for one in fields(self.fault)}
-        fault = type(self.fault)(**values | {"at_s": tick * period_s})
+        fault = replace(self.fault, at_s=tick * period_s)
         return PlannedFault(self.name, target, fault, tick, until)
 
     def act(self, schedules: Mapping[str, FaultSchedule], tick: int, period_s: float) -> int | str:
@@ -159,8 +159,8 @@ class OrderInbox:
 
 
 def _table(fault: Fault) -> dict[str, Any]:
-    values = {one.name: getattr(fault, one.name) for one in fields(fault)}
-    return {key: value for key, value in values.items() if key not in _GIVEN and value is not None}
+    given = {key: value for key, value in fault.parameters.items() if value is not None}
+    return {"kind": fault.kind} | given
 
 
 def _fault(table: object) -> Fault | None:
@@ -183,6 +183,6 @@ def _is_text(value: object) -> bool:
     return type(value) is str and len(value) <= MOST_TEXT
 
 
-def targets_to(targets: Sequence[str], hearer: str) -> tuple[str, ...]:
+def targets_to(targets: Sequence[str], robot: str) -> tuple[str, ...]:
     """Those targets that concern a controller: its robot, and edges to it."""
-    return tuple(target for target in targets if target.rpartition(" -> ")[2] == hearer)
+    return tuple(target for target in targets if hearer(target) == robot)

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from configs.edges import FOREVER, InEdge, next_change, presence
+from configs.edges import FOREVER, InEdge, hearer, next_change, presence
 
 END = 40
 
@@ -55,3 +55,7 @@ def test_an_edge_without_windows_always_exists() -> None:
     assert not edge.is_over(FOREVER)
     assert edge.next_change(0) == FOREVER
     assert presence(None, 100) == (1.0, 0)
+
+
+def test_an_edge_concerns_the_robot_that_hears_and_a_robot_itself() -> None:
+    assert [hearer(it) for it in ("r1 -> r2", "leader -> r3", "r4")] == ["r2", "r3", "r4"]
