@@ -29,13 +29,14 @@ from bridge.network.launcher import LauncherWatch
 from bridge.network.link import Arrival, Link, Publisher
 from bridge.network.messages import Notice, Rows
 from bridge.network.reports import AgentReport
-from bridge.network.telemetry import RowBuffer, row_of
+from bridge.network.telemetry import RowBuffer, put_rows, row_of
 from bridge.network.zenoh_link import POLLED_DEPTH, ZenohLink
-from bridge.process.awake import LOOK_S
-from bridge.process.clock import SYSTEM_CLOCK, process_cpu_ns
+from bridge.process.awake import LOOK_S, AwakeClock
+from bridge.process.clock import process_cpu_ns
 from bridge.process.lifecycle import (
     Stop,
     go_realtime,
+    launcher_stopped,
     name_process,
     processor_wait_ns,
     serve,
@@ -78,11 +79,13 @@ def _run(brief: AgentBrief, stop: Stop, link: ZenohLink, watch: LauncherWatch | 
     path = link.publisher(keys.path(name, robot), steady=may_be_absent)
     telemetry = link.publisher(keys.telemetry(name, robot))
     report = link.publisher(keys.report(name, AGENT.process(robot)))
-    rows = RowBuffer(row_of(brief.signals), partial(_put, telemetry))
+    rows = RowBuffer(row_of(brief.signals), partial(put_rows, telemetry))
     log = None
     if brief.logs_inputs:
         inputs = link.publisher(keys.inputs(name, robot))
-        log = InputBuffer(lambda first, block, final: _put(inputs, first, len(block), block, final))
+        log = InputBuffer(
+            lambda first, block, final: put_rows(inputs, first, len(block), block, final)
+        )
     agent = Agent(brief, rows) if log is None else LoggedAgent(brief, rows, log)
     notice = link.publisher(keys.notice(name, AGENT.process(robot)))
     agent.guard.announce = lambda event: notice.put(Notice(event).encode())
@@ -118,8 +121,9 @@ def _heard_the_go(link: Link, agent: Agent, brief: AgentBrief, stop: Stop) -> bo
     It is what was subscribed to last: with it all subscriptions are in force. Only then does the
     controller come to its bus, for which bus time stands still.
     """
-    deadline = SYSTEM_CLOCK.monotonic_s() + brief.schedule.start_deadline_s
-    while SYSTEM_CLOCK.monotonic_s() < deadline:
+    clock = AwakeClock(held=launcher_stopped)
+    deadline = clock.now() + brief.schedule.start_deadline_s
+    while clock.now() < deadline:
         arrival = link.receive(LOOK_S)
         if stop.requested:
             return False
@@ -128,10 +132,6 @@ def _heard_the_go(link: Link, agent: Agent, brief: AgentBrief, stop: Stop) -> bo
         if arrival is not None and arrival.tag == "go":
             return True
     raise did_not_start(agent)
-
-
-def _put(publisher: Publisher, first: int, count: int, block: bytes, final: bool) -> None:
-    publisher.put(Rows(first, count, block, final).encode())
 
 
 class _Connections(NamedTuple):

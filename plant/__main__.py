@@ -21,7 +21,7 @@ from bridge.network.link import Arrival, Link, Publisher, waiting
 from bridge.network.messages import Go, Notice, PoseFix, Progress, Rows, Silence
 from bridge.network.refused_messages import Refusals
 from bridge.network.reports import PlantReport
-from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer
+from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer, put_rows
 from bridge.network.zenoh_link import ZenohLink
 from bridge.process.awake import Stall
 from bridge.process.clock import SYSTEM_CLOCK, implausible_start, monotonic_of, process_cpu_ns
@@ -119,13 +119,13 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
     silences = _silences(brief, link)
     robots = [*(robot.brief.robot for robot in emulated), *(other.robot for other in others)]
     truths = [link.publisher(keys.truth(name, robot)) for robot in robots]
-    rows = [RowBuffer(PLANT_ROW, partial(_put_rows, truth)) for truth in truths]
+    rows = [RowBuffer(PLANT_ROW, partial(put_rows, truth)) for truth in truths]
     logs: dict[str, FrameBuffer] = {}
     if brief.traffic:
         for bus in dict.fromkeys(robot.bus for robot in brief.robots):
             traffic = link.publisher(keys.traffic(name, bus), express=False)
             truths.append(traffic)
-            logs[bus] = FrameBuffer(partial(_put_rows, traffic))
+            logs[bus] = FrameBuffer(partial(put_rows, traffic))
     taps = {bus: log.add for bus, log in logs.items()}
     progress = link.publisher(keys.progress(name, PLANT.name))
     report = link.publisher(keys.report(name, PLANT.name))
@@ -320,10 +320,6 @@ def _record(
             other.receive_pose(PoseFix.decode(arrival.payload))
     for other, buffer in zip(others.values(), rows, strict=True):
         buffer.add(tick, other.row(tick * period_s))
-
-
-def _put_rows(publisher: Publisher, first: int, count: int, rows: bytes, final: bool) -> None:
-    publisher.put(Rows(first, count, rows, final).encode())
 
 
 def _await_controllers(brief: PlantBrief, hub: Hub, hellos: Hellos, stop: Stop) -> None:

@@ -8,6 +8,8 @@ import struct
 from collections.abc import Callable, Sequence
 
 from bridge.frame import Frame
+from bridge.network.link import Publisher
+from bridge.network.messages import Rows
 from configs.signals import PLANT_SIGNALS, Signal
 
 
@@ -20,6 +22,11 @@ PLANT_ROW = row_of(PLANT_SIGNALS)
 
 BLOCK_TICKS = 128
 """Rows that are gathered before a block is sent."""
+
+
+def put_rows(publisher: Publisher, first: int, count: int, block: bytes, final: bool) -> None:
+    """Put a block as a `RowBuffer` hands it on."""
+    publisher.put(Rows(first, count, block, final).encode())
 
 
 class RowBuffer:
