@@ -1,9 +1,9 @@
 """Faults of one bus together: what they do to its frames and to the CAN controllers of its drives.
 
 A bus is told its disturbance at each tick at which one of these faults begins or ends, made anew of
-all that act. A robot's frames are told on a bus of its own by nothing; where robots share a bus, by
-the node that the drives' protocol reads from the identifier: frames of no node, and of other
-protocols, are then no robot's.
+all that act. On a bus of its own all frames are a robot's. Where robots share a bus they are told
+apart by the node that the drives' protocol reads from the identifier: frames of no node, and of
+other protocols, are then no robot's.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -16,6 +16,7 @@ from bridge.frame import Frame
 from bridge.frame_faults import ActingFrameFault, Concerns
 from configs.faults.base import PlannedFault, WheelFault
 from configs.faults.buses import FrameFault, NodeBabbling
+from plant.effects import of_side
 from plant.robot import EmulatedRobot
 
 BABBLE = bytes(8)
@@ -46,9 +47,8 @@ class _Acting:
 
     @property
     def drives(self) -> Sequence[DriveNode]:
-        fault, (right, left) = self.planned.fault, self.robot.drives
-        wheel = fault.wheel if isinstance(fault, WheelFault) else "both"
-        return {"right": (right,), "left": (left,), "both": (right, left)}[wheel]
+        fault = self.planned.fault
+        return of_side(self.robot.drives, fault.wheel if isinstance(fault, WheelFault) else "both")
 
 
 def _frames(acting: _Acting, on: Disturbance) -> None:

@@ -6,9 +6,9 @@ are in its row of `configs.roles`: of an agent its own path, rows and inputs to 
 paths of exactly its in-neighbours, and that there are none, its own pose, and leader/speed iff
 h_i = 1. Every role that a run starts also puts progress, notices and its report. Faults are ordered
 by the launcher alone; in lockstep the plant hands orders on to controllers
-(`bridge.network.fault_orders`). Besides the roles
-there are guests, clients of buses on other machines: they put their lines up and hear their lines
-down; which buses they may open is the relay's decision.
+(`bridge.network.fault_orders`). Besides the roles there are guests, clients of buses on other
+machines: they put their lines up and hear their lines down; which buses they may open is the
+relay's decision.
 
 Plant and controllers may watch the launcher's token and hear its last word: on other machines that
 is how they learn that the run is over, and why. A process on another machine has a password that

@@ -41,6 +41,7 @@ _HEAD = struct.Struct("<IBq")
 _IDENTIFIER = struct.Struct("<I")
 _FULL_FRAME = struct.Struct("<IBqI8s")
 _FULL_DATA = 8
+_FULL_PAYLOAD = _IDENTIFIER.size + _FULL_DATA
 _TICK = struct.Struct("<q")
 _BEGIN = struct.Struct("<?q")
 _CLOCK = struct.Struct("<qdd")
@@ -156,7 +157,7 @@ class InputBuffer:
         """A frame was received."""
         length = len(data)
         if length == _FULL_DATA:
-            self._block += _FULL_FRAME.pack(12, Kind.FRAME, at_ns, can_id, data)
+            self._block += _FULL_FRAME.pack(_FULL_PAYLOAD, Kind.FRAME, at_ns, can_id, data)
         else:
             self._block += _HEAD.pack(_IDENTIFIER.size + length, Kind.FRAME, at_ns)
             self._block += _IDENTIFIER.pack(can_id) + data

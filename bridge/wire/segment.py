@@ -80,7 +80,7 @@ class Segment:
         for some in (self._failing, self.recovery.nodes):
             if node in some:
                 some.remove(node)
-        self._rest_for_good(node)
+        self._withdraw(node)
         self.revise(at_ns)
 
     def move(self, node: Node, to: "Segment", at_ns: int) -> None:
@@ -100,7 +100,7 @@ class Segment:
         dropped = len(entries) - len(kept)
         entries[:] = kept
         if not kept:
-            self._rest_for_good(node)
+            self._withdraw(node)
         self.revise(at_ns)
         return dropped
 
@@ -111,7 +111,7 @@ class Segment:
             return
         node.confinement.tec = OFF
         self._report_state(node, at_ns, events)
-        self._rest_for_good(node)
+        self._withdraw(node)
 
     def awaits(self, segment: "Segment") -> bool:
         """Whether a node is about to move to that segment."""
@@ -274,8 +274,8 @@ class Segment:
         if not node.queue.entries and node in self._ready:
             self._ready.remove(node)
 
-    def _rest_for_good(self, node: Node) -> None:
-        """A node has nothing to send."""
+    def _withdraw(self, node: Node) -> None:
+        """Let a node take no part in arbitration until it wakes."""
         if node in self._ready:
             self._ready.remove(node)
         if not self._ready:

@@ -61,7 +61,7 @@ class Interference:
             robot.update_encoders()
             for drive in robot.drives:
                 said = drive.due(now_ns)
-                if not self.is_silent(drive):
+                if not self._is_silent(drive):
                     frames += said
         return self.from_drives(sorted(frames), now_ns)
 
@@ -81,11 +81,11 @@ class Interference:
             for robot in self._robots
             for frame in frames
             for drive in robot.drives
-            if not self.is_silent(drive)
+            if not self._is_silent(drive)
             for reply in drive.on_frame(frame, now_ns)
         ]
 
-    def is_silent(self, drive: DriveNode) -> bool:
+    def _is_silent(self, drive: DriveNode) -> bool:
         """Whether a drive says and hears nothing."""
         return any(drive is silent for silent in self._silent)
 
