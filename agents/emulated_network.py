@@ -79,7 +79,7 @@ class EmulatedNetwork:
             case source if source == LOCALISATION:
                 self._fixes = channel
             case robot:
-                self._paths = dict(sorted((self._paths | {robot: channel}).items()))
+                self._paths[robot] = channel
         return channel
 
     def channel(self, source: str) -> Channel[Any] | None:
@@ -93,6 +93,7 @@ class EmulatedNetwork:
         Its ages aren't recorded.
         """
         channel = self._add(ChannelModel(source=source, seed=self._seed_of(source)))
+        self._paths = dict(sorted(self._paths.items()))
         if source == LEADER and leader is not None:
             every = self._schedule.share_every
             self._v_r_ns = max((tick - 1) // every * every, 0) * self._schedule.period_ns
