@@ -139,8 +139,7 @@ class EmulatedRobot:
             return
         step = period_s / substeps
         if step > self._longest_step_s:
-            substeps = ceil(period_s / self._longest_step_s)
-            step = period_s / substeps
+            substeps, step = self._stable_steps(period_s)
         for n in range(substeps):
             after = rk4(self._body, state, right, left, t_s + n * step, step)
             if after is None:
@@ -170,6 +169,11 @@ class EmulatedRobot:
         if self._localisation is not None:
             self._localisation.apply(effects)
         self._apply_to_powertrain(effects)
+
+    def _stable_steps(self, span_s: float) -> tuple[int, float]:
+        """The least number of steps in a span at which they are stable, and their length [s]."""
+        steps = ceil(span_s / self._longest_step_s)
+        return steps, span_s / steps
 
     def _apply_to_powertrain(self, effects: RobotEffects) -> None:
         if self._faulty or effects.right.of_powertrain or effects.left.of_powertrain:
@@ -279,8 +283,7 @@ class RealisticRobot(EmulatedRobot):
         """Integrate one span from scenario time `t_s`; drives, motors and encoders step with it."""
         step = period_s / substeps
         if step > self._longest_step_s:
-            substeps = ceil(period_s / self._longest_step_s)
-            step = period_s / substeps
+            substeps, step = self._stable_steps(period_s)
         state, body, train = self.state, self._body, self._train
         right, left = self._right, self._left
         gear_r, gear_l = self._gear_right, self._gear_left
