@@ -21,7 +21,7 @@ def campaign(
         str | None,
         typer.Option(
             metavar="FROM:TO:STEP|T,T",
-            help="Times at which the fault begins [s], as 5:25:5. Default: half of duration_s.",
+            help=r"Times at which the fault begins \[s], as 5:25:5. Default: half of duration_s.",
         ),
     ] = None,
     seeds: Annotated[

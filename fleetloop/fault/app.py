@@ -48,7 +48,7 @@ def list_(
     ctx: typer.Context,
     as_toml: Annotated[
         bool,
-        typer.Option("--toml", help="Print the entries of [[fault]] that repeat them."),
+        typer.Option("--toml", help=r"Print the entries of \[\[fault]] that repeat them."),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:

@@ -5,10 +5,14 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
+from rich.text import Text
 from support.command_line import fleetloop
 
 from configs.errors import ScenarioError
@@ -43,6 +47,20 @@ def test_every_verb_has_help(verb: str, tmp_path: Path) -> None:
     done = fleetloop(tmp_path, verb, "--help")
     assert done.returncode == 0
     assert "Usage" in done.stdout
+
+
+def _helps(command: Any) -> Iterator[str]:
+    """The help texts of a command, its parameters and its verbs."""
+    yield command.help or ""
+    yield from (getattr(param, "help", None) or "" for param in command.params)
+    for verb in getattr(command, "commands", {}).values():
+        yield from _helps(verb)
+
+
+def test_no_bracket_of_a_help_text_is_taken_for_markup() -> None:
+    texts = list(_helps(typer.main.get_command(app)))
+    assert any("[s]" in text for text in texts)
+    assert [text for text in texts if Text.from_markup(text).spans] == []
 
 
 def test_h_is_help_and_the_version_is_told(tmp_path: Path) -> None:
