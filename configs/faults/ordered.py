@@ -61,14 +61,5 @@ def ordered_fault(
     return fault
 
 
-def fresh_name(kind: str, names: Collection[str]) -> str:
-    """The name of a fault without one: its kind, with a number from the second one on."""
-    number, name = 1, kind
-    while name in names:
-        number += 1
-        name = f"{kind}_{number}"
-    return name
-
-
 def _told(problem: Problem) -> Complaint:
     return Complaint(WHERE, problem.key.removeprefix(f"{WHERE}."), problem.value, problem.remedy)

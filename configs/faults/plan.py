@@ -1,6 +1,6 @@
 """The faults of a scenario by target and tick, and what relates them to its other sections."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from math import ceil
 from typing import TYPE_CHECKING
 
@@ -18,15 +18,21 @@ if TYPE_CHECKING:
     from configs.scenario import Scenario
 
 
+def fresh_name(kind: str, names: Collection[str]) -> str:
+    """The name of a fault without one: its kind, with a number from the second one on."""
+    number, name = 1, kind
+    while name in names:
+        number += 1
+        name = f"{kind}_{number}"
+    return name
+
+
 def names_of(faults: Sequence[Fault]) -> list[str]:
-    """The name of each fault: its own, else its kind with a number from the second one on."""
+    """The name of each fault: its own, else a fresh one."""
     taken = {fault.name for fault in faults if fault.name is not None}
     names = []
     for fault in faults:
-        name, number = fault.name or fault.kind, 1
-        while fault.name is None and name in taken:
-            number += 1
-            name = f"{fault.kind}_{number}"
+        name = fault.name or fresh_name(fault.kind, taken)
         taken.add(name)
         names.append(name)
     return names

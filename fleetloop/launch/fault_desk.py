@@ -21,8 +21,8 @@ from bridge.network.link import Link, Publisher
 from configs.brief import Schedule
 from configs.errors import ScenarioError
 from configs.faults.base import Fault
-from configs.faults.ordered import fresh_name, ordered_fault
-from configs.faults.plan import plan
+from configs.faults.ordered import ordered_fault
+from configs.faults.plan import fresh_name, plan
 from configs.roles import AGENT, PLANT, takes_orders
 from configs.scenario import Scenario
 from fleetloop.door.requests import Request, Respond

@@ -11,8 +11,8 @@ from configs.brief import Schedule
 from configs.errors import ScenarioError
 from configs.faults.base import RobotFault
 from configs.faults.kinds import KINDS
-from configs.faults.ordered import fresh_name, ordered_fault
-from configs.faults.plan import names_of, plan
+from configs.faults.ordered import ordered_fault
+from configs.faults.plan import fresh_name, names_of, plan
 from configs.parameters import MOST_S
 from configs.scenario import Scenario
 from plant.orders import PlantOrders

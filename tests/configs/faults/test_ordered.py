@@ -3,7 +3,8 @@
 import pytest
 
 from configs.errors import ScenarioError
-from configs.faults.ordered import fresh_name, ordered_fault
+from configs.faults.ordered import ordered_fault
+from configs.faults.plan import fresh_name
 from configs.loading import load
 
 SCENARIO = load("two_robots", ("duration_s=20.0",))
