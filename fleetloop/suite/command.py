@@ -5,7 +5,6 @@ Exit status: 0 all held, 1 one failed, was not reached or had an error, 2 usage,
 """
 
 import contextlib
-import os
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from pathlib import Path
 
 from bridge.process.clock import SYSTEM_CLOCK
 from configs.errors import ExitStatus
+from fleetloop.jobs.pool import processors
 from fleetloop.results import run_folder
 from fleetloop.results.junit import write_junit
 from fleetloop.results.outcome import Outcome
@@ -50,7 +50,7 @@ def run_tests(paths: Sequence[str], options: SuiteOptions) -> int:
         InfrastructureError: a file or a process can't be had.
     """
     sources = selected(paths, options.select)
-    at_once = options.jobs or len(os.sched_getaffinity(0))
+    at_once = options.jobs or processors()
     if not options.as_json:
         say(header(version("fleetloop"), len(sources), at_once))
     created = run_folder.create("test", options.out, SYSTEM_CLOCK.wall_ns()) if sources else None
