@@ -109,12 +109,16 @@ def inject(
     """Apply a fault; say from which tick on it acts."""
     from fleetloop.fault.command import inject_fault
 
-    given = {"kind": kind, "wheel": wheel, "for_s": for_s, "at_s": at_s, "name": name}
-    table: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
-    if robots is not None:
-        table["robots"] = list(listed("--robot", robots))
-    if edges:
-        table["edges"] = edges
+    given: dict[str, Any] = {
+        "kind": kind,
+        "robots": listed("--robot", robots) or None,
+        "edges": edges or None,
+        "wheel": wheel,
+        "for_s": for_s,
+        "at_s": at_s,
+        "name": name,
+    }
+    table = {key: value for key, value in given.items() if value is not None}
     inject_fault(ctx.obj, table, parameters or [], as_json=as_json)
 
 

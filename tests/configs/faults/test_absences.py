@@ -62,7 +62,7 @@ def test_the_plant_is_told_in_lockstep_alone() -> None:
 def test_a_process_fault_that_cannot_act_is_refused_with_the_reason(
     fault: str, more: str, remedy: str
 ) -> None:
-    text = SMALL if not more else SMALL.replace("[[robot]]", f"{more}\n[[robot]]", 1)
+    text = SMALL.replace("[[robot]]", f"{more}\n[[robot]]", 1)
     assert remedy in "\n".join(map(str, problems(f"{text}\n[[fault]]\n{fault}\n")))
 
 
