@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -149,6 +149,18 @@ def running(folder: Path, *args: str, bus_time_s: float = 1.3) -> Iterator[Run]:
         yield run
     finally:
         run.kill()
+
+
+def await_from(
+    process: "subprocess.Popen[bytes]", reached: Callable[[], object], within_s: float = WAIT_S
+) -> None:
+    """Return as soon as something is reached, while this process lives."""
+    deadline = time.monotonic() + within_s
+    while not reached():
+        assert process.poll() is None
+        assert time.monotonic() < deadline
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(0.05)
 
 
 def completed(folder: Path, *args: str) -> tuple[int, str]:

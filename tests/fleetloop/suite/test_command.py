@@ -5,13 +5,13 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from importlib import resources
 from pathlib import Path
 
 import psutil
 import pytest
 from support.junit import valid
+from support.processes import await_from
 
 from bridge.process.lifecycle import Stop
 from fleetloop.suite.cases import Bounds, case_of, run_cases
@@ -99,13 +99,9 @@ def test_a_run_ends_with_the_test_that_began_it_even_if_that_is_killed(tmp_path:
         command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
     try:
-        deadline = time.monotonic() + 60.0
-        while not (children := psutil.Process(process.pid).children(recursive=True)):
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        while not list(tmp_path.glob("runs/*/a/record.mcap")):
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        await_from(process, lambda: list(tmp_path.glob("runs/*/a/record.mcap")), 60.0)
+        children = psutil.Process(process.pid).children(recursive=True)
+        assert children
     finally:
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
