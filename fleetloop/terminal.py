@@ -6,6 +6,7 @@ seconds, so that a CI log shows life and nothing else.
 
 import json
 import sys
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
 
@@ -59,6 +60,39 @@ def note(text: str) -> None:
     """Print a note that is not part of the result."""
     sys.stderr.write(text + "\n")
     sys.stderr.flush()
+
+
+class Bars:
+    """Bars on a terminal, elsewhere a line every few seconds; a context manager."""
+
+    def __init__(self, amount: str, *, quiet: bool) -> None:
+        console = Console(stderr=True)
+        # Without a thread of its own: it is shown a few times a second anyway.
+        self._bars = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=24),
+            TextColumn(amount),
+            console=console,
+            transient=True,
+            auto_refresh=False,
+            disable=quiet or not console.is_terminal,
+        )
+        self._plain = not quiet and not console.is_terminal
+        self._next_line_s = 0.0
+
+    def __enter__(self) -> Self:
+        self._bars.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bars.stop()
+
+    def _refresh(self, line: Callable[[], str]) -> None:
+        """Show the bars, or the line if one is due."""
+        self._bars.refresh()
+        if self._plain and (now_s := SYSTEM_CLOCK.monotonic_s()) >= self._next_line_s:
+            self._next_line_s = now_s + PLAIN_EVERY_S
+            note(line())
 
 
 class RunProgress:

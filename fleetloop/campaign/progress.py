@@ -1,45 +1,24 @@
 """How far a campaign is: cells done, rate, time left."""
 
 from collections import Counter
-from typing import Self
-
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 
 from bridge.process.clock import SYSTEM_CLOCK
 from fleetloop.campaign.branches import Baseline
 from fleetloop.campaign.verdicts import Result, Verdict
-from fleetloop.terminal import PLAIN_EVERY_S, note
+from fleetloop.terminal import Bars, note
 
 
-class Meter:
-    """A bar on a terminal, elsewhere a line every few seconds; a context manager."""
+class Meter(Bars):
+    """One bar for all cells."""
 
     def __init__(self, name: str, total: int, before: int, *, quiet: bool) -> None:
+        amount = "{task.completed:.0f} / {task.total:.0f} cells{task.fields[pace]}"
+        super().__init__(amount, quiet=quiet)
         self._name, self._total, self._before, self._quiet = name, total, before, quiet
         self._done = before
         self._counts: Counter[Verdict] = Counter()
         self._began_s = SYSTEM_CLOCK.monotonic_s()
-        self._next_line_s = 0.0
-        console = Console(stderr=True)
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=24),
-            TextColumn("{task.completed:.0f} / {task.total:.0f} cells{task.fields[pace]}"),
-            console=console,
-            transient=True,
-            auto_refresh=False,
-            disable=quiet or not console.is_terminal,
-        )
-        self._plain = not quiet and not console.is_terminal
-
-    def __enter__(self) -> Self:
-        self._bar.start()
-        self._task = self._bar.add_task(self._name, total=self._total, pace="")
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
+        self._task = self._bars.add_task(name, total=total, pace="")
 
     def advance(self, said: Baseline | Result) -> None:
         """Take note of what came."""
@@ -52,14 +31,13 @@ class Meter:
     def show(self) -> None:
         """Show how far it is."""
         pace = self._pace()
-        self._bar.update(self._task, completed=self._done, pace=pace)
-        self._bar.refresh()
-        now_s = SYSTEM_CLOCK.monotonic_s()
-        if self._plain and now_s >= self._next_line_s:
-            self._next_line_s = now_s + PLAIN_EVERY_S
-            counts = ", ".join(f"{n} {verdict}" for verdict, n in self._counts.items())
-            told = f"{self._name}: {self._done} of {self._total} cells{pace}"
-            note(f"{told}: {counts}" if counts else told)
+        self._bars.update(self._task, completed=self._done, pace=pace)
+        self._refresh(lambda: self._line(pace))
+
+    def _line(self, pace: str) -> str:
+        counts = ", ".join(f"{n} {verdict}" for verdict, n in self._counts.items())
+        told = f"{self._name}: {self._done} of {self._total} cells{pace}"
+        return f"{told}: {counts}" if counts else told
 
     def _pace(self) -> str:
         """Rate and time left, once there is a rate."""

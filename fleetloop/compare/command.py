@@ -19,7 +19,7 @@ from fleetloop.compare.claims import Verdict, claims
 from fleetloop.compare.contenders import contenders, scenario_under
 from fleetloop.compare.figures import all_figures
 from fleetloop.compare.page import page
-from fleetloop.compare.progress import Bars
+from fleetloop.compare.progress import RunBars
 from fleetloop.compare.results import Row, described
 from fleetloop.compare.runs import Planned, rows_of
 from fleetloop.compare.tables import print_tables
@@ -71,7 +71,7 @@ def compare(source: str, options: CompareOptions) -> int:
     try:
         with (
             stop_on_signals() as stop,
-            Bars(labels, scenario.ends_at_s, quiet=options.as_json) as bars,
+            RunBars(labels, scenario.ends_at_s, quiet=options.as_json) as bars,
         ):
             keep = options.keep_records
             rows = rows_of(planned, created.path, folder, stop, bars.show, keep_records=keep)
