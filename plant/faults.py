@@ -3,8 +3,8 @@
 EFFECTS        of faults that last: their part of the robot's effects (`plant.effects`), which are
                made anew of all that act on it when one begins or ends
 STRIKES        of faults that are an instant: what they do to the robot, once
-BUS_EFFECTS    of faults of frames and CAN controllers: their part of the bus's disturbance
-               (`plant.disturbance`)
+
+Those of faults of frames and CAN controllers are in `plant.disturbance`.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
