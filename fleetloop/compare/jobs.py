@@ -10,7 +10,7 @@ from configs.loading import to_toml
 from fleetloop.compare.measures import Course, Measures, courses, measures
 from fleetloop.compare.step_cost import Sample, StepCost, samples, step_costs
 from fleetloop.jobs.job import Tell, Told
-from fleetloop.launch.run import run_in_process
+from fleetloop.launch.conduct import run_in_process
 from fleetloop.record.reader import Record
 from fleetloop.results import run_folder
 from fleetloop.results.summary import Summary, summarise, to_json

@@ -1,40 +1,29 @@
 """`fleetloop run`: one scenario from file to results."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 from bridge.network.messages import Progress
-from bridge.process.clock import SYSTEM_CLOCK, local_date
-from bridge.process.lifecycle import Stop, keep_to_itself
-from configs.connections import NetworkLink
-from configs.deployment import Deployment, load_deployment
-from configs.errors import ExitStatus, FleetloopError, InfrastructureError, ScenarioError
-from configs.events import KINDS, Event, in_order, told
-from configs.faults.plan import process_fault_problem
-from configs.loading import load, to_toml
+from bridge.process.lifecycle import keep_to_itself
+from configs.errors import ExitStatus, FleetloopError
+from configs.events import KINDS, Event, told
+from configs.loading import load
 from configs.overrides import Overrides
-from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of
+from configs.resolve import schedule
 from configs.roles import short_name
-from configs.scenario import Scenario
-from fleetloop.check.examine import examine
-from fleetloop.check.finding import in_words, titled
-from fleetloop.in_process import InProcessRun
-from fleetloop.launch import placement, wall_time
-from fleetloop.launch.accounts import stats_of
-from fleetloop.launch.fault_ledger import FaultLedger
-from fleetloop.launch.process_run import ProcessRun
-from fleetloop.record.background import BackgroundWriter
-from fleetloop.record.events_file import EVENTS, events_file
-from fleetloop.record.reader import Record
-from fleetloop.record.run_record import RunRecord
+from fleetloop.launch.conduct import (
+    Concluded,
+    Listener,
+    Manner,
+    carry_out,
+    conclude,
+    prepare,
+)
 from fleetloop.record.scan import RecordError
-from fleetloop.results import run_folder
-from fleetloop.results.expectations import out_of_reach
 from fleetloop.results.junit import write_junit
 from fleetloop.results.outcome import Outcome, of_error, of_summary, unbegun
-from fleetloop.results.summary import RunStats, Summary, summarise, to_json
+from fleetloop.results.summary import Summary
 from fleetloop.results.tables import print_report, print_results
 from fleetloop.signals import stop_on_signals
 from fleetloop.terminal import RunProgress, note, say_json
@@ -129,189 +118,39 @@ def run_scenario(source: str, options: RunOptions) -> int:
 
 def _run(source: str, options: RunOptions, teller: _Teller) -> int:
     scenario = load(source, options.overrides)
-    if options.in_process and scenario.clock.mode == "realtime":
-        raise ScenarioError(
-            f'{source}: clock.mode = "realtime" needs processes; add --clock lockstep to run it'
-            " in one process"
-        )
-    if options.speed and scenario.clock.mode == "realtime":
-        raise ScenarioError(
-            f"--speed {options.speed:g}: real time has one speed; for lockstep only"
-        )
-    if options.in_process and (problem := process_fault_problem(scenario)):
-        raise ScenarioError(f"{source}: {problem}, without --in-process")
-    if options.in_process and options.deployment is not None:
-        raise ScenarioError(
-            f"--deployment {options.deployment}: --in-process has no buses and no network to place"
-        )
-    deployment = _deployment(scenario, options)
+    manner = Manner(
+        in_process=options.in_process,
+        speed=options.speed,
+        deployment=options.deployment,
+        profile=options.profile,
+        force=options.force,
+    )
     if not options.in_process:
         keep_to_itself()
-    _check_credentials(scenario, deployment)
-    if long := wall_time.warning(scenario, speed=options.speed, in_process=options.in_process):
-        note(long)
-    for line in out_of_reach(scenario):
-        note(f"{scenario.name}: {line}")
-    _look_ahead(source, scenario, options)
-    started_ns = SYSTEM_CLOCK.wall_ns()
-    created = run_folder.create(scenario.name, options.out, started_ns)
-    folder = created.path
+    deployment = prepare(source, scenario, manner, note, overrides=options.overrides)
     with (
         stop_on_signals() as stop,
         RunProgress(scenario.name, scenario.ends_at_s, quiet=options.as_json) as progress,
     ):
         live = _Live(progress, schedule(scenario).period_ns)
-        try:
-            run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
-            if options.in_process:
-                stats = run_in_process(scenario, folder, live.on_progress, live.on_event, stop)
-            else:
-                run = ProcessRun(
-                    scenario,
-                    run=f"{folder.name}-{SYSTEM_CLOCK.monotonic_ns() % 1_000_000:06d}",
-                    record=folder / run_folder.RECORD,
-                    speed=options.speed,
-                    profile=options.profile,
-                    on_progress=live.on_progress,
-                    on_event=live.on_event,
-                    on_notice=live.on_notice,
-                    deployment=deployment,
-                )
-                stats = stats_of(
-                    run.run(stop),
-                    realtime=scenario.clock.mode == "realtime",
-                    period_s=scenario.clock.control_period_s,
-                )
-        except InfrastructureError:
-            run_folder.discard(created)
-            raise
-    if not stats.began:
-        run_folder.discard(created)
-        note(f"{stats.ended}: {stats.reason}; the run did not begin")
-        return teller.tell(
-            unbegun(scenario.name, stats.ended, stats.reason, EXIT_STATUS[stats.ended])
-        )
-    stats.started = local_date(started_ns).isoformat()
-    return _finish(scenario, folder, stats, options, teller)
-
-
-def _look_ahead(source: str, scenario: Scenario, options: RunOptions) -> None:
-    """Say what `fleetloop check` has against a scenario, but for its rehearsal: here is the run.
-
-    Raises:
-        ScenarioError: a necessary condition fails; named.
-    """
-    examined = examine(source, scenario, options.overrides)
-    found = [finding for finding in examined if finding.level != "ok"]
-    for line in in_words(found):
-        note(line)
-    failed = list(dict.fromkeys(titled(one) for one in found if one.level == "error"))
-    if failed and not options.force:
-        raise ScenarioError(
-            f"{source}: would not work as it is, by {'; '.join(failed)};"
-            " --force runs it all the same"
-        )
-
-
-def _check_credentials(scenario: Scenario, deployment: Deployment) -> None:
-    """Refuse what can't be authenticated, and name the guests that are kept out."""
-    placement.check_credentials(scenario, deployment)
-    for user, why in placement.kept_out(deployment).items():
-        note(f"{user}: kept out: {why}")
-
-
-def _deployment(scenario: Scenario, options: RunOptions) -> Deployment:
-    if options.deployment is None:
-        return Deployment()
-    return load_deployment(options.deployment, scenario)
-
-
-def run_in_process(
-    scenario: Scenario,
-    folder: Path,
-    on_progress: Callable[[Progress], None],
-    on_event: Callable[[Event], None],
-    stop: Stop,
-) -> RunStats:
-    """Run all roles in this process and write the record into the run's folder.
-
-    Raises:
-        InfrastructureError: the record can't be written, or the run could not start.
-    """
-    network = NetworkLink("in-process", "", "", "")
-    began = SYSTEM_CLOCK.monotonic_s()
-    record = folder / run_folder.RECORD
-    period_ns = schedule(scenario).period_ns
-    run: InProcessRun | None = None
-    ended, reason = "completed", ""
-    try:
-        with (
-            RunRecord(
-                record,
-                {robot.name: signals_of(scenario, robot) for robot in scenario.robot},
-                to_toml(scenario),
-                period_ns,
-                buses=scenario.buses,
-                formats=scenario.bus.record,
-                inputs=scenario.names if scenario.records_inputs else (),
-            ) as file,
-            BackgroundWriter(file) as writer,
-        ):
-            run = InProcessRun(
-                plant_brief(scenario, network=network),
-                [agent_brief(scenario, r, network=network, bus=()) for r in scenario.names],
-                leader_brief(scenario),
-                writer,
-                on_progress,
-                on_event,
-            )
-            startup_s = SYSTEM_CLOCK.monotonic_s() - began
-            run.run(stop)
-    except InfrastructureError as error:
-        if run is None:
-            raise
-        ended, reason = "aborted", str(error)
-    if stop.requested:
-        ended, reason = "interrupted", stop.reason
-    return RunStats(
-        mode="in-process",
-        ended=ended,
-        began=any(run.frames.values()),
-        reason=reason,
-        wall_s=run.wall_s,
-        startup_s=startup_s,
-        frames_per_bus=run.frames,
-        nodes=run.nodes,
-        stopped_robots=run.stopped_robots,
-        faults=FaultLedger(scenario).rows(run.ticks),
-        events=run.events,
-        remarks=run.remarks,
-        messages=run.messages,
-    )
-
-
-def _finish(
-    scenario: Scenario, folder: Path, stats: RunStats, options: RunOptions, teller: _Teller
-) -> int:
-    record = folder / run_folder.RECORD
-    if not record.exists():
-        gone = stats.reason or f"{record} is not there: the run's folder was removed or moved"
-        raise InfrastructureError(gone)
-    try:
-        recorded = Record.open(record)
-    except RecordError as error:
-        note(f"{stats.ended}: {stats.reason}; {error}")
-        ended = "aborted" if stats.ended == "completed" else stats.ended
-        reason = f"{stats.reason}; {error}" if stats.reason else str(error)
+        listener = Listener(live.on_progress, live.on_event, live.on_notice)
+        carried = carry_out(scenario, options.out, manner, deployment, listener, stop)
+    ended, reason = carried.stats.ended, carried.stats.reason
+    if not carried.stats.began:
+        note(f"{ended}: {reason}; the run did not begin")
         return teller.tell(unbegun(scenario.name, ended, reason, EXIT_STATUS[ended]))
-    summary = summarise(recorded, scenario, stats)
-    unsaved: InfrastructureError | None = None
     try:
-        run_folder.write(folder / run_folder.SUMMARY, to_json(summary))
-        events = in_order(stats.events, scenario.names)
-        run_folder.write(folder / EVENTS, events_file(events, schedule(scenario).period_ns))
-    except InfrastructureError as error:
-        unsaved = error  # results first
+        concluded = conclude(scenario, carried)
+    except RecordError as error:
+        note(f"{ended}: {reason}; {error}")
+        ended = "aborted" if ended == "completed" else ended
+        reason = f"{reason}; {error}" if reason else str(error)
+        return teller.tell(unbegun(scenario.name, ended, reason, EXIT_STATUS[ended]))
+    return _show(concluded, carried.folder, options, teller)
+
+
+def _show(concluded: Concluded, folder: Path, options: RunOptions, teller: _Teller) -> int:
+    record, summary, unsaved = concluded
     if not options.as_json:
         print_results(summary, folder)
     status = exit_status(summary, allow_unchecked=options.allow_unchecked)
@@ -321,7 +160,7 @@ def _finish(
     if options.figures and summary["ticks"]:
         from fleetloop.results.report import write_report
 
-        page = write_report(folder, recorded)
+        page = write_report(folder, record)
         if not options.as_json:
             print_report(page)
     return status

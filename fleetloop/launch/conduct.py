@@ -1,0 +1,302 @@
+"""A run from its scenario to its summary, whoever asks for it: the command, a program, a job.
+
+prepare     what is wrong with it, before anything is started
+carry_out   the run: its folder, its processes or none, its statistics
+conclude    its summary and events, from the record
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from bridge.network.messages import Progress
+from bridge.process.clock import SYSTEM_CLOCK, local_date
+from bridge.process.lifecycle import Stop
+from configs.connections import NetworkLink
+from configs.deployment import Deployment, load_deployment
+from configs.errors import InfrastructureError, ScenarioError
+from configs.events import Event, in_order
+from configs.faults.plan import process_fault_problem
+from configs.loading import to_toml
+from configs.overrides import Overrides
+from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of
+from configs.scenario import Scenario
+from fleetloop.check.examine import examine
+from fleetloop.check.finding import in_words, titled
+from fleetloop.in_process import InProcessRun
+from fleetloop.launch import placement, wall_time
+from fleetloop.launch.accounts import stats_of
+from fleetloop.launch.fault_ledger import FaultLedger
+from fleetloop.launch.process_run import ProcessRun
+from fleetloop.record.background import BackgroundWriter
+from fleetloop.record.events_file import EVENTS, events_file
+from fleetloop.record.reader import Record
+from fleetloop.record.run_record import RunRecord
+from fleetloop.results import run_folder
+from fleetloop.results.expectations import out_of_reach
+from fleetloop.results.summary import RunStats, Summary, summarise, to_json
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Manner:
+    """How a scenario is run."""
+
+    in_process: bool = False
+    speed: float = 0.0
+    """Multiple of real time to hold a lockstep run to; 0: as fast as the machine allows."""
+    deployment: Path | None = None
+    profile: bool = False
+    force: bool = False
+    """Run what `fleetloop check` calls an error."""
+
+
+class Listener(NamedTuple):
+    """Told of a run while it goes on."""
+
+    on_progress: Callable[[Progress], None]
+    on_event: Callable[[Event], None]
+    on_notice: Callable[[str, str], None]
+    """Of a process, in words."""
+
+
+class Words(NamedTuple):
+    """What a caller calls the options of `Manner`; the default is the command line."""
+
+    in_process: str = "--in-process"
+    lockstep: str = "--clock lockstep"
+    speed: str = "--speed"
+    deployment: str = "--deployment"
+    force: str = "--force"
+
+
+OF_OPTIONS = Words()
+
+
+def prepare(
+    source: str,
+    scenario: Scenario,
+    manner: Manner,
+    note: Callable[[str], None],
+    *,
+    overrides: Overrides = (),
+    words: Words = OF_OPTIONS,
+) -> Deployment:
+    """Refuse what can't be run so; note what `fleetloop check` has against it.
+
+    Args:
+        source: the scenario's name in messages.
+        scenario: to be run.
+        manner: how.
+        note: told a line for each thing to mind.
+        overrides: what options set in the scenario.
+        words: what the caller calls these options.
+
+    Returns:
+        The deployment.
+
+    Raises:
+        ScenarioError: scenario, manner and deployment don't go together, or a necessary condition
+            fails.
+    """
+    realtime = scenario.clock.mode == "realtime"
+    if manner.in_process and realtime:
+        raise ScenarioError(
+            f'{source}: clock.mode = "realtime" needs processes; add {words.lockstep} to run it'
+            " in one process"
+        )
+    if manner.speed and realtime:
+        raise ScenarioError(
+            f"{words.speed} {manner.speed:g}: real time has one speed; for lockstep only"
+        )
+    if manner.in_process and (problem := process_fault_problem(scenario)):
+        raise ScenarioError(f"{source}: {problem}, without {words.in_process}")
+    if manner.in_process and manner.deployment is not None:
+        raise ScenarioError(
+            f"{words.deployment} {manner.deployment}: {words.in_process} has no buses and no"
+            " network to place"
+        )
+    deployment = load_deployment(manner.deployment, scenario) if manner.deployment else Deployment()
+    placement.check_credentials(scenario, deployment)
+    for user, why in placement.kept_out(deployment).items():
+        note(f"{user}: kept out: {why}")
+    if long := wall_time.warning(scenario, speed=manner.speed, in_process=manner.in_process):
+        note(long)
+    for line in out_of_reach(scenario):
+        note(f"{scenario.name}: {line}")
+    # But for the rehearsal: here is the run.
+    found = [one for one in examine(source, scenario, overrides) if one.level != "ok"]
+    for line in in_words(found):
+        note(line)
+    failed = list(dict.fromkeys(titled(one) for one in found if one.level == "error"))
+    if failed and not manner.force:
+        raise ScenarioError(
+            f"{source}: would not work as it is, by {'; '.join(failed)};"
+            f" {words.force} runs it all the same"
+        )
+    return deployment
+
+
+class Carried(NamedTuple):
+    """A run that has ended."""
+
+    folder: Path
+    stats: RunStats
+
+
+def carry_out(
+    scenario: Scenario,
+    out: Path | None,
+    manner: Manner,
+    deployment: Deployment,
+    listener: Listener,
+    stop: Stop,
+) -> Carried:
+    """Run a scenario that was prepared, into a folder `out` or one of its own.
+
+    A run of which nothing could be recorded leaves no folder: its statistics say that it did not
+    begin.
+
+    Raises:
+        ScenarioError: `out` exists and isn't empty.
+        InfrastructureError: the run could not start.
+    """
+    started_ns = SYSTEM_CLOCK.wall_ns()
+    created = run_folder.create(scenario.name, out, started_ns)
+    folder = created.path
+    try:
+        run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
+        if manner.in_process:
+            stats = run_in_process(scenario, folder, listener.on_progress, listener.on_event, stop)
+        else:
+            stats = _run_over_processes(scenario, folder, manner, deployment, listener, stop)
+    except InfrastructureError:
+        run_folder.discard(created)
+        raise
+    if not stats.began:
+        run_folder.discard(created)
+    stats.started = local_date(started_ns).isoformat()
+    return Carried(folder, stats)
+
+
+def _run_over_processes(
+    scenario: Scenario,
+    folder: Path,
+    manner: Manner,
+    deployment: Deployment,
+    listener: Listener,
+    stop: Stop,
+) -> RunStats:
+    run = ProcessRun(
+        scenario,
+        run=f"{folder.name}-{SYSTEM_CLOCK.monotonic_ns() % 1_000_000:06d}",
+        record=folder / run_folder.RECORD,
+        speed=manner.speed,
+        profile=manner.profile,
+        on_progress=listener.on_progress,
+        on_event=listener.on_event,
+        on_notice=listener.on_notice,
+        deployment=deployment,
+    )
+    return stats_of(
+        run.run(stop),
+        realtime=scenario.clock.mode == "realtime",
+        period_s=scenario.clock.control_period_s,
+    )
+
+
+def run_in_process(
+    scenario: Scenario,
+    folder: Path,
+    on_progress: Callable[[Progress], None],
+    on_event: Callable[[Event], None],
+    stop: Stop,
+) -> RunStats:
+    """Run all roles in this process and write the record into the run's folder.
+
+    Raises:
+        InfrastructureError: the record can't be written, or the run could not start.
+    """
+    network = NetworkLink("in-process", "", "", "")
+    began = SYSTEM_CLOCK.monotonic_s()
+    record = folder / run_folder.RECORD
+    period_ns = schedule(scenario).period_ns
+    run: InProcessRun | None = None
+    ended, reason = "completed", ""
+    try:
+        with (
+            RunRecord(
+                record,
+                {robot.name: signals_of(scenario, robot) for robot in scenario.robot},
+                to_toml(scenario),
+                period_ns,
+                buses=scenario.buses,
+                formats=scenario.bus.record,
+                inputs=scenario.names if scenario.records_inputs else (),
+            ) as file,
+            BackgroundWriter(file) as writer,
+        ):
+            run = InProcessRun(
+                plant_brief(scenario, network=network),
+                [agent_brief(scenario, r, network=network, bus=()) for r in scenario.names],
+                leader_brief(scenario),
+                writer,
+                on_progress,
+                on_event,
+            )
+            startup_s = SYSTEM_CLOCK.monotonic_s() - began
+            run.run(stop)
+    except InfrastructureError as error:
+        if run is None:
+            raise
+        ended, reason = "aborted", str(error)
+    if stop.requested:
+        ended, reason = "interrupted", stop.reason
+    return RunStats(
+        mode="in-process",
+        ended=ended,
+        began=any(run.frames.values()),
+        reason=reason,
+        wall_s=run.wall_s,
+        startup_s=startup_s,
+        frames_per_bus=run.frames,
+        nodes=run.nodes,
+        stopped_robots=run.stopped_robots,
+        faults=FaultLedger(scenario).rows(run.ticks),
+        events=run.events,
+        remarks=run.remarks,
+        messages=run.messages,
+    )
+
+
+class Concluded(NamedTuple):
+    """What a run came to."""
+
+    record: Record
+    summary: Summary
+    unsaved: InfrastructureError | None
+    """Why the summary, or the events, could not be written."""
+
+
+def conclude(scenario: Scenario, carried: Carried) -> Concluded:
+    """Make the summary of a run that began, and write it and the events into its folder.
+
+    Raises:
+        RecordError: the record can't be read.
+        InfrastructureError: the record is gone.
+    """
+    folder, stats = carried
+    path = folder / run_folder.RECORD
+    if not path.exists():
+        gone = stats.reason or f"{path} is not there: the run's folder was removed or moved"
+        raise InfrastructureError(gone)
+    record = Record.open(path)
+    summary = summarise(record, scenario, stats)
+    unsaved: InfrastructureError | None = None
+    try:
+        run_folder.write(folder / run_folder.SUMMARY, to_json(summary))
+        events = in_order(stats.events, scenario.names)
+        run_folder.write(folder / EVENTS, events_file(events, schedule(scenario).period_ns))
+    except InfrastructureError as error:
+        unsaved = error
+    return Concluded(record, summary, unsaved)
