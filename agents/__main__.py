@@ -79,6 +79,7 @@ def _run(brief: AgentBrief, stop: Stop, link: ZenohLink, watch: LauncherWatch | 
     path = link.publisher(keys.path(name, robot), steady=may_be_absent)
     telemetry = link.publisher(keys.telemetry(name, robot))
     report = link.publisher(keys.report(name, AGENT.process(robot)))
+    progress = link.publisher(keys.progress(name, AGENT.process(robot)))
     rows = RowBuffer(row_of(brief.signals), partial(put_rows, telemetry))
     log = None
     if brief.logs_inputs:
@@ -110,7 +111,18 @@ def _run(brief: AgentBrief, stop: Stop, link: ZenohLink, watch: LauncherWatch | 
         return stop.reason
     with open_bus(brief.robot, brief.bus) as bus:
         connections = _Connections(
-            agent, bus, link, subscriptions, path, hellos, rows, report, orders, watch, log
+            agent,
+            bus,
+            link,
+            subscriptions,
+            path,
+            hellos,
+            rows,
+            report,
+            progress,
+            orders,
+            watch,
+            log,
         )
         return (_realtime if realtime else _lockstep)(connections, stop)
 
@@ -145,6 +157,7 @@ class _Connections(NamedTuple):
     hellos: Hellos
     rows: RowBuffer
     report: Publisher
+    progress: Publisher
     orders: OrderInbox | None = None
     watch: LauncherWatch | None = None
     inputs: InputBuffer | None = None
@@ -252,6 +265,7 @@ def _lockstep(connections: _Connections, stop: Stop) -> str:
         connections.subscriptions,
         connections.path,
         connections.hellos,
+        connections.progress,
         connections.orders,
     )
     connections.await_peers(loop.on_arrival, stop)
@@ -263,10 +277,6 @@ def _lockstep(connections: _Connections, stop: Stop) -> str:
 
 
 def _realtime(connections: _Connections, stop: Stop) -> str:
-    brief = connections.agent.brief
-    progress = connections.link.publisher(
-        keys.progress(brief.network.run, AGENT.process(brief.robot))
-    )
     loop = RealtimeLoop(
         connections.agent,
         connections.bus,
@@ -274,7 +284,7 @@ def _realtime(connections: _Connections, stop: Stop) -> str:
         connections.subscriptions,
         connections.path,
         connections.hellos,
-        progress,
+        connections.progress,
         connections.orders,
         watch=connections.watch,
     )

@@ -78,6 +78,8 @@ class Agent:
     def __init__(self, brief: AgentBrief, rows: RowBuffer) -> None:
         self.brief = brief
         self._rows = rows
+        self.row: Sequence[float] = ()
+        """The values of `brief.signals` at the last tick; empty before there is one."""
         self._schedule = brief.schedule
         self._h = brief.schedule.period_s
         self.guard = self._guard = Guard(brief)
@@ -110,6 +112,8 @@ class Agent:
         """Messages that are due at a tick and have not arrived."""
         self.faults = MessageFaults(brief, self._channel_of, self._guard.note)
         """Faults of the messages to this robot."""
+        self.neighbours = reception.neighbours.heard
+        """The in-neighbours whose edges exist, and how old what they said last is [s]."""
         self._neighbours, self._edges = reception.neighbours, reception.edges
         self._history = self._pose_history(brief)
         self._localiser = Localiser(brief.localisation, brief.wheels, self._history)
@@ -301,7 +305,8 @@ class Agent:
         if self._records_ages:
             signals = (*self._reception.ages_s(t_ns), *signals)
         sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
-        self._rows.add(tick, (*used, *signals, *sent))
+        self.row = row = (*used, *signals, *sent)
+        self._rows.add(tick, row)
         return frames
 
     def _stand_by(self, tick: int, motion: RobotMotion) -> Sequence[Frame]:
@@ -321,8 +326,9 @@ class Agent:
         ages = self._reception.ages_s(t_ns) if self._records_ages else ()
         sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
         known = self._located or not self.brief.rejoins
-        row = (t_ns * 1e-9, *(motion if known else _NOWHERE), nan, nan, nan, nan, 0, nan, nan, nan)
-        self._rows.add(tick, (*row, *ages, *self._no_signals, *sent))
+        used = (t_ns * 1e-9, *(motion if known else _NOWHERE), nan, nan, nan, nan, 0, nan, nan, nan)
+        self.row = row = (*used, *ages, *self._no_signals, *sent)
+        self._rows.add(tick, row)
         return frames
 
     def speaks(self, tick: int) -> bool:

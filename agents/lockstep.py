@@ -17,6 +17,7 @@ from agents.agent import Agent
 from agents.bus_clock import BusClock
 from agents.guard import Phase
 from agents.process_faults import ProcessFaults
+from agents.status import Narrator
 from agents.subscriptions import Subscriptions
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import can_id_of, to_message
@@ -76,6 +77,7 @@ class LockstepLoop:
         subscriptions: Subscriptions,
         path: Publisher,
         hellos: Hellos,
+        progress: Publisher,
         orders: OrderInbox | None = None,
         *,
         clock: Clock = SYSTEM_CLOCK,
@@ -90,6 +92,7 @@ class LockstepLoop:
         self._subscriptions = subscriptions
         self._path = path
         self._hellos = hellos
+        self._progress = progress
         self._within_s, self._frames_within_s = _patience_s(self._schedule)
         self.faults = ProcessFaults(agent.brief, agent.guard.note, clock=clock)
         """Faults of this process."""
@@ -130,6 +133,8 @@ class LockstepLoop:
         faults.skip_to(first_tick)
         subscriptions, orders, bus = self._subscriptions, self._orders, self._bus
         timeout_s = self._frames_within_s
+        narrator, told_ns = Narrator(agent), asked_ns
+        tell_every_ns = int(schedule.status_every_s * 1e9)
         while True:
             tick: int | None = None
             if message is not None:
@@ -159,6 +164,9 @@ class LockstepLoop:
                 asked_ns = self._clock.monotonic_ns()
                 counters.compute_ns += asked_ns - heard_ns
                 counters.ticks += 1
+                if asked_ns >= told_ns:
+                    told_ns = asked_ns + tell_every_ns
+                    self._progress.put(narrator.progress(tick).encode())
                 if agent.phase is Phase.DONE:
                     return
             message = self._await_frame(timeout_s)

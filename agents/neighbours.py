@@ -138,6 +138,11 @@ class Neighbours:
                 sum_v += weight * neighbour.v_hat
         return degree, sum_s, sum_v
 
+    def heard(self, now_ns: int) -> list[tuple[str, float]]:
+        """The neighbours whose edges exist, and ages as `ages_s` gives them."""
+        ages_s = zip(self._by_name.items(), self.ages_s(now_ns), strict=True)
+        return [(name, age_s) for (name, one), age_s in ages_s if one.exists]
+
     def ages_s(self, now_ns: int) -> list[float]:
         """Age of the newest path state of each neighbour [s], in the order of names.
 

@@ -23,6 +23,7 @@ from agents.bus_health import BusHealth
 from agents.guard import Phase
 from agents.lockstep import deliver, did_not_start, take_orders
 from agents.process_faults import ProcessFaults
+from agents.status import Narrator
 from agents.subscriptions import Subscriptions
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import can_id_of, to_frame, to_message
@@ -31,7 +32,7 @@ from bridge.network.barrier import Hellos
 from bridge.network.fault_orders import OrderInbox
 from bridge.network.launcher import CUT_OFF, LauncherWatch
 from bridge.network.link import Link, Publisher, waiting
-from bridge.network.messages import Go, Progress
+from bridge.network.messages import Go
 from bridge.network.reports import Deadlines
 from bridge.process.awake import STALL_S, Lateness
 from bridge.process.clock import SYSTEM_CLOCK, Clock, implausible_start, monotonic_of
@@ -45,7 +46,7 @@ BACKLOG_S = 1.0
 
 
 PROGRESS_PERIOD_S = 0.2
-"""Period of a controller's progress messages."""
+"""Longest period of a controller's progress messages: they are its signs of life."""
 
 
 @dataclass(slots=True)
@@ -97,7 +98,9 @@ class RealtimeLoop:
         self._progress = progress
         self._watch = watch
         self._away = False  # as the guard was told
-        self._progress_ticks = max(round(PROGRESS_PERIOD_S / agent.brief.schedule.period_s), 1)
+        self._narrator = Narrator(agent)
+        every_s = min(self._schedule.status_every_s, PROGRESS_PERIOD_S)
+        self._progress_ticks = max(round(every_s / self._schedule.period_s), 1)
         self._lateness = Lateness(agent.brief.schedule.period_s)
         self._health = BusHealth(agent.brief.robot, agent.brief.host.bus_error_limit_ns)
         self._echoes = Echoes() if hands_back(agent.brief.bus) else None
@@ -201,7 +204,7 @@ class RealtimeLoop:
                 self._send(frames, tick)
             self.counters.ticks += tick >= 0
             if tick % self._progress_ticks == 0:
-                self._progress.put(Progress(tick, tick * period_ns, 0).encode())
+                self._progress.put(self._narrator.progress(tick).encode())
             subscriptions.follow(tick, distances_m)
             tick += 1
             if schedule.shares(tick) and agent.speaks(tick):

@@ -68,6 +68,7 @@ class Schedule:
     realtime: bool = False  # all processes keep the wall clock; else the plant owns time
     on_late: OnLate = "abort"  # in lockstep, of a controller that has gone or doesn't answer
     profile: bool = False  # every process samples where its processor time goes
+    status_every_s: float = 0.1  # period of what each process says of itself for people [wall s]
 
     @property
     def period_s(self) -> float:

@@ -42,6 +42,8 @@ TICK_DEADLINE_S, TICK_DEADLINE_PER_ROBOT_S = 2.0, 0.02
 """On two busy cores a tick of 250 robots takes up to 0.7 s."""
 HELLO_EVERY_S, HELLO_EVERY_PER_ROBOT_S = 0.02, 0.001
 """All processes send hellos at once, so those of a large fleet are less frequent."""
+STATUS_EVERY_S, STATUS_EVERY_PER_ROBOT_S = 0.1, 0.004
+"""What processes say for people costs the launcher at most 250 messages a second."""
 SERIAL_NUMBER = 0x3858_0000_0000
 
 
@@ -68,6 +70,7 @@ def schedule(scenario: Scenario, speed: float = 0.0, *, profile: bool = False) -
         realtime=clock.mode == "realtime",
         on_late="abort" if clock.mode == "realtime" else clock.on_late,
         profile=profile,
+        status_every_s=max(STATUS_EVERY_S, STATUS_EVERY_PER_ROBOT_S * robots),
     )
 
 

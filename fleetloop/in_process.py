@@ -11,6 +11,7 @@ from typing import NamedTuple, Protocol
 from agents.agent import Agent
 from agents.bus_clock import BusClock
 from agents.inputs import LoggedAgent
+from agents.status import Narrator
 from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.frame import Frame
 from bridge.network.inputs import InputBuffer
@@ -22,11 +23,14 @@ from configs.brief import AgentBrief, LeaderBrief, PlantBrief
 from configs.edges import hearer
 from configs.events import Event
 from configs.faults.base import PlannedFault
+from configs.roles import AGENT, PLANT
 from fleetloop.record.writer import Source
+from fleetloop.robot_states import RobotBoard, RobotState
 from plant.bus.build import build_buses
 from plant.faults import fault_events
 from plant.herald import Herald
 from plant.robot import EmulatedRobot, emulated_robot
+from plant.status import PlantMeter
 from plant.troubles import diverged_robots, divergences
 
 PROGRESS_EVERY_TICKS = 256
@@ -140,6 +144,7 @@ class InProcessRun:
         *,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
+        self._board = RobotBoard({brief.robot: brief.bus for brief in plant.robots})
         self._clock = clock
         self._schedule = plant.schedule
         self._robots = [emulated_robot(brief) for brief in plant.robots]
@@ -195,6 +200,8 @@ class InProcessRun:
         self._logs = {bus: FrameBuffer(partial(_write_traffic, writer, bus)) for bus in names}
         taps = {bus: log.add for bus, log in self._logs.items()}
         self._buses = build_buses(plant, self._robots, port, begin, taps)
+        self._meter = PlantMeter(self._buses, self._robots)
+        self._narrators = {agent.brief.robot: Narrator(agent) for agent in self._agents}
         self._steps = [bus.steps() for bus in self._buses.values()]
         for agent in self._agents:
             if agent.brief.leader_link is not None:
@@ -203,6 +210,14 @@ class InProcessRun:
         self.wall_s = 0.0
         self._next_tick = -self._schedule.countdown_ticks
         self._start_ns = 0
+
+    def robots(self) -> list[RobotState]:
+        """What is to be seen of each robot now, in the order of the scenario."""
+        tick, board = self._next_tick - 1, self._board
+        board.note(PLANT.name, Progress(tick, 0, 0, self._meter.status()))
+        for robot, narrator in self._narrators.items():
+            board.note(AGENT.process(robot), narrator.progress(tick))
+        return board.states()
 
     @property
     def frames(self) -> dict[str, int]:

@@ -47,6 +47,7 @@ from plant.orders import PlantOrders
 from plant.real_robot import RealRobot
 from plant.realtime import RealtimeLoop
 from plant.robot import emulated_robot
+from plant.status import Narrator, PlantMeter
 from plant.troubles import bus_troubles, diverged_robots, divergences
 
 PLANT_PRIORITY = 45
@@ -170,8 +171,10 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
     notice = link.publisher(keys.notice(name, PLANT.name))
     herald = Herald(news, lambda event: notice.put(Notice(event).encode()))
 
+    narrator = Narrator(progress, brief.schedule.status_every_s)
+
     def say(state: Progress) -> None:
-        progress.put(state.encode())
+        narrator.say(state)
         herald.look(state.tick)
 
     missing_privileges: list[str] = []
@@ -196,6 +199,7 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         absent = AbsentControllers(brief, hub, silences, herald.note)
         loop = LockstepLoop(brief, emulated, hub, poses, rows, say, taps, absent, orders)
         counters, progress_of, body = loop.counters, loop.progress, loop.run
+    narrator.meter = PlantMeter(loop.buses, emulated)
     sampler = Sampler()
     began_ns, waited_ns = process_cpu_ns(), processor_wait_ns()
     try:

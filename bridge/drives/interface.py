@@ -104,6 +104,10 @@ class DriveNode(Protocol):
         """Torque of the last set-point at the shaft [N·m], before limits."""
 
     @property
+    def state_in_words(self) -> str:
+        """Its state, and after a colon the errors that disarmed it or are active, if any."""
+
+    @property
     def next_due_ns(self) -> int:
         """The earliest bus time at which `due` has an effect; valid after its last call."""
 

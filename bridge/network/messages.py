@@ -4,7 +4,8 @@ A message is a msgpack array that begins with the version of its layout. Decodin
 long, the wrong types, a wrong length, an unknown version or a number that isn't finite give None,
 never an exception; the caller counts it. Text is for people: what doesn't print, such as a
 terminal's escapes, is replaced. Times are scenario time in ns. A message may be well formed and
-still be impossible: readers that know the run check that.
+still be impossible: readers that know the run check that. The status of a progress message is nil
+or one of `bridge.network.status`.
 
     message        layout                                        key
     PathState      [1, tick, t_ns, s, v_hat]                     robot/<name>/path
@@ -13,7 +14,7 @@ still be impossible: readers that know the run check that.
     LeaderSpeed    [1, [[from_t_ns, speed_m_s, ramp_ns], ...]]   leader/speed
     Rows           [1, first_tick, length, rows, final]          robot/<name>/truth, telemetry;
                                                                  robot/<name>/inputs: bytes
-    Progress       [1, tick, t_ns, wall_ns]                      @progress/<process>
+    Progress       [1, tick, t_ns, wall_ns, status]              @progress/<process>
     Notice         [1, tick, source, kind, text]                 @notice/<process>
     Go             [1, epoch_ns, ticks]                          @clock/go
     ClockPing      [1, sent_ns]                                  @clock/ping
@@ -23,6 +24,7 @@ still be impossible: readers that know the run check that.
 from typing import Any, NamedTuple
 
 from bridge.network.packing import MAX_BYTES, finite, ints, pack, printable, unpack
+from bridge.network.status import Status, status_of
 from configs.events import KINDS, MAX_EVENT_TEXT, Event
 from configs.leader_speed import SpeedChange, in_order
 
@@ -30,7 +32,7 @@ MOST_BYTES = {
     "path": 128,
     "silence": 128,
     "pose": 128,
-    "progress": 128,
+    "progress": 1 << 16,
     "pong": 128,
     "notice": 1 << 12,
     "order": MAX_BYTES,
@@ -160,21 +162,36 @@ class Rows(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """How far a process is."""
+    """How far a process is, and now and then what is to be seen of it."""
 
     tick: int
     t_ns: int
     wall_ns: int  # since control began
+    status: Status | None = None
 
     def encode(self) -> bytes:
-        """Bytes for the wire."""
-        return pack(*self)
+        """Bytes for the wire; without a status that is too long for it."""
+        tick, t_ns, wall_ns, status = self
+        payload = pack(tick, t_ns, wall_ns, None if status is None else status.fields())
+        return (
+            payload
+            if len(payload) <= MOST_BYTES["progress"]
+            else self._replace(status=None).encode()
+        )
 
     @classmethod
     def decode(cls, payload: bytes) -> "Progress | None":
         """The message in the bytes, None if there is none."""
-        fields = unpack(payload, 4)
-        return cls(*fields[1:]) if fields is not None and ints(fields[1:]) else None
+        if len(payload) > MOST_BYTES["progress"]:
+            return None
+        fields = unpack(payload, 5)
+        if fields is None or not ints(fields[1:4]):
+            return None
+        _, tick, t_ns, wall_ns, said = fields
+        status = None if said is None else status_of(said)
+        if said is not None and status is None:
+            return None
+        return cls(tick, t_ns, wall_ns, status)
 
 
 class Notice(NamedTuple):

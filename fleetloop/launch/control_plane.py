@@ -20,6 +20,7 @@ from fleetloop.launch.message_reader import MessageReader
 from fleetloop.launch.outcome import Outcome
 from fleetloop.launch.remote_roles import RemoteRoles
 from fleetloop.launch.vitals import Vitals
+from fleetloop.robot_states import RobotBoard, RobotState
 
 
 class ControlPlane:
@@ -28,6 +29,7 @@ class ControlPlane:
     Args:
         schedule: of the run: what a progress message may say.
         remote: the roles on other machines.
+        board: keeps what is to be seen of the robots.
         now: seconds on the launcher's clock of awake time.
         on_progress: called with the plant's progress.
         on_event: called with each event, as they come.
@@ -38,6 +40,7 @@ class ControlPlane:
         self,
         schedule: Schedule,
         remote: RemoteRoles,
+        board: RobotBoard,
         now: Callable[[], float],
         on_progress: Callable[[Progress], None],
         on_event: Callable[[Event], None],
@@ -48,6 +51,7 @@ class ControlPlane:
         self.clocks = ClockOffsets(remote.processes)
         self.vitals = Vitals()
         self.remote = remote
+        self._board = board
         self.children: list[Child] = []
         self.alive: set[str] = set()
         """Processes with a liveliness token."""
@@ -150,11 +154,19 @@ class ControlPlane:
         silence = self.vitals.beat(process, progress.tick, self.now())
         if silence is not None:
             self.note(process, "back", f"goes on after {silence.lasted_s:.1f} s")
+        self._board.note(process, progress)
         if process == PLANT.name:
             self.ticking = True
             self.outcome.ticks = progress.tick
             self.outcome.wall_s = progress.wall_ns * 1e-9
             self._on_progress(progress)
+
+    def robots(self) -> list[RobotState]:
+        """What is to be seen of each robot now, in the order of the scenario."""
+        controllers = {AGENT.process(robot) for robot in self._board.robots}
+        gone = controllers - self.alive - self.outcome.reports.keys() if self.ticking else set()
+        absent = dict.fromkeys(self.held, "held") | dict.fromkeys(gone | self.let_go, "absent")
+        return self._board.states({short_name(process): it for process, it in absent.items()})
 
     def _process_report(self, process: str, payload: bytes) -> None:
         if (report := self.words.report(process, payload)) is not None:

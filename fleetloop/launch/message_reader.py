@@ -59,7 +59,7 @@ class MessageReader:
             self.refusals.note(f"{tag} message", keys.process_of(key), "flood", why, count)
 
     def _wrong(self, progress: Progress) -> str | None:
-        schedule, (tick, t_ns, wall_ns) = self._schedule, progress
+        schedule, (tick, t_ns, wall_ns, _) = self._schedule, progress
         if not -schedule.countdown_ticks <= tick <= schedule.ticks:
             return f"tick {tick}, where the run has {schedule.ticks}"
         if t_ns not in (0, tick * schedule.period_ns) or wall_ns < 0:

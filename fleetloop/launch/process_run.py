@@ -51,6 +51,7 @@ from fleetloop.launch.restarts import Restarts
 from fleetloop.launch.run_requests import run_requests
 from fleetloop.launch.spawn import Orders, respawn, spawn
 from fleetloop.launch.supervision import CONSEQUENCES_S, Supervision
+from fleetloop.robot_states import RobotBoard, buses_of
 
 GO_AHEAD_NS = 200_000_000
 """In real time, from the go to power-up: for the go to reach every process."""
@@ -95,8 +96,16 @@ class ProcessRun:
         rejoin_s = network.rejoin_s if network is not None else 0.0
         self._remote = RemoteRoles(self._deployment.elsewhere(scenario), rejoin_s)
         self._plane = ControlPlane(
-            self._schedule, self._remote, self._now, on_progress, on_event, on_notice
+            self._schedule,
+            self._remote,
+            RobotBoard(buses_of(scenario)),
+            self._now,
+            on_progress,
+            on_event,
+            on_notice,
         )
+        self.robots = self._plane.robots
+        """What is to be seen of each robot now."""
         # A launcher that has lost a router of its own hears of nobody.
         patience_s = rejoin_s if placement.is_external(self._deployment) else 0.0
         self._supervision = Supervision(self._plane, self._schedule, patience_s)

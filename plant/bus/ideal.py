@@ -42,6 +42,8 @@ class IdealBus:
         self._interference = Interference(robots)
         faults.disturbances.disturb = self._interference.disturb
         self.crossed = 0
+        self.now_ns = 0
+        self.busy_ns: int | None = None
         self._tap = tap
         self._port = port
         self._schedule = schedule
@@ -69,7 +71,7 @@ class IdealBus:
         (single,) = robots if len(robots) == 1 else (None,)
         late: list[Frame] = []  # replies that wait for the next tick
         for tick in range(-schedule.countdown_ticks, last + 1):
-            bus_ns = schedule.bus_time_ns(tick)
+            self.now_ns = bus_ns = schedule.bus_time_ns(tick)
             begin_faults(tick)
             begin(tick)
             if interference.acts:
@@ -135,6 +137,7 @@ class IdealBus:
 
     def move(self, bus_ns: int) -> None:
         """Move the bodies to a bus time."""
+        self.now_ns = bus_ns
         for robot in self.robots:
             robot.move(bus_ns, self._zero_ns, self._step_ns)
 

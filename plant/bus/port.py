@@ -53,6 +53,14 @@ class Bus(Protocol):
     acts_between_ticks: bool
     """In real time, whether `next_ns` has to be looked at between two ticks."""
 
+    @property
+    def now_ns(self) -> int:
+        """The bus time that it has got to."""
+
+    @property
+    def busy_ns(self) -> int | None:
+        """Time in which its wire was occupied until then; None: it has no bit timing."""
+
     def node_counts(self) -> dict[str, dict[str, int]]:
         """Frames of each node on the wire by their fate; nothing without bit timing."""
 

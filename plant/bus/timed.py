@@ -94,6 +94,16 @@ class TimedBus:
         self.crossed = 0
         """Frames that ended on the wire, drives' and clients'."""
 
+    @property
+    def now_ns(self) -> int:
+        """The bus time of the wire."""
+        return self.wire.now_ns
+
+    @property
+    def busy_ns(self) -> int:
+        """Time in which the wire was occupied until then."""
+        return self.wire.busy_ns
+
     def node_counts(self) -> dict[str, dict[str, int]]:
         """Frames of each drive and of each client that is still there, by their fate."""
         hosts = (host.node for host in self._hosts.values())

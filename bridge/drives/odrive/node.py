@@ -117,6 +117,12 @@ class OdriveNode(LocalAxis):
         return self._due(now_ns)
 
     @property
+    def state_in_words(self) -> str:
+        """As a heartbeat says it: the axis's state, and its errors if there are any."""
+        errors = self.errors | self.disarm_reason
+        return f"{self.state.name}: {f.error_names(errors)}" if errors else self.state.name
+
+    @property
     def next_due_ns(self) -> int:
         """The earliest bus time at which `due` has an effect."""
         next_ns = min(self._next_encoder_ns, self._next_other_ns)

@@ -55,7 +55,7 @@ def test_rows_survive_the_wire(first: int, length: int, final: bool) -> None:
     assert (Rows.decode(rows.encode(), 16) is None) == (length > 0)
 
 
-@given(st.builds(Progress, ints, ints, ints))
+@given(st.builds(Progress, ints, ints, ints, st.none()))
 def test_progress_survives_the_wire(progress: Progress) -> None:
     assert Progress.decode(progress.encode()) == progress
 

@@ -59,6 +59,10 @@ class PlainNode:
             self.fed_ns = now_ns
         return ()
 
+    @property
+    def state_in_words(self) -> str:
+        return f"OFF: {self.off}" if self.off else "ON"
+
     def update_measurements(self, measurements: DriveMeasurements) -> None:
         pass
 
