@@ -80,7 +80,8 @@ def _run(brief: AgentBrief, stop: Stop, link: ZenohLink, watch: LauncherWatch | 
     telemetry = link.publisher(keys.telemetry(name, robot))
     report = link.publisher(keys.report(name, AGENT.process(robot)))
     progress = link.publisher(keys.progress(name, AGENT.process(robot)))
-    rows = RowBuffer(row_of(brief.signals), partial(put_rows, telemetry))
+    within_ns = brief.schedule.rows_within_ns
+    rows = RowBuffer(row_of(brief.signals), partial(put_rows, telemetry), within_ns)
     log = None
     if brief.logs_inputs:
         inputs = link.publisher(keys.inputs(name, robot))

@@ -77,7 +77,8 @@ class Agent:
 
     def __init__(self, brief: AgentBrief, rows: RowBuffer) -> None:
         self.brief = brief
-        self._rows = rows
+        self.rows = rows
+        """Of the record."""
         self.row: Sequence[float] = ()
         """The values of `brief.signals` at the last tick; empty before there is one."""
         self._schedule = brief.schedule
@@ -306,7 +307,7 @@ class Agent:
             signals = (*self._reception.ages_s(t_ns), *signals)
         sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
         self.row = row = (*used, *signals, *sent)
-        self._rows.add(tick, row)
+        self.rows.add(tick, row)
         return frames
 
     def _stand_by(self, tick: int, motion: RobotMotion) -> Sequence[Frame]:
@@ -328,7 +329,7 @@ class Agent:
         known = self._located or not self.brief.rejoins
         used = (t_ns * 1e-9, *(motion if known else _NOWHERE), nan, nan, nan, nan, 0, nan, nan, nan)
         self.row = row = (*used, *ages, *self._no_signals, *sent)
-        self._rows.add(tick, row)
+        self.rows.add(tick, row)
         return frames
 
     def speaks(self, tick: int) -> bool:

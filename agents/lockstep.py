@@ -94,6 +94,8 @@ class LockstepLoop:
         self._hellos = hellos
         self._progress = progress
         self._within_s, self._frames_within_s = _patience_s(self._schedule)
+        self._rows = agent.rows
+        self._rows_within_s = self._schedule.rows_within_ns * 1e-9
         self.faults = ProcessFaults(agent.brief, agent.guard.note, clock=clock)
         """Faults of this process."""
         self.counters = LockstepCounters()
@@ -132,6 +134,7 @@ class LockstepLoop:
         clock = BusClock(schedule, agent.feedback_since, first_tick)
         faults.skip_to(first_tick)
         subscriptions, orders, bus = self._subscriptions, self._orders, self._bus
+        look_at_rows = self._rows.look
         timeout_s = self._frames_within_s
         narrator, told_ns = Narrator(agent), asked_ns
         tell_every_ns = int(schedule.status_every_s * 1e9)
@@ -162,6 +165,7 @@ class LockstepLoop:
                 counters.bus_ns += came_ns - asked_ns
                 counters.listen_ns += heard_ns - came_ns
                 asked_ns = self._clock.monotonic_ns()
+                look_at_rows(asked_ns)
                 counters.compute_ns += asked_ns - heard_ns
                 counters.ticks += 1
                 if asked_ns >= told_ns:
@@ -189,10 +193,13 @@ class LockstepLoop:
         left_s = within_s = self._within_s
         while (missing := agent.missing(tick)) and not stop.requested:
             # A late look may find the message in the queue; under a flood the queue never ends.
-            arrival = self._link.receive(LOOK_S if left_s > 0.0 else 0.0)
+            wait_s = self._rows_within_s if clock is None else LOOK_S
+            arrival = self._link.receive(wait_s if left_s > 0.0 else 0.0)
             if clock is None:
                 clock = AwakeClock(held=launcher_stopped, clock=self._clock)
                 deadline = clock.now() + within_s
+            if arrival is None:
+                self._rows.hand_on()
             left_s = deadline - clock.now()
             if arrival is not None and left_s > -within_s:
                 self.on_arrival(arrival)
@@ -202,11 +209,12 @@ class LockstepLoop:
 
     def _await_frame(self, within_s: float) -> can.Message | None:
         """The next frame of the bus; None at a question without a frame."""
-        message = self._receive(LOOK_S)
+        message = self._receive(self._rows_within_s)
         if message is not None or self._bus.asked:
             return message
+        self._rows.hand_on()
         clock = AwakeClock(held=launcher_stopped, clock=self._clock)
-        deadline = clock.now() + within_s - LOOK_S
+        deadline = clock.now() + within_s - self._rows_within_s
         while (message := self._receive(LOOK_S)) is None and not self._bus.asked:
             if clock.now() > deadline:
                 raise InfrastructureError(

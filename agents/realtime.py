@@ -34,6 +34,7 @@ from bridge.network.launcher import CUT_OFF, LauncherWatch
 from bridge.network.link import Link, Publisher, waiting
 from bridge.network.messages import Go
 from bridge.network.reports import Deadlines
+from bridge.network.telemetry import LOOKS
 from bridge.process.awake import STALL_S, Lateness
 from bridge.process.clock import SYSTEM_CLOCK, Clock, implausible_start, monotonic_of
 from bridge.process.lifecycle import Stop
@@ -101,6 +102,8 @@ class RealtimeLoop:
         self._narrator = Narrator(agent)
         every_s = min(self._schedule.status_every_s, PROGRESS_PERIOD_S)
         self._progress_ticks = max(round(every_s / self._schedule.period_s), 1)
+        self._rows = agent.rows
+        self._look_s = agent.brief.schedule.rows_within_ns * 1e-9 / LOOKS
         self._lateness = Lateness(agent.brief.schedule.period_s)
         self._health = BusHealth(agent.brief.robot, agent.brief.host.bus_error_limit_ns)
         self._echoes = Echoes() if hands_back(agent.brief.bus) else None
@@ -266,16 +269,17 @@ class RealtimeLoop:
             if left_ns <= 0 and polled:
                 return
             try:
-                message = self._bus.recv(max(left_ns, 0) * 1e-9)
+                message = self._bus.recv(min(max(left_ns, 0) * 1e-9, self._look_s))
             except (can.CanError, OSError) as error:
                 self._on_bus_error(error)
                 # An interface that is down may fail at once at every call.
                 self._clock.sleep(max(due_ns - self._clock.monotonic_ns(), 0) * 1e-9)
                 return
             polled = message is None
-            if message is None:
-                continue
             came_ns = self._clock.monotonic_ns()
+            if message is None:
+                self._rows.look(came_ns)
+                continue
             bus_ns = came_ns - self._power_up_ns
             can_id = can_id_of(message)
             if can_id & ERR:

@@ -36,6 +36,8 @@ from configs.signals import Signal
 OnLate = Literal["abort", "hold", "drop"]
 LEAD_TICKS = 16
 """In lockstep a bus may be this many ticks ahead of the slowest."""
+ROWS_WITHIN_NS = 40_000_000
+"""In this time rows for the record are handed on, so that a viewer sees a run at 25 Hz."""
 
 
 # --- the controller -------------------------------------------------------------------------------
@@ -69,6 +71,7 @@ class Schedule:
     on_late: OnLate = "abort"  # in lockstep, of a controller that has gone or doesn't answer
     profile: bool = False  # every process samples where its processor time goes
     status_every_s: float = 0.1  # period of what each process says of itself for people [wall s]
+    rows_within_ns: int = ROWS_WITHIN_NS  # a row is handed on so long after it was made [wall ns]
 
     @property
     def period_s(self) -> float:

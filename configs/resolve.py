@@ -4,6 +4,7 @@ from math import inf
 
 from configs import sections
 from configs.brief import (
+    ROWS_WITHIN_NS,
     AgentBrief,
     ChannelModel,
     DriveLink,
@@ -44,6 +45,8 @@ HELLO_EVERY_S, HELLO_EVERY_PER_ROBOT_S = 0.02, 0.001
 """All processes send hellos at once, so those of a large fleet are less frequent."""
 STATUS_EVERY_S, STATUS_EVERY_PER_ROBOT_S = 0.1, 0.004
 """What processes say for people costs the launcher at most 250 messages a second."""
+ROWS_WITHIN_PER_ROBOT_NS = 2_500_000
+"""Blocks of rows of a large fleet are handed on less often, 800 in a second from all processes."""
 SERIAL_NUMBER = 0x3858_0000_0000
 
 
@@ -71,6 +74,7 @@ def schedule(scenario: Scenario, speed: float = 0.0, *, profile: bool = False) -
         on_late="abort" if clock.mode == "realtime" else clock.on_late,
         profile=profile,
         status_every_s=max(STATUS_EVERY_S, STATUS_EVERY_PER_ROBOT_S * robots),
+        rows_within_ns=max(ROWS_WITHIN_NS, ROWS_WITHIN_PER_ROBOT_NS * robots),
     )
 
 

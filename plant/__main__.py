@@ -120,7 +120,8 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
     silences = _silences(brief, link)
     robots = [*(robot.brief.robot for robot in emulated), *(other.robot for other in others)]
     truths = [link.publisher(keys.truth(name, robot)) for robot in robots]
-    rows = [RowBuffer(PLANT_ROW, partial(put_rows, truth)) for truth in truths]
+    within_ns = brief.schedule.rows_within_ns
+    rows = [RowBuffer(PLANT_ROW, partial(put_rows, truth), within_ns) for truth in truths]
     logs: dict[str, FrameBuffer] = {}
     if brief.traffic:
         for bus in dict.fromkeys(robot.bus for robot in brief.robots):
@@ -185,9 +186,10 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         settle_memory()
         missing_privileges = go_realtime(PLANT_PRIORITY)
         by_name = {other.robot: other for other in others}
-        record = partial(_record, link, by_name, rows[len(emulated) :], brief.schedule.period_s)
+        own, of_others = rows[: len(emulated)], rows[len(emulated) :]
+        record = partial(_record, link, by_name, of_others, brief.schedule.period_s)
         loop = wall = RealtimeLoop(
-            brief, emulated, end, hub, poses, rows[: len(emulated)], say, taps, record, orders
+            brief, emulated, end, hub, poses, own, say, taps, record, of_others, orders
         )
         counters, progress_of, stalls = wall.counters, wall.progress, wall.lateness.stalls
         body = partial(wall.run, epoch_ns)

@@ -21,7 +21,7 @@ from typing import NamedTuple
 from bridge.can_bus.hub import Hub
 from bridge.network.link import Publisher
 from bridge.network.messages import Progress
-from bridge.network.telemetry import RowBuffer, Tap
+from bridge.network.telemetry import RowBuffer, RowLooks, Tap
 from bridge.process.awake import LOOK_S, STALL_S
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, launcher_stopped
@@ -76,6 +76,7 @@ class LockstepLoop:
         self._window = 0 if self._tick_wall_ns else LEAD_TICKS
         self._limit_s = ANSWER_SHARE * schedule.tick_deadline_s
         self._hub = hub
+        self._rows = RowLooks(rows, schedule.rows_within_ns)
         self._report = report
         self._absent = absent
         first = -schedule.countdown_ticks
@@ -117,10 +118,11 @@ class LockstepLoop:
         for lane in self._lanes.values():
             self._start_tick(lane, now_ns)
         orders = self._orders.waiting if self._orders is not None else ()
+        rows, wait_s = self._rows, min(WAIT_S, self._rows.every_s)
         while self._at_slowest and not stop.requested:
             if orders:
                 self._take_orders()
-            answered = hub.collect(0.0 if self._unasked else WAIT_S)
+            answered = hub.collect(0.0 if self._unasked else wait_s)
             after_ns = self._clock.monotonic_ns()
             self.counters.waited_ns += after_ns - now_ns
             if after_ns - now_ns > _STALL_NS or (not answered and launcher_stopped()):
@@ -130,6 +132,8 @@ class LockstepLoop:
             if absent.allowed:
                 self._go_on_without(after_ns, answered)
             now_ns = self._clock.monotonic_ns()
+            if now_ns >= rows.next_ns:
+                rows.look(now_ns)
             if now_ns - after_ns > _STALL_NS:
                 self._forgive(now_ns - after_ns)
             if not (answered or absent.allowed):
@@ -246,8 +250,10 @@ class LockstepLoop:
         if left_ns < -self._tick_wall_ns:
             self.counters.overruns += 1
         while left_ns > 0:
-            self._hub.serve(left_ns * 1e-9)
-            left_ns = due_ns - self._clock.monotonic_ns()
+            self._hub.serve(min(left_ns * 1e-9, self._rows.every_s))
+            now_ns = self._clock.monotonic_ns()
+            self._rows.look(now_ns)
+            left_ns = due_ns - now_ns
 
     def _forgive(self, stood_still_ns: int) -> None:
         """Time in which this process, or the router, stood still doesn't count as a delay."""

@@ -15,7 +15,7 @@ from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
 from bridge.network.link import Publisher
 from bridge.network.messages import Progress
-from bridge.network.telemetry import RowBuffer, Tap
+from bridge.network.telemetry import RowBuffer, RowLooks, Tap
 from bridge.process.awake import Lateness
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop
@@ -45,6 +45,7 @@ class RealtimeLoop:
         report: Callable[[Progress], None],
         taps: Mapping[str, Tap],
         record_others: Callable[[int], None] = lambda _: None,
+        other_rows: Sequence[RowBuffer] = (),
         orders: PlantOrders | None = None,
         *,
         clock: Clock = SYSTEM_CLOCK,
@@ -65,6 +66,7 @@ class RealtimeLoop:
         """Buses on which something happens between two ticks."""
         self._poses = dict(zip(robots, poses, strict=True))
         self._rows = dict(zip(robots, rows, strict=True))
+        self._looks = RowLooks([*rows, *other_rows], brief.schedule.rows_within_ns)
         self._tick = -brief.schedule.countdown_ticks
         self._epoch_ns = 0
         self._next_report_ns = 0
@@ -86,8 +88,11 @@ class RealtimeLoop:
         while self._tick <= schedule.ticks and not stop.requested:
             due_ns = power_up_ns + schedule.bus_time_ns(self._tick)
             now_ns = self._clock.monotonic_ns()
+            if now_ns >= self._looks.next_ns:
+                self._looks.look(now_ns)
             if now_ns < due_ns:
-                self._serve((due_ns - now_ns) * 1e-9, power_up_ns)
+                left_s = (due_ns - now_ns) * 1e-9
+                self._serve(min(left_s, self._looks.every_s), power_up_ns)
                 continue
             self.counters.overruns += now_ns > due_ns + schedule.period_ns
             self.lateness.note(self._tick, (now_ns - due_ns) * 1e-9)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from bridge.frame import Frame
 from bridge.network.link import Publisher
 from bridge.network.messages import Rows
+from configs.brief import ROWS_WITHIN_NS
 from configs.signals import PLANT_SIGNALS, Signal
 
 
@@ -21,7 +22,9 @@ def row_of(signals: Sequence[Signal]) -> struct.Struct:
 PLANT_ROW = row_of(PLANT_SIGNALS)
 
 BLOCK_TICKS = 128
-"""Rows that are gathered before a block is sent."""
+"""Rows that are gathered before a block is sent, unless it is old before."""
+LOOKS = 4
+"""Looks at a block's age within the time in which it is handed on."""
 
 
 def put_rows(publisher: Publisher, first: int, count: int, block: bytes, final: bool) -> None:
@@ -33,15 +36,30 @@ class RowBuffer:
     """Gathers the rows of consecutive ticks and hands them on as blocks.
 
     `hand_on(first_tick, count, rows, final)` gets a block whenever `BLOCK_TICKS` rows are there,
-    and a last, perhaps empty one from `finish`.
+    or some have been there for a while, and a last, perhaps empty one from `finish`. Where rows
+    begin and end in blocks changes nothing in a record.
+
+    Args:
+        row: of the table of signals.
+        hand_on: called with each block.
+        within_ns: a block is handed on so long after its first row, if `look` is called `LOOKS`
+            times in that time.
     """
 
-    __slots__ = ("_block", "_count", "_first_tick", "_hand_on", "_pack_into", "_size")
+    __slots__ = (
+        *("_age_ns", "_block", "_count", "_first_tick", "_hand_on", "_pack_into", "_seen_ns"),
+        "_size",
+    )
 
     def __init__(
-        self, row: struct.Struct, hand_on: Callable[[int, int, bytes, bool], None]
+        self,
+        row: struct.Struct,
+        hand_on: Callable[[int, int, bytes, bool], None],
+        within_ns: int = ROWS_WITHIN_NS,
     ) -> None:
         self._hand_on = hand_on
+        self._age_ns = within_ns * (LOOKS - 1) // LOOKS
+        self._seen_ns: int | None = None  # since when there is a row
         self._pack_into = row.pack_into
         self._size = row.size
         self._block = bytearray(BLOCK_TICKS * row.size)
@@ -57,6 +75,14 @@ class RowBuffer:
         self._count = count = count + 1
         if count == BLOCK_TICKS:
             self._flush(final=False)
+
+    def look(self, now_ns: int) -> None:
+        """Hand on what has been there for so long, by a clock [ns]."""
+        if self._count:
+            if self._seen_ns is None:
+                self._seen_ns = now_ns
+            elif now_ns - self._seen_ns >= self._age_ns:
+                self._flush(final=False)
 
     def hand_on(self) -> None:
         """Hand on what is there."""
@@ -78,6 +104,32 @@ class RowBuffer:
         self._hand_on(self._first_tick, self._count, rows, final)
         self._first_tick += self._count
         self._count = 0
+        self._seen_ns = None
+
+
+class RowLooks:
+    """Looks at the ages of several buffers' blocks, `LOOKS` times within a time.
+
+    Args:
+        buffers: of rows.
+        within_ns: of these.
+    """
+
+    __slots__ = ("_buffers", "_every_ns", "every_s", "next_ns")
+
+    def __init__(self, buffers: Sequence[RowBuffer], within_ns: int) -> None:
+        self._buffers = buffers
+        self._every_ns = within_ns // LOOKS
+        self.every_s = self._every_ns * 1e-9
+        """Longest wait between two looks [s]."""
+        self.next_ns = 0
+        """Loops compare their clock with it."""
+
+    def look(self, now_ns: int) -> None:
+        """Look at all, and say when to look next."""
+        self.next_ns = now_ns + self._every_ns
+        for buffer in self._buffers:
+            buffer.look(now_ns)
 
 
 FRAME_ROW = struct.Struct("<qIBB2x8s")

@@ -90,7 +90,7 @@ def test_a_row_holds_what_was_used_and_commanded() -> None:
     bench.run(bench.schedule.countdown_ticks)
     bench.agent.receive_path_state("r1", PathState(0, 0, 0.0, 0.6))
     bench.tick()
-    bench.agent._rows.finish()
+    bench.agent.rows.finish()
     (row,) = (dict(zip(COLUMNS, values, strict=True)) for values in bench.rows)
     assert row["t_s"] == 0.0
     assert (row["x_used_m"], row["y_used_m"]) == (1.95, 0.05)

@@ -27,7 +27,7 @@ ABSURD = (FLT_MAX, -FLT_MAX, 1e30, -1e20, 1e-45, -0.0, 1e6)
 
 
 def rows_of(bench: Bench) -> list[dict[str, float]]:
-    bench.agent._rows.finish()
+    bench.agent.rows.finish()
     return [dict(zip(COLUMNS, values, strict=True)) for values in bench.rows]
 
 

@@ -223,7 +223,7 @@ def test_a_dry_run_computes_and_records_and_sends_nothing() -> None:
     assert all(frames == [] for frames in dry.run(20))
     assert dry.phase is Phase.DRIVING
     assert dry.closed() == [False, False]
-    wet.agent._rows.finish(), dry.agent._rows.finish()
+    wet.agent.rows.finish(), dry.agent.rows.finish()
     assert dry.rows[0] == wet.rows[0]
     assert "dry run: nothing was sent to the drives" in dry.agent.guard.remarks()
     assert list(dry.agent.shut_down()) == []

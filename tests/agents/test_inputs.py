@@ -54,7 +54,7 @@ class Logged:
         assert [sent for entry, sent in answers if entry.kind in ends] == self.frames
         assert [entry.sent() for entry in log if entry.kind in ends] == self.frames
         for bench in (self.bench, other):
-            bench.agent._rows.finish()
+            bench.agent.rows.finish()
         assert repr(other.rows) == repr(self.bench.rows)  # NaN included
         assert other.phase is self.bench.phase
         assert other.why == self.bench.why

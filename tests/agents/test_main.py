@@ -35,7 +35,7 @@ class Ending:
             subscriptions=None,
             path=publisher,
             hellos=Hellos(0.02),
-            rows=self.bench.agent._rows,
+            rows=self.bench.agent.rows,
             report=publisher,
         )
         self.stop = Stop()

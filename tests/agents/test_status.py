@@ -21,7 +21,7 @@ def test_errors_and_torques_are_those_of_the_row_of_the_tick() -> None:
     while bench.tick_now < 20:
         bench.tick()
     said = Narrator(bench.agent).progress(19)
-    bench.agent._rows.finish()
+    bench.agent.rows.finish()
     names = [signal.name for signal in bench.agent.brief.signals]
     row = dict(zip(names, bench.rows[19], strict=True))
     assert (said.tick, said.t_ns) == (19, 19 * bench.schedule.period_ns)

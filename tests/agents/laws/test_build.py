@@ -67,7 +67,7 @@ def test_a_signal_that_is_not_finite_is_told_once_and_recorded(
     assert driving.phase is Phase.DRIVING
     (said,) = (it for it in driving.agent.guard.events if it.kind == "law")
     assert said.text == f"law own_law:Own: recorded as not finite: odd = {told}"
-    driving.agent._rows.finish()
+    driving.agent.rows.finish()
     odd = [row[18] for row in driving.rows]  # behind 14 of the controller and (8), count
     assert odd[:5] == [0.0] * 5
     assert all(isnan(v) or v < 0.0 for v in odd[5:])

@@ -1,8 +1,10 @@
 """Rows and blocks of telemetry."""
 
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from support.controller_rows import SIGNALS
 
-from bridge.network.telemetry import BLOCK_TICKS, PLANT_ROW, RowBuffer
+from bridge.network.telemetry import BLOCK_TICKS, PLANT_ROW, RowBuffer, RowLooks
 from configs.signals import PLANT_SIGNALS
 
 
@@ -27,3 +29,41 @@ def test_blocks_are_consecutive_whole_and_end_with_a_final_one() -> None:
     rows = b"".join(block for _, _, block, _ in blocks)
     ticks = [row[0] for row in PLANT_ROW.iter_unpack(rows)]
     assert ticks == [float(k) for k in range(2 * BLOCK_TICKS + 3)]
+
+
+def handed_on(row_every_ns: int, within_ns: int, rows: int) -> list[tuple[int, int, int]]:
+    """When blocks are handed on, their first tick and length; rows and looks come evenly."""
+    blocks: list[tuple[int, int, int]] = []
+    now_ns = tick = 0
+    buffer = RowBuffer(
+        PLANT_ROW, lambda first, count, *_: blocks.append((now_ns, first, count)), within_ns
+    )
+    looks = RowLooks([buffer], within_ns)
+    while tick < rows:
+        now_ns = min(tick * row_every_ns, looks.next_ns)
+        if now_ns == looks.next_ns:
+            looks.look(now_ns)
+        else:
+            buffer.add(tick, [0.0] * len(PLANT_SIGNALS))
+            tick += 1
+    return blocks
+
+
+@given(row_every_ns=st.integers(200_000, 100_000_000))
+@settings(max_examples=20)
+def test_a_row_is_handed_on_within_a_time_and_no_row_is_lost(row_every_ns: int) -> None:
+    within_ns = 40_000_000
+    blocks = handed_on(row_every_ns, within_ns, 2 * BLOCK_TICKS)
+    expected = 0
+    for at_ns, first, count in blocks:
+        assert first == expected
+        assert at_ns - first * row_every_ns <= within_ns
+        expected += count
+    assert 2 * BLOCK_TICKS - expected < BLOCK_TICKS
+
+
+def test_blocks_that_fill_in_time_are_not_divided() -> None:
+    every_ns = 29_000_000 // BLOCK_TICKS
+    assert {count for _, _, count in handed_on(every_ns, 40_000_000, 4 * BLOCK_TICKS)} == {
+        BLOCK_TICKS
+    }

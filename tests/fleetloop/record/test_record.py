@@ -63,6 +63,12 @@ def test_the_file_does_not_depend_on_the_order_of_arrival(tmp_path: Path) -> Non
     assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
 
 
+def test_the_file_does_not_depend_on_where_blocks_begin_and_end(tmp_path: Path) -> None:
+    write(tmp_path / "a.mcap", 2000)
+    write(tmp_path / "b.mcap", 2000, block=17)
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
+
+
 def test_a_source_that_ends_early_holds_nobody_back(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     with RecordWriter(path, LAYOUT, "", PERIOD_NS) as writer:
