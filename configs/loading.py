@@ -4,9 +4,10 @@ A scenario is named by the path of a TOML file or by the name of a shipped one. 
 file come at once, a line each: file, key, value, remedy.
 """
 
+import copy
 import difflib
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -14,10 +15,12 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
+from configs.changes import overrides_of
 from configs.checks import cross_problems
 from configs.complaints import complaints, refusal, salvage
 from configs.errors import Complaint, Problem, ScenarioError
 from configs.graph_inclusion import included_graph
+from configs.origin import Origin
 from configs.overrides import Override
 from configs.parameters import as_tuples
 from configs.scenario import Scenario
@@ -71,6 +74,30 @@ def loads(
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{name}: not a TOML file: {error}") from error
+    return _of_data(name, data, overrides, folder, recorded=recorded)
+
+
+def changed(scenario: Scenario, changes: Mapping[str, object]) -> Scenario:
+    """A scenario with these changes of its file (`configs.changes`); checked as a file is.
+
+    Raises:
+        ScenarioError: all that is wrong with it, a line each.
+    """
+    origin = scenario.origin
+    if origin is None:  # not from a file: then with all defaults
+        origin = Origin(scenario.name, "", tomllib.loads(to_toml(scenario)))
+    data = copy.deepcopy(dict(origin.data))
+    return _of_data(origin.source, data, overrides_of(changes, data), origin.folder)
+
+
+def _of_data(
+    name: str,
+    data: dict[str, Any],
+    overrides: Sequence[str | Override],
+    folder: str,
+    *,
+    recorded: bool = False,
+) -> Scenario:
     found: list[Complaint] = []
     applied: list[Override] = []
     for override in overrides:
@@ -83,7 +110,8 @@ def loads(
     if (wrong := included_graph(data, Path(folder))) is not None:
         found.append(blamed(name, wrong, applied))
     context = {"folder": str(Path(folder).resolve()), "recorded": recorded}
-    return _check(name, data, applied, found, context)
+    scenario = _check(name, data, applied, found, context)
+    return scenario.originating(Origin(name, folder, data))
 
 
 def to_toml(scenario: Scenario) -> str:

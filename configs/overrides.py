@@ -15,7 +15,7 @@ class Override(NamedTuple):
 
     option: str  # as it was given, for messages: "--seed -3"
     key: str  # dotted; members of lists by name or number: "robot.r2.pose.x_m"
-    value: object
+    value: object  # None takes the key away
 
     @classmethod
     def from_set(cls, text: str) -> "Override | Complaint":
@@ -45,7 +45,7 @@ class Override(NamedTuple):
                 holder = holder.setdefault(part, {})
                 names.append(part)
             elif isinstance(holder, list):
-                at = _find(holder, part)
+                at = find(holder, part)
                 if at is None:
                     return self._complain(f"no {part!r} there; known: {', '.join(_names(holder))}")
                 names.append(_names(holder)[at])
@@ -54,11 +54,18 @@ class Override(NamedTuple):
                 return self._complain(f"{part} is in no table")
         if isinstance(holder, dict):
             holder[last] = self.value
-        elif isinstance(holder, list) and (at := _find(holder, last)) is not None:
-            holder[at] = self.value
-            last = _names(holder)[at]  # what is no table any more has lost its name
+            if self.value is None:
+                del holder[last]
+        elif isinstance(holder, list) and (at := find(holder, last)) is not None:
+            if self.value is None:
+                last = _names(holder)[at]
+                del holder[at]
+            else:
+                holder[at] = self.value
+                last = _names(holder)[at]  # what is no table any more has lost its name
         else:
-            return self._complain(f"{last} names nothing there")
+            known = f"; known: {', '.join(_names(holder))}" if isinstance(holder, list) else ""
+            return self._complain(f"{last} names nothing there{known}")
         return self._replace(key=".".join([*names, last]))
 
     def _complain(self, remedy: str) -> Complaint:
@@ -72,7 +79,8 @@ def _value(text: str) -> object:
         return text
 
 
-def _find(items: Sequence[Any], part: str) -> int | None:
+def find(items: Sequence[Any], part: str) -> int | None:
+    """The place of the member of a list that this name, or number, means."""
     for n, item in enumerate(items):
         if isinstance(item, dict) and item.get("name") == part:
             return n

@@ -4,12 +4,12 @@
 run is; a deployment defines where its processes and buses are.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
 from annotated_types import Len
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 
 from configs.choices import chosen_anew, shared_part
 from configs.drives import Drive
@@ -24,6 +24,7 @@ from configs.graph_section import GraphSection
 from configs.host import Host
 from configs.membership import Membership, attended
 from configs.netem import Effects
+from configs.origin import Origin
 from configs.parameters import Name, Seconds, Seed, changed
 from configs.paths import Cosine, PathShape
 from configs.plugins import Choice
@@ -94,9 +95,59 @@ class Scenario(BaseModel):
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with these sections instead of its own; what was made of the old ones goes."""
         copied = super().model_copy(update=update, deep=deep)
+        if update:
+            copied.originating(None)  # its file says something else
         for made in ("ages_vary", "members", "topology", "reach"):
             copied.__dict__.pop(made, None)
         return copied
+
+    _origin: Origin | None = PrivateAttr(None)
+
+    @property
+    def origin(self) -> Origin | None:
+        """The file that this was loaded from; None if it wasn't, or was changed since."""
+        return self._origin
+
+    def originating(self, origin: Origin | None) -> Self:
+        """This scenario, told where it is from."""
+        self._origin = origin
+        return self
+
+    def with_(
+        self, changes: Mapping[str, object] | None = None, /, **sections: object
+    ) -> "Scenario":
+        """A scenario that differs from this one, checked as its file is.
+
+            scenario.with_(control={"k1": 3.0}, until_s=5.0)
+            scenario.with_({"coordination.p": 3.0, "robot.r2.pose.x_m": -6.5})
+            scenario.with_(robot={"r2": {"pose": {"x_m": -6.5}}})
+
+        Args:
+            changes: keys of the file, dotted; members of lists by name or number.
+            sections: the same as keyword arguments. A table is changed key by key (one of another
+                `kind` replaces it), anything else is replaced, None takes a key away.
+
+        Raises:
+            ScenarioError: all that is wrong with it: key, value, what would be right.
+        """
+        from configs.loading import changed as changed_scenario
+
+        return changed_scenario(self, {**(changes or {}), **sections})
+
+    def to_toml(self) -> str:
+        """The text of a scenario file that says all of this, defaults too."""
+        from configs.loading import to_toml
+
+        return to_toml(self)
+
+    def __repr_args__(self) -> Iterable[tuple[str | None, object]]:
+        """What tells scenarios apart; all of it is in `to_toml`."""
+        yield None, self.name
+        yield "robots", len(self.robot)
+        yield "law", self.control.name
+        yield "until_s", self.ends_at_s
+        yield "clock", self.clock.mode
+        yield "seed", self.seed
 
     @property
     def ends_at_s(self) -> float:

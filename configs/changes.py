@@ -1,0 +1,72 @@
+"""Changes of a loaded scenario, from a program: what `--set` does, and then the same checks.
+
+control={"k1": 3.0}                     a table is changed key by key
+{"control.k1": 3.0}                     the same, dotted
+robot={"r2": {"pose": {"x_m": -6.5}}}   members of lists by name (or number)
+path={"kind": "circle", ...}            a table of another kind replaces the one that is there
+expect=[...]                            anything else replaces what is there
+until_s=None                            None takes a key, or a member of a list, away
+"""
+
+import copy
+from collections.abc import Iterator, Mapping
+from pathlib import PurePath
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic_core import to_jsonable_python
+
+from configs.overrides import Override, find
+from configs.parameters import Parameters
+
+KIND = "kind"
+
+
+def overrides_of(changes: Mapping[str, object], data: Mapping[str, Any]) -> list[Override]:
+    """Changes as overrides of the parsed file `data`, a key each."""
+    return [
+        one
+        for key, value in changes.items()
+        for one in _flat(key, value, _inside(data, key.split(".")))
+    ]
+
+
+def _flat(key: str, value: object, there: object) -> Iterator[Override]:
+    if isinstance(value, Mapping) and not _is_of_another_kind(value, there):
+        for name, inner in value.items():
+            yield from _flat(f"{key}.{name}", inner, _inside(there, [str(name)]))
+    else:
+        made = plain(value)
+        yield Override(f"{key} = {made!r}", key, made)
+
+
+def _is_of_another_kind(table: Mapping[str, object], there: object) -> bool:
+    kind = there.get(KIND) if isinstance(there, Mapping) else None
+    return kind is not None and table.get(KIND, kind) != kind
+
+
+def _inside(holder: object, path: list[str]) -> object:
+    """What is there, None if nothing is."""
+    for part in path:
+        if isinstance(holder, Mapping):
+            holder = holder.get(part)
+        elif isinstance(holder, list):
+            at = find(holder, part)
+            holder = None if at is None else holder[at]
+        else:
+            return None
+    return holder
+
+
+def plain(value: object) -> Any:
+    """A value as parsed TOML has it: a section's object as a table, numpy's numbers as Python's."""
+    if isinstance(value, Parameters | BaseModel):
+        return to_jsonable_python(value, by_alias=True, exclude_none=True)
+    if isinstance(value, Mapping):
+        return {str(key): plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(inner) for inner in value]
+    if isinstance(value, PurePath):
+        return str(value)
+    tolist = getattr(value, "tolist", None)  # numpy isn't imported for it
+    return tolist() if callable(tolist) else copy.deepcopy(value)
