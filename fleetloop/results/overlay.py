@@ -16,8 +16,9 @@ from configs.errors import ScenarioError
 from fleetloop.record.reader import Record
 from fleetloop.results import run_folder, tables
 from fleetloop.results.drawing import COLOURS
+from fleetloop.results.known import Known, known_of
 from fleetloop.results.overlay_figures import PANELS, overlay_figures, robots_of
-from fleetloop.results.report import PAGE, Known, figure_tag, known_of, write_figures
+from fleetloop.results.report import PAGE, figure_tag, write_figures
 from fleetloop.results.summary import Summary
 from fleetloop.results.tables import finding, mark, number, settled_at
 

@@ -15,7 +15,7 @@ from fleetloop.record.reader import Record
 from fleetloop.results.derived import spread
 from fleetloop.results.drawing import DPI, WIDTH_IN, drawable, envelope, legend, stride, style_of
 from fleetloop.results.figures import STYLE, Captioned
-from fleetloop.results.report import Known
+from fleetloop.results.known import Known
 
 PANELS = 4
 _WIDTH_IN = 1.5 * WIDTH_IN

@@ -10,16 +10,15 @@ from importlib import resources
 from io import BytesIO
 from pathlib import Path
 from string import Template
-from typing import Any, NamedTuple
+from typing import Any
 
-from configs.errors import InfrastructureError, ScenarioError
-from configs.loading import loads
+from configs.errors import InfrastructureError
 from configs.scenario import Scenario
 from fleetloop.record.reader import Record
 from fleetloop.results import run_folder
 from fleetloop.results.figures import Captioned, all_figures
-from fleetloop.results.summary import RunStats, Summary, summarise
-from fleetloop.results.summary_file import read_summary
+from fleetloop.results.known import known_of
+from fleetloop.results.summary import Summary
 from fleetloop.results.tables import (
     claim,
     final_line,
@@ -59,29 +58,6 @@ def write_report(run: Path, record: Record | None = None) -> Path:
     return page
 
 
-class Known(NamedTuple):
-    """What is known of a run."""
-
-    record: Record
-    scenario: Scenario
-    summary: Summary
-
-
-def known_of(record: Record) -> Known:
-    """What a page says of a run.
-
-    Raises:
-        ScenarioError: nothing is in its record, or its scenario can't be read.
-    """
-    path = record.path
-    if not any(len(rows) for rows in record.controller.values()):
-        raise ScenarioError(f"{path}: not one tick of a controller is in it, nothing to show")
-    scenario = loads(f"{path}: {run_folder.SCENARIO}", record.scenario_toml, recorded=True)
-    if scenario.names != record.robots:
-        raise ScenarioError(f"{path}: rows of {record.robots}, but a scenario of {scenario.names}")
-    return Known(record, scenario, _summary(path.parent, record, scenario))
-
-
 def write_figures(run: Path, figures: Iterable[Captioned]) -> list[tuple[Captioned, bytes]]:
     """Write figures into a run's folder of them; return each with its PNG file.
 
@@ -97,15 +73,6 @@ def write_figures(run: Path, figures: Iterable[Captioned]) -> list[tuple[Caption
     for item, data in drawn:
         run_folder.write(folder / f"{item.name}.png", data)
     return drawn
-
-
-def _summary(folder: Path, record: Record, scenario: Scenario) -> Summary:
-    summary = read_summary(folder)
-    if summary is None:
-        reason = f"the run left no {run_folder.SUMMARY}"
-        stats = RunStats("unknown", ended="aborted", reason=reason, events_known=False)
-        return summarise(record, scenario, stats)
-    return summary
 
 
 def png(item: Captioned) -> bytes:

@@ -156,6 +156,18 @@ def trouble_lines(summary: Summary) -> Iterator[str]:
     yield from machine_lines(summary)
 
 
+def wrong_lines(outcome: dict[str, Any]) -> list[str]:
+    """What is wrong with the outcome of a run: why there is no verdict, what did not hold, why."""
+    lines = []
+    if outcome["verdict"] not in ("held", "failed"):
+        lines.append(f"{outcome['verdict']}: {outcome['reason']}")
+    broken = [expect for expect in outcome["expectations"] if expect["held"] is not True]
+    lines += [f"{mark(expect):<11}  {claim(expect)}" for expect in broken]
+    if "stopped_robots" in outcome:
+        lines += trouble_lines(outcome)
+    return lines
+
+
 def machine_lines(summary: Summary) -> Iterator[str]:
     """Stalls of launcher and plant; empty without any, or without a watch."""
     machine = {"stalls": 0, **(summary["machine"] or {})}

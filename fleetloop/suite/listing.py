@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 from fleetloop.results.outcome import REFUSED, Outcome
-from fleetloop.results.tables import finding, label, mark, trouble_lines
+from fleetloop.results.tables import wrong_lines
 from fleetloop.terminal import say
 
 HELD, FAILED, ERROR, SKIPPED = "held", "failed", "error", "skipped"
@@ -73,13 +73,7 @@ class Listing:
 
 def account(source: str, outcome: Outcome, overrides: Sequence[str] = ()) -> list[str]:
     """What is wrong with a scenario's outcome, and the command that runs it again."""
-    lines = []
-    if outcome["verdict"] not in ("held", "failed"):
-        lines.append(f"{outcome['verdict']}: {outcome['reason']}")
-    broken = [expect for expect in outcome["expectations"] if expect["held"] is not True]
-    lines += [f"{mark(expect):<11}  {label(expect)}: {finding(expect)}" for expect in broken]
-    if "stopped_robots" in outcome:
-        lines += trouble_lines(outcome)
+    lines = wrong_lines(outcome)
     lines.append(f"again   {command(source, outcome, overrides)}")
     if outcome["folder"]:
         lines.append(f"run     {outcome['folder']}")
