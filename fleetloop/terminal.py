@@ -1,25 +1,31 @@
 """Output to the operator: results on standard output, progress and notes on standard error.
 
-On a terminal a progress bar with the real-time factor moves; elsewhere a plain line comes every few
-seconds, so that a CI log shows life and nothing else.
+On a terminal a progress bar with the real-time factor moves, and under it a row per robot; what
+happens is said above them. Elsewhere a plain line comes every few seconds, so that a CI log shows
+life and nothing else.
 """
 
 import json
 import sys
-from collections.abc import Callable
-from types import TracebackType
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Self
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.measure import Measurement
-from rich.progress import BarColumn, Progress, TaskID, TextColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn
 from rich.table import Table
 from rich.text import Text
 
 from bridge.process.clock import SYSTEM_CLOCK
+from fleetloop.robot_rows import rows
+from fleetloop.robot_states import RobotState
 from fleetloop.streams import forget_output, spelled_for
 
 PLAIN_EVERY_S = 5.0
+LOOK_EVERY_S = 0.2
+"""Shortest time between two pictures of a run."""
+LINES_ABOVE = 6
+"""Of a terminal, that the rows of robots leave for the bar and for what happens."""
 
 
 def say(text: str) -> None:
@@ -62,30 +68,57 @@ def note(text: str) -> None:
     sys.stderr.flush()
 
 
-class Bars:
-    """Bars on a terminal, elsewhere a line every few seconds; a context manager."""
+class _Region(Progress):
+    """Bars, and lines under them."""
 
-    def __init__(self, amount: str, *, quiet: bool) -> None:
-        console = Console(stderr=True)
-        # Without a thread of its own: it is shown a few times a second anyway.
-        self._bars = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=24),
-            TextColumn(amount),
+    below: Callable[[], RenderableType | None] = staticmethod(lambda: None)
+
+    def get_renderables(self) -> Iterable[RenderableType]:
+        """All of it, as it is now."""
+        yield self.make_tasks_table(self.tasks)
+        if (lines := self.below()) is not None:
+            yield lines
+
+
+class Bars:
+    """Bars on a terminal, elsewhere a line every few seconds; a context manager.
+
+    What is said on standard error meanwhile comes above the bars.
+    """
+
+    def __init__(self, *columns: str | ProgressColumn, quiet: bool, bar_width: int = 24) -> None:
+        self._console = console = Console(stderr=True)
+        # A terminal that can't move its cursor is told lines, as a log is.
+        self._moving = not quiet and console.is_terminal and not console.is_dumb_terminal
+        self._plain = not quiet and not self._moving
+        # Without a thread of its own: it is shown a few times a second anyway. Results on standard
+        # output are no part of it.
+        self._bars = _Region(
+            TextColumn("{task.description}", markup=False),
+            BarColumn(bar_width=bar_width),
+            *columns,
             console=console,
             transient=True,
             auto_refresh=False,
-            disable=quiet or not console.is_terminal,
+            redirect_stdout=False,
+            disable=not self._moving,
         )
-        self._plain = not quiet and not console.is_terminal
         self._next_line_s = 0.0
 
     def __enter__(self) -> Self:
         self._bars.start()
+        self._bars.refresh()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._bars.stop()
+
+    def notice(self, text: str) -> None:
+        """Say what has just happened, above the bars."""
+        if self._moving:
+            self._console.print(text, style="yellow", markup=False, highlight=False, soft_wrap=True)
+        else:
+            note(text)
 
     def _refresh(self, line: Callable[[], str]) -> None:
         """Show the bars, or the line if one is due."""
@@ -95,57 +128,52 @@ class Bars:
             note(line())
 
 
-class RunProgress:
-    """Shows how far a run is; a context manager."""
+class RunProgress(Bars):
+    """Shows how far a run is, and how its robots do.
+
+    Args:
+        name: of the scenario.
+        duration_s: scenario time at which it ends.
+        quiet: show nothing but notices.
+    """
 
     def __init__(self, name: str, duration_s: float, *, quiet: bool = False) -> None:
+        super().__init__(
+            TextColumn("{task.completed:6.2f} / {task.total:g} s"),
+            TextColumn("{task.fields[factor]}"),
+            quiet=quiet,
+        )
         self._name = name
         self._duration_s = duration_s
-        self._quiet = quiet
-        self._console = Console(stderr=True)
-        self._bar: Progress | None = None
-        self._task = TaskID(0)
-        self._next_line = 0.0
-
-    def __enter__(self) -> Self:
-        if self._console.is_terminal and not self._quiet:
-            self._bar = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                TextColumn("{task.completed:6.2f} / {task.total:g} s"),
-                TextColumn("{task.fields[factor]}"),
-                console=self._console,
-                transient=True,
-            )
-            self._bar.start()
-            self._task = self._bar.add_task(
-                f"{self._name}: starting", total=self._duration_s, factor=""
-            )
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-
-    def notice(self, text: str) -> None:
-        """Say what has just happened, above the bar."""
-        if self._bar is not None:
-            self._console.print(text, style="yellow", markup=False, highlight=False, soft_wrap=True)
-        else:
-            note(text)
+        self._task = self._bars.add_task(f"{name}: starting", total=duration_s, factor="")
+        self._next_look_s = 0.0
+        self.robots: Callable[[], Sequence[RobotState]] = lambda: ()
+        """Asked for what is to be seen of the robots."""
+        self._bars.below = self._rows
 
     def show(self, t_s: float, wall_s: float) -> None:
         """Say that scenario time `t_s` was reached after `wall_s` of running."""
-        factor = f"{t_s / wall_s:5.1f} × real time" if t_s > 0 and wall_s > 0 else ""
-        if self._bar is not None:
-            self._bar.update(
-                self._task, completed=max(t_s, 0.0), description=self._name, factor=factor
-            )
-        elif not self._quiet and t_s > 0 and (now := SYSTEM_CLOCK.monotonic_s()) >= self._next_line:
-            self._next_line = now + PLAIN_EVERY_S
-            note(f"{self._name}: {t_s:.2f} / {self._duration_s:g} s  {factor.strip()}")
+        if (now_s := SYSTEM_CLOCK.monotonic_s()) < self._next_look_s:
+            return
+        self._next_look_s = now_s + LOOK_EVERY_S
+        factor = f"{t_s / wall_s:5.1f} {self._spelled('×')} real time" if t_s > 0 < wall_s else ""
+        self._bars.update(
+            self._task, completed=max(t_s, 0.0), description=self._name, factor=factor
+        )
+        if t_s > 0 or self._moving:
+            words = f"{self._name}: {t_s:.2f} / {self._duration_s:g} s  {factor.strip()}"
+            self._refresh(lambda: words)
+
+    def _spelled(self, text: str) -> str:
+        return spelled_for(self._console.file, text)
+
+    def _rows(self) -> RenderableType | None:
+        width, height = self._console.size
+        lines = rows(self.robots(), width, height - LINES_ABOVE, self._spelled)
+        if not lines:
+            return None
+        whole = Text(no_wrap=True)
+        for text, style in lines:
+            whole.append(text + "\n", style)
+        whole.right_crop(1)
+        return whole

@@ -2,6 +2,8 @@
 
 from collections import Counter
 
+from rich.progress import TextColumn
+
 from bridge.process.clock import SYSTEM_CLOCK
 from fleetloop.campaign.branches import Baseline
 from fleetloop.campaign.verdicts import Result, Verdict
@@ -13,7 +15,7 @@ class Meter(Bars):
 
     def __init__(self, name: str, total: int, before: int, *, quiet: bool) -> None:
         amount = "{task.completed:.0f} / {task.total:.0f} cells{task.fields[pace]}"
-        super().__init__(amount, quiet=quiet)
+        super().__init__(TextColumn(amount), quiet=quiet)
         self._name, self._total, self._before, self._quiet = name, total, before, quiet
         self._done = before
         self._counts: Counter[Verdict] = Counter()

@@ -10,7 +10,7 @@ from configs.loading import to_toml
 from fleetloop.compare.measures import Course, Measures, courses, measures
 from fleetloop.compare.step_cost import Sample, StepCost, samples, step_costs
 from fleetloop.jobs.job import Tell, Told
-from fleetloop.launch.conduct import run_in_process
+from fleetloop.launch.conduct import Listener, run_in_process
 from fleetloop.record.reader import Record
 from fleetloop.results import run_folder
 from fleetloop.results.summary import Summary, summarise, to_json
@@ -50,7 +50,9 @@ class Trial:
 
         if not self.keep_record:
             scenario = scenario.model_copy(update={"bus": replace(scenario.bus, record=())})
-        stats = run_in_process(scenario, self.folder, on_progress, lambda *_: None, stop)
+        stats = run_in_process(
+            scenario, self.folder, Listener(on_progress, lambda _: None, lambda *_: None), stop
+        )
         path = self.folder / run_folder.RECORD
         record = Record.open(path)
         summary = summarise(record, scenario, stats)

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
+from rich.progress import TextColumn
+
 from bridge.network.messages import Progress
 from fleetloop.terminal import Bars
 
@@ -10,7 +12,7 @@ class RunBars(Bars):
     """A bar per run."""
 
     def __init__(self, labels: Sequence[str], ends_s: float, *, quiet: bool) -> None:
-        super().__init__("{task.completed:6.2f} / {task.total:g} s", quiet=quiet)
+        super().__init__(TextColumn("{task.completed:6.2f} / {task.total:g} s"), quiet=quiet)
         self._labels, self._ends_s = labels, ends_s
         self._tasks = [self._bars.add_task(label, total=ends_s) for label in labels]
 

@@ -5,7 +5,7 @@ carry_out   the run: its folder, its processes or none, its statistics
 conclude    its summary and events, from the record
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -36,6 +36,7 @@ from fleetloop.record.run_record import RunRecord
 from fleetloop.results import run_folder
 from fleetloop.results.expectations import out_of_reach
 from fleetloop.results.summary import RunStats, Summary, summarise, to_json
+from fleetloop.robot_states import RobotState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +52,17 @@ class Manner:
     """Run what `fleetloop check` calls an error."""
 
 
+class Start(NamedTuple):
+    """A run that begins."""
+
+    folder: Path
+    run: str
+    """Its name, by which its door and its buses are found; "" in process."""
+    processes: tuple[str, ...]  # besides the launcher
+    robots: Callable[[], Sequence[RobotState]]
+    """Gives what is to be seen of the robots."""
+
+
 class Listener(NamedTuple):
     """Told of a run while it goes on."""
 
@@ -58,6 +70,8 @@ class Listener(NamedTuple):
     on_event: Callable[[Event], None]
     on_notice: Callable[[str, str], None]
     """Of a process, in words."""
+    on_start: Callable[[Start], None] = lambda _: None
+    """Before everything else."""
 
 
 class Words(NamedTuple):
@@ -167,7 +181,7 @@ def carry_out(
     try:
         run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
         if manner.in_process:
-            stats = run_in_process(scenario, folder, listener.on_progress, listener.on_event, stop)
+            stats = run_in_process(scenario, folder, listener, stop)
         else:
             stats = _run_over_processes(scenario, folder, manner, deployment, listener, stop)
     except InfrastructureError:
@@ -187,9 +201,10 @@ def _run_over_processes(
     listener: Listener,
     stop: Stop,
 ) -> RunStats:
+    name = f"{folder.name}-{SYSTEM_CLOCK.monotonic_ns() % 1_000_000:06d}"
     run = ProcessRun(
         scenario,
-        run=f"{folder.name}-{SYSTEM_CLOCK.monotonic_ns() % 1_000_000:06d}",
+        run=name,
         record=folder / run_folder.RECORD,
         speed=manner.speed,
         profile=manner.profile,
@@ -198,6 +213,7 @@ def _run_over_processes(
         on_notice=listener.on_notice,
         deployment=deployment,
     )
+    listener.on_start(Start(folder, run.name, run.processes, run.robots))
     return stats_of(
         run.run(stop),
         realtime=scenario.clock.mode == "realtime",
@@ -208,8 +224,7 @@ def _run_over_processes(
 def run_in_process(
     scenario: Scenario,
     folder: Path,
-    on_progress: Callable[[Progress], None],
-    on_event: Callable[[Event], None],
+    listener: Listener,
     stop: Stop,
 ) -> RunStats:
     """Run all roles in this process and write the record into the run's folder.
@@ -241,9 +256,10 @@ def run_in_process(
                 [agent_brief(scenario, r, network=network, bus=()) for r in scenario.names],
                 leader_brief(scenario),
                 writer,
-                on_progress,
-                on_event,
+                listener.on_progress,
+                listener.on_event,
             )
+            listener.on_start(Start(folder, "", (), run.robots))
             startup_s = SYSTEM_CLOCK.monotonic_s() - began
             run.run(stop)
     except InfrastructureError as error:

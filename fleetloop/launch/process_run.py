@@ -125,6 +125,16 @@ class ProcessRun:
         self._links: dict[str, NetworkLink] = {}
 
     @property
+    def name(self) -> str:
+        """The name of the run, by which its door and its buses are found."""
+        return self._run
+
+    @property
+    def processes(self) -> tuple[str, ...]:
+        """All processes besides this one."""
+        return self._processes
+
+    @property
     def outcome(self) -> Outcome:
         """Outcome of the run so far."""
         return self._plane.outcome

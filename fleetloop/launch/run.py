@@ -16,6 +16,7 @@ from fleetloop.launch.conduct import (
     Concluded,
     Listener,
     Manner,
+    Start,
     carry_out,
     conclude,
     prepare,
@@ -61,6 +62,10 @@ class _Live(NamedTuple):
 
     progress: RunProgress
     period_ns: int
+
+    def on_start(self, start: Start) -> None:
+        """Know where the robots are seen."""
+        self.progress.robots = start.robots
 
     def on_progress(self, state: Progress) -> None:
         """Show how far it is."""
@@ -133,7 +138,7 @@ def _run(source: str, options: RunOptions, teller: _Teller) -> int:
         RunProgress(scenario.name, scenario.ends_at_s, quiet=options.as_json) as progress,
     ):
         live = _Live(progress, schedule(scenario).period_ns)
-        listener = Listener(live.on_progress, live.on_event, live.on_notice)
+        listener = Listener(live.on_progress, live.on_event, live.on_notice, live.on_start)
         carried = carry_out(scenario, options.out, manner, deployment, listener, stop)
     ended, reason = carried.stats.ended, carried.stats.reason
     if not carried.stats.began:
