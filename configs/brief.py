@@ -308,6 +308,18 @@ class LeaderBrief:
     speed_changes: tuple[SpeedChange, ...]  # v_r(t), in order of time
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ViewerBrief:
+    """Everything that the viewer receives at its start."""
+
+    scenario_toml: str
+    folder: str  # of the run: its record
+    door: str  # path of the socket on which the launcher answers requests
+    token: str  # of this viewer: part of its page's address, and what it shows at the door
+    start_deadline_s: float
+    network: NetworkLink
+
+
 @dataclass(frozen=True, slots=True)
 class RecorderBrief:
     """Everything that the recorder receives at its start."""

@@ -4,6 +4,7 @@
     plant         one                                    `fleetloop run` or `plant --join`
     agent         one per robot, agent/<robot>           `fleetloop run` or `fleetloop agent`
     recorder      one, on the launcher's machine         `fleetloop run`
+    viewer        one, on the launcher's machine         `fleetloop run`, when it is asked for
     localisation  one, if robots aren't emulated         the operator: a program of the robots' own
     launcher      one                                    the operator; its session is in the router
 
@@ -18,7 +19,7 @@ asked to stop (SIGTERM). The recorder is one, and ends by itself once it has wri
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from configs.brief import AgentBrief, PlantBrief, RecorderBrief
+from configs.brief import AgentBrief, PlantBrief, RecorderBrief, ViewerBrief
 
 
 class Topic(Enum):
@@ -41,6 +42,8 @@ class Topic(Enum):
     TRAFFIC = auto()
     GO = auto()
     ORDERS_OF_CONTROLLERS = auto()  # in lockstep, where the plant hands them on
+    PROGRESS = auto()  # of all processes of the run
+    NOTICES = auto()  # likewise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +62,8 @@ class Role:
     """Can't be placed on another machine."""
     observer: bool = False
     """Takes no part in the run: it is stopped once plant and controllers have ended."""
+    on_request: bool = False
+    """No part of the run's start: started when it is asked for. It puts nothing on the network."""
     takes_orders: bool = False
     """Carries out faults that are ordered during a run."""
     puts: tuple[Topic, ...] = ()
@@ -118,11 +123,21 @@ RECORDER = Role(
     observer=True,
     hears=(Topic.TRUTHS, Topic.TRAFFIC, Topic.TELEMETRIES, Topic.INPUTS),
 )
+VIEWER = Role(
+    name="viewer",
+    module="fleetloop.live",
+    brief=ViewerBrief,
+    beside_launcher=True,
+    observer=True,
+    on_request=True,
+    hears=(Topic.TRUTHS, Topic.TELEMETRIES, Topic.PROGRESS, Topic.NOTICES),
+)
 LOCALISATION = Role(name="localisation", puts=(Topic.MEASURED_POSES,), hears=(Topic.GO,))
 
-ROLES = (PLANT, AGENT, RECORDER, LOCALISATION, LAUNCHER)
+ROLES = (PLANT, AGENT, RECORDER, LOCALISATION, VIEWER, LAUNCHER)
 """In the order in which a run starts them."""
-STARTED = tuple(role for role in ROLES if role.module)
+STARTED = tuple(role for role in ROLES if role.module and not role.on_request)
+"""At its start."""
 
 
 def is_observer(process: str) -> bool:

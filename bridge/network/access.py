@@ -4,8 +4,9 @@ The graph *is* the network. The router refuses everything that isn't listed (def
 process is bound to its identity by a random password that it alone is given. The rights of a role
 are in its row of `configs.roles`: of an agent its own path, rows and inputs to put, and to hear the
 paths of exactly its in-neighbours, and that there are none, its own pose, and leader/speed iff
-h_i = 1. Every role that a run starts also puts progress, notices and its report. Faults are ordered
-by the launcher alone; in lockstep the plant hands orders on to controllers
+h_i = 1. Every role that a run starts also puts progress, notices and its report. The viewer hears
+rows, progress and notices of all, and puts nothing: what it asks, it asks at the run's door. Faults
+are ordered by the launcher alone; in lockstep the plant hands orders on to controllers
 (`bridge.network.fault_orders`). Besides the roles there are guests, clients of buses on other
 machines: they put their lines up and hear their lines down; which buses they may open is the
 relay's decision.
@@ -195,6 +196,9 @@ class _Graph(NamedTuple):
         run = self.run
         if topic is Topic.GO:
             return [keys.go(run)]
+        if topic in (Topic.PROGRESS, Topic.NOTICES):
+            key_of_process = keys.progress if topic is Topic.PROGRESS else keys.notice
+            return [key_of_process(run, process) for process in processes_of(tuple(self.robots))]
         if topic is Topic.LEADER_SPEED:
             return [keys.leader_speed(run)] if robot in self.leader else []
         if topic is Topic.ORDERS_OF_CONTROLLERS:
@@ -224,7 +228,7 @@ class _Graph(NamedTuple):
 def _rights(role: Role, robot: str, graph: _Graph) -> Rights:
     run, process = graph.run, role.process(robot)
     control: tuple[str, ...] = ()
-    if role.module:
+    if role.module and not role.on_request:
         control = keys.progress(run, process), keys.notice(run, process), keys.report(run, process)
     reports = tuple(keys.report(run, other) for other in role.watches)
     if role.takes_orders:
@@ -287,4 +291,4 @@ def _rules_of(user: str, rights: Rights) -> list[dict[str, object]]:
             rule("watches", ["declare_liveliness_subscriber"], "ingress", rights.watches),
             rule("sees", ["liveliness_token"], "egress", rights.watches),
         ]
-    return rules
+    return [one for one in rules if one["key_exprs"]]  # Zenoh takes none without

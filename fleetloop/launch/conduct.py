@@ -48,6 +48,8 @@ class Manner:
     """Multiple of real time to hold a lockstep run to; 0: as fast as the machine allows."""
     deployment: Path | None = None
     profile: bool = False
+    live: bool = False
+    """With a viewer from the start, whose address is told as a notice."""
     force: bool = False
     """Run what `fleetloop check` calls an error."""
 
@@ -212,6 +214,7 @@ def _run_over_processes(
         on_event=listener.on_event,
         on_notice=listener.on_notice,
         deployment=deployment,
+        live=manner.live,
     )
     listener.on_start(Start(folder, run.name, run.processes, run.robots))
     return stats_of(

@@ -14,6 +14,7 @@ failures, `fleetloop.launch.ending` ends the processes.
 
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 from bridge.can_bus import sockets
@@ -49,8 +50,9 @@ from fleetloop.launch.process_faults import ProcessFaults, returning
 from fleetloop.launch.remote_roles import RemoteRoles
 from fleetloop.launch.restarts import Restarts
 from fleetloop.launch.run_requests import run_requests
-from fleetloop.launch.spawn import Orders, respawn, spawn
+from fleetloop.launch.spawn import Orders, respawn, spawn, viewer_brief
 from fleetloop.launch.supervision import CONSEQUENCES_S, Supervision
+from fleetloop.launch.viewer import Viewer
 from fleetloop.robot_states import RobotBoard, buses_of
 
 GO_AHEAD_NS = 200_000_000
@@ -77,9 +79,11 @@ class ProcessRun:
         on_event: Callable[[Event], None] = lambda _: None,
         on_notice: Callable[[str, str], None] = lambda *_: None,
         deployment: Deployment | None = None,
+        live: bool = False,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         self._clock = clock
+        self._live = live
         self._scenario = scenario
         self._deployment = deployment or Deployment()
         self._orders = Orders.of(scenario, self._deployment, record, speed, profile=profile)
@@ -123,6 +127,12 @@ class ProcessRun:
         self._next_look_s = 0.0
         self._clocks = ClockGate(scenario, self._deployment, self._plane.clocks, self._now)
         self._links: dict[str, NetworkLink] = {}
+        self._viewer = Viewer(
+            lambda token: viewer_brief(self._orders, self._links, self._run, token),
+            self._schedule.start_deadline_s,
+            partial(on_notice, "live"),
+            self._now,
+        )
 
     @property
     def name(self) -> str:
@@ -189,6 +199,7 @@ class ProcessRun:
                 spawn(self._orders, self._links, folder, fork_server, self._plane.children)
             if granted := placement.bus_guests(self._deployment):
                 open_.enter_context(Relay(link, folder, scenario.buses, granted))
+            open_.enter_context(self._viewer)
             yield link
 
     @contextlib.contextmanager
@@ -257,7 +268,7 @@ class ProcessRun:
     def _watch(self, link: LauncherLink, stop: Stop) -> Failure | None:
         """Follow the run until the plant and all controllers have ended."""
         most, folder = self._scenario.host.restarts, sockets.folder_of(self._run)
-        requests = run_requests(self._run, self._orders, self._desk)
+        requests = run_requests(self._run, self._orders, self._desk, self._viewer)
         absent = absences(planned_faults(self._scenario), self._schedule.ticks)
         with (
             Restarts(
@@ -271,6 +282,8 @@ class ProcessRun:
             ) as restarts,
             Door(folder, requests) as door,
         ):
+            if self._live:
+                self._viewer.open()
             faults = ProcessFaults(self._plane, self._schedule, absent, restarts)
             return self._follow(link, stop, restarts, faults, door)
 
@@ -287,6 +300,7 @@ class ProcessRun:
             plane.receive(link, WATCH_EVERY_S)
             door.look()
             self._desk.look()
+            self._viewer.look()
             self._report_refusals(link)
             plane.clocks.ask(EVERY_S)
             supervision.name_the_frozen()

@@ -10,13 +10,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bridge.can_bus import sockets
-from configs.brief import AgentBrief, PlantBrief, RecorderBrief
+from configs.brief import AgentBrief, PlantBrief, RecorderBrief, ViewerBrief
 from configs.connections import NetworkLink
 from configs.deployment import Deployment
 from configs.loading import to_toml
 from configs.resolve import agent_brief, plant_brief, schedule, signals_of
-from configs.roles import AGENT, PLANT, RECORDER, STARTED
+from configs.roles import AGENT, PLANT, RECORDER, STARTED, VIEWER
 from configs.scenario import Scenario
+from fleetloop.door.server import NAME as DOOR
 from fleetloop.launch import placement
 from fleetloop.launch.child import Child
 from fleetloop.launch.fork_server import ForkServer
@@ -175,6 +176,21 @@ def _recorder(place: Place) -> RecorderBrief:
         ticks.bus_time_ns(ticks.ticks) + AFTERWARDS_NS,
         fills_gaps=_may_have_gaps(orders),
         logged_inputs=orders.scenario.records_inputs,
+    )
+
+
+def viewer_brief(orders: Orders, links: Links, run: str, token: str) -> ViewerBrief | None:
+    """The brief of the viewer; None if the router isn't the run's, and knows no viewer."""
+    network = links.get(VIEWER.identity())
+    if network is None:
+        return None
+    return ViewerBrief(
+        scenario_toml=to_toml(orders.scenario),
+        folder=str(orders.record.parent.absolute()),
+        door=str(sockets.folder_of(run) / DOOR),
+        token=token,
+        start_deadline_s=schedule(orders.scenario).start_deadline_s,
+        network=network,
     )
 
 

@@ -14,7 +14,7 @@ from bridge.network.zenoh_link import PolledLink, ZenohLink
 from configs.connections import NetworkLink
 from configs.errors import InfrastructureError
 from configs.loading import load
-from configs.roles import AGENT, LAUNCHER, LOCALISATION, PLANT
+from configs.roles import AGENT, LAUNCHER, LOCALISATION, PLANT, VIEWER, processes_of
 
 ROBOTS = ("r1", "r2", "r3", "r4")
 HEARS = {"r1": (), "r2": ("r1",), "r3": ("r2",), "r4": ("r2", "r3")}
@@ -206,6 +206,49 @@ def test_nobody_can_speak_under_another_robots_key(
                 own.put(b"honest")
                 honest = heard_by(router, 0.05)
             assert honest == {(f"report of {impostor}", b"honest")}
+
+
+@pytest.mark.system
+def test_a_viewer_hears_rows_progress_and_notices_and_can_put_nothing(
+    router: RouterLink, plan: access.AccessPlan
+) -> None:
+    processes = processes_of(ROBOTS)
+    hears = {of(RUN, robot) for of in (keys.truth, keys.telemetry) for robot in ROBOTS}
+    hears |= {of(RUN, process) for of in (keys.progress, keys.notice) for process in processes}
+    rights = plan.rights[VIEWER.identity()]
+    assert set(rights.hears) == hears
+    assert (rights.puts, rights.tokens) == ((), (keys.live(RUN, VIEWER.name),))
+    forged = [of(RUN, robot) for of in (keys.path, keys.pose, keys.truth) for robot in ROBOTS]
+    forged += [of(RUN, process) for of in (keys.order, keys.report) for process in processes]
+    forged += [keys.leader_speed(RUN), keys.go(RUN)]
+    heard: list[str] = []
+    for key in forged:
+        router.each(key, lambda payload: heard.append(payload.decode()))
+    router.each_live(keys.live(RUN, VIEWER.name), lambda *_: heard.append("there"))
+    with (
+        client(router, plan, VIEWER.identity()) as viewer,
+        client(router, plan, PLANT.identity()) as plant,
+        client(router, plan, AGENT.identity("r3")) as r3,
+    ):
+        for key in hears:
+            viewer.subscribe(key, key)
+        for key in forged:
+            viewer.publisher(key).put(b"forged")
+            viewer.publisher(key, steady=True).put(b"forged")
+        mouths = [(plant, keys.truth(RUN, "r1")), (plant, keys.progress(RUN, "plant"))]
+        mouths += [(r3, keys.telemetry(RUN, "r3")), (r3, keys.notice(RUN, "agent/r3"))]
+        said = {key: link.publisher(key) for link, key in mouths}
+        found: set[tuple[str, bytes]] = set()
+        deadline = time.monotonic() + 10.0
+        while len(found) < len(said) and time.monotonic() < deadline:
+            for publisher in said.values():
+                publisher.put(b"honest")
+            found |= heard_by(viewer, 0.05)
+        assert found == {(key, b"honest") for key in said}
+        viewer.declare_live(keys.live(RUN, VIEWER.name))
+        while "there" not in heard and time.monotonic() < deadline:
+            time.sleep(0.01)
+    assert set(heard) == {"there", "honest"}  # the plant's row, but nothing that was forged
 
 
 @pytest.mark.system

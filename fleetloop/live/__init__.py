@@ -1,0 +1,1 @@
+"""`fleetloop live`: a run as a page that moves, and its controls."""
