@@ -45,6 +45,7 @@ from bridge.process.lifecycle import (
 from bridge.process.profile import Sampler
 from configs.brief import AgentBrief
 from configs.errors import FleetloopError, InfrastructureError
+from configs.faults.absences import Absence
 from configs.roles import AGENT
 
 REALTIME_DEPTH = 64
@@ -214,7 +215,9 @@ class _Connections(NamedTuple):
             stop.await_release()
 
         loop.faults.hand_on, loop.faults.heard = self.hand_on, stop.await_heard
-        loop.faults.last_word = say_last
+        loop.faults.last_word, loop.faults.awake = say_last, self.rows.announce
+        if self.agent.brief.rejoins:
+            self.rows.announce()
         try:
             with sampler if self.agent.brief.schedule.profile else nullcontext():
                 body()
@@ -230,17 +233,20 @@ class _Connections(NamedTuple):
             say_last(failure, early)
         return early
 
-    def hand_on(self, returns: bool) -> None:
-        """Hand on all rows and inputs; unless a process of this robot returns, they end here."""
-        inputs, schedule = self.inputs, self.agent.brief.schedule
-        if returns:
-            self.rows.hand_on()
-        elif schedule.realtime or schedule.on_late != "abort":
-            self.rows.give_up(schedule.ticks)
-        else:
+    def hand_on(self, absence: Absence) -> None:
+        """Hand on all rows and inputs; unless this robot's controller returns, they may end here.
+
+        One that is frozen, and not replaced, has them all afterwards.
+        """
+        schedule, returns = self.agent.brief.schedule, absence.to_tick is not None
+        if not (schedule.realtime or schedule.on_late != "abort"):
             self.rows.finish()
-        if inputs is not None:
-            (inputs.hand_on if returns else inputs.finish)()
+        elif absence.frozen and returns and schedule.on_late != "drop":
+            self.rows.hand_on()
+        else:
+            self.rows.leave(schedule.ticks, final=not returns)
+        if self.inputs is not None:
+            (self.inputs.hand_on if returns else self.inputs.finish)()
 
     def stop_wheels(self) -> None:
         """Disarm the drives, as far as the bus still sends, after a loop that ended early."""

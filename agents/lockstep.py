@@ -154,7 +154,7 @@ class LockstepLoop:
                     self._await_messages(tick, stop)
                 heard_ns = self._clock.monotonic_ns()
                 if orders is not None and orders.waiting:
-                    take_orders(agent, orders, tick)
+                    take_orders(agent, faults, orders, tick)
                 self._send(agent.step(tick) if not stop.requested else agent.shut_down())
                 if tick >= subscriptions.next_change:
                     subscriptions.change(tick)
@@ -250,10 +250,11 @@ def did_not_start(agent: Agent) -> InfrastructureError:
     return InfrastructureError("; ".join(said))
 
 
-def take_orders(agent: Agent, orders: OrderInbox, tick: int) -> None:
-    """Have the agent carry out what has come, at this tick or later; answer it."""
+def take_orders(agent: Agent, faults: ProcessFaults, orders: OrderInbox, tick: int) -> None:
+    """Have the agent, or its process, carry out what has come, at this tick or later; answer it."""
     for order in orders.take():
-        orders.answer(order, agent.take_order(order, tick))
+        takes = faults.take if order.fault.PLACE == "process" else agent.take_order
+        orders.answer(order, takes(order, tick))
 
 
 def deliver(agent: Agent, arrival: Arrival) -> None:

@@ -198,7 +198,7 @@ class RealtimeLoop:
             agent.keep_time(now_ns - epoch_ns, late_s, self._round_trip_s)
             self._receive_messages()
             if self._orders is not None and self._orders.waiting:
-                take_orders(agent, self._orders, tick)
+                take_orders(agent, faults, self._orders, tick)
             frames = agent.step(tick) if not stop.requested else agent.shut_down()
             overdue = now_ns >= due_ns + period_ns and agent.phase is Phase.DRIVING
             if overdue:

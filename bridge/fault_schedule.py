@@ -50,10 +50,14 @@ class FaultSchedule:
         """The faults that act, in the order in which they began; instants are over at once."""
         return tuple(self._acting)
 
+    @property
+    def known(self) -> tuple[PlannedFault, ...]:
+        """The faults that act or wait."""
+        return (*self._acting, *self._waiting)
+
     def knows(self, name: str, target: str) -> bool:
         """Whether a fault of this name waits or acts on a target."""
-        known = (*self._waiting, *self._acting)
-        return any((one.name, one.target) == (name, target) for one in known)
+        return any((one.name, one.target) == (name, target) for one in self.known)
 
     def add(self, planned: PlannedFault) -> None:
         """Take a fault that was ordered; one whose tick has gone acts at the next."""

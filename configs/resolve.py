@@ -1,5 +1,6 @@
 """Scenario → briefs: what each process of a run receives at its start."""
 
+from collections.abc import Iterable
 from math import inf
 
 from configs import sections
@@ -111,7 +112,7 @@ def agent_brief(
         drives=_drive_link(scenario, robot, drive),
         host=_host_limits(scenario, ours=dict(bus).get("interface", OURS) == OURS),
         channels=channels(scenario, name),
-        faults=agent_faults(scenario, name),
+        faults=agent_faults(planned_faults(scenario), name),
         seed=scenario.seed,
         phase_ns=round(scenario.names.index(name) * ticks.period_ns / len(scenario.names)),
         bus=bus,
@@ -133,13 +134,9 @@ def channels(scenario: Scenario, name: str) -> tuple[ChannelModel, ...]:
     )
 
 
-def agent_faults(scenario: Scenario, name: str) -> tuple[PlannedFault, ...]:
-    """The faults of a robot's messages and of its process."""
-    return tuple(
-        one
-        for one in planned_faults(scenario)
-        if one.fault.PLACE != "plant" and hearer(one.target) == name
-    )
+def agent_faults(faults: Iterable[PlannedFault], name: str) -> tuple[PlannedFault, ...]:
+    """Those of a robot's messages and of its process."""
+    return tuple(one for one in faults if one.fault.PLACE != "plant" and hearer(one.target) == name)
 
 
 def signals_of(scenario: Scenario, robot: sections.Robot) -> tuple[Signal, ...]:

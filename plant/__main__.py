@@ -132,7 +132,8 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
     progress = link.publisher(keys.progress(name, PLANT.name))
     report = link.publisher(keys.report(name, PLANT.name))
     refusals = Refusals()
-    orders = _orders(brief, link, refusals)
+    inbox = OrderInbox(link, name, PLANT.name, refusals)
+    relays = _relays(brief, link)
     link.subscribe(keys.go(name), "go")
     for other in others:
         link.subscribe(keys.pose(name, other.robot), other.robot)
@@ -188,6 +189,7 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         by_name = {other.robot: other for other in others}
         own, of_others = rows[: len(emulated)], rows[len(emulated) :]
         record = partial(_record, link, by_name, of_others, brief.schedule.period_s)
+        orders = PlantOrders(brief.schedule, inbox, relays)
         loop = wall = RealtimeLoop(
             brief, emulated, end, hub, poses, own, say, taps, record, of_others, orders
         )
@@ -199,6 +201,7 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         _await_go(brief, link, hellos, stop)
         settle_memory()
         absent = AbsentControllers(brief, hub, silences, herald.note)
+        orders = PlantOrders(brief.schedule, inbox, relays, absent)
         loop = LockstepLoop(brief, emulated, hub, poses, rows, say, taps, absent, orders)
         counters, progress_of, body = loop.counters, loop.progress, loop.run
     narrator.meter = PlantMeter(loop.buses, emulated)
@@ -241,12 +244,12 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
     return counters
 
 
-def _orders(brief: PlantBrief, link: ZenohLink, refusals: Refusals) -> PlantOrders:
-    """The orders to this plant; in lockstep those to controllers come here as well."""
-    run = brief.network.run
+def _relays(brief: PlantBrief, link: Link) -> dict[str, Publisher]:
+    """By robot, where orders to controllers are handed on: in lockstep the plant has them all."""
     told = () if brief.schedule.realtime else [robot.robot for robot in brief.robots]
-    relays = {robot: link.publisher(keys.order(run, AGENT.process(robot))) for robot in told}
-    return PlantOrders(brief.schedule, OrderInbox(link, run, PLANT.name, refusals), relays)
+    return {
+        robot: link.publisher(keys.order(brief.network.run, AGENT.process(robot))) for robot in told
+    }
 
 
 def _silences(brief: PlantBrief, link: Link) -> dict[str, Publisher]:

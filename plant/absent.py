@@ -11,10 +11,11 @@ exactly one message, of the robot or of the plant, and none waits in vain. A con
 the path state of a tick before it answers the tick before: absent from tick k on, its last one is
 of tick k; there again with the answer to tick m, its first one is of tick m + 1.
 
-A controller that has to come again is waited for before its tick begins.
+A controller that has to come again is waited for before its tick begins. Absences are planned by
+the scenario, or by an order (`plant.orders`), which may also end one before its time.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum, auto
 
 from bridge.can_bus.hub import Hub
@@ -23,7 +24,7 @@ from bridge.network.messages import Silence
 from configs.brief import PlantBrief
 from configs.edges import FOREVER
 from configs.events import Event
-from configs.faults.absences import Absence
+from configs.faults.absences import Absence, overlapping
 
 _AT_ONCE = -FOREVER
 
@@ -64,14 +65,58 @@ class AbsentControllers:
         self._hub = hub
         self._silences = silences
         self._announce = announce
+        self._period_s = brief.schedule.period_s
         self._planned: dict[str, list[Absence]] = {}
-        for absence in brief.absences if self.allowed else ():
-            self._planned.setdefault(absence.robot, []).append(absence)
+        self.plan(brief.absences)
         self._states: dict[str, State] = {}
         self._wakes: dict[str, int] = {}
         """By robot whose controller is frozen as planned, the tick at which it is awake again."""
         self._returns: dict[str, int] = {}
         """By robot whose controller is started again as planned, the tick of that."""
+        self._causes: dict[str, str] = {}
+        """By robot, the fault of the planned absence that began last."""
+
+    # --- planned absences ------------------------------------------------------------------------
+
+    def problem(self, wanted: Sequence[Absence]) -> str | None:
+        """Why these can't be planned as well, None if they can."""
+        for one in wanted if self.allowed else ():
+            if one.robot in self._states:
+                return f"the controller of {one.robot} is absent"
+            overlap = overlapping((*self._planned.get(one.robot, ()), one))
+            if overlap is not None:
+                return overlap.problem(self._period_s)
+        return None
+
+    def plan(self, wanted: Iterable[Absence]) -> None:
+        """Plan these as well."""
+        for one in wanted if self.allowed else ():
+            planned = self._planned.setdefault(one.robot, [])
+            planned.append(one)
+            planned.sort(key=lambda it: it.from_tick)
+
+    def curtail(self, name: str, robots: Iterable[str], tick: int) -> bool:
+        """End the absences by a fault at a tick; whether there are any.
+
+        One that would begin at that tick or later is forgotten.
+        """
+        found = not self.allowed  # then the first one ends the run
+        for robot in robots:
+            planned = self._planned.get(robot, [])
+            of_fault = [one for one in planned if one.name == name]
+            self._planned[robot] = [
+                one.ended(tick) if one.name == name else one
+                for one in planned
+                if one.name != name or one.from_tick < tick
+            ]
+            found |= bool(of_fault)
+            for ends in (self._wakes, self._returns):
+                if self._causes.get(robot) == name and robot in ends:
+                    ends[robot] = min(ends[robot], tick)
+                    found = True
+        return found
+
+    # --- through the ticks -----------------------------------------------------------------------
 
     def any_of(self, robots: list[str]) -> bool:
         """Whether one of them is absent."""
@@ -138,6 +183,7 @@ class AbsentControllers:
         absence = planned.pop(0)
         if self._states.get(robot) in (State.DROPPED, State.BACK):  # nothing is there to be killed
             return
+        self._causes[robot] = absence.name
         until = FOREVER if absence.to_tick is None else absence.to_tick
         if absence.frozen and self._policy == "hold":
             self._wakes[robot] = until

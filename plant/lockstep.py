@@ -160,6 +160,8 @@ class LockstepLoop:
         if self._orders is not None and lanes:
             latest = max(lane.tick for lane in lanes)
             self._orders.take(self.buses.values(), latest + 1)
+            for lane in lanes:
+                self._look_at(lane)
 
     # --- one bus -------------------------------------------------------------------------------
 

@@ -2,16 +2,21 @@
 
 A controller waits for the pose of each tick at which the localisation system takes one. An order
 that is put before such a pose arrives before it; so the tick at which that pose is due is the first
-one at which all controllers have the order, however far they are now.
+one at which all controllers have the order, however far they are now. Faults of their processes act
+before a tick's messages are heard: they begin and end at the tick after that. The plant plans the
+absences that they make, and answers for all.
 """
 
 from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
+from bridge.fault_schedule import FaultSchedule
 from bridge.network.fault_orders import FaultOrder, targets_to
 from bridge.network.link import Publisher
 from configs.brief import Schedule
+from configs.faults.absences import absences
+from plant.absent import AbsentControllers
 from plant.bus.port import Bus
 
 
@@ -34,12 +39,20 @@ class PlantOrders:
         schedule: of the run.
         inbox: where they arrive.
         relays: to the controller of each robot; none in real time.
+        absent: the controllers that lockstep goes on without; None in real time.
     """
 
-    def __init__(self, schedule: Schedule, inbox: Inbox, relays: Mapping[str, Publisher]) -> None:
+    def __init__(
+        self,
+        schedule: Schedule,
+        inbox: Inbox,
+        relays: Mapping[str, Publisher],
+        absent: AbsentControllers | None = None,
+    ) -> None:
         self._schedule = schedule
         self._inbox = inbox
         self._relays = relays
+        self._absent = absent
         self.waiting = inbox.waiting
         """Orders that have come; loops look whether there are any."""
 
@@ -49,15 +62,27 @@ class PlantOrders:
             robot.brief.robot: bus.faults.schedule for bus in buses for robot in bus.robots
         }
         for order in self._inbox.take():
-            of_controllers = order.fault.PLACE == "agent"
-            first = self._first_heard(earliest) if of_controllers else earliest
+            first = earliest
+            if order.fault.PLACE != "plant":
+                first = self._first_heard(earliest) + (order.fault.PLACE == "process")
             tick = order.tick(first, self._schedule.ticks)
-            if isinstance(tick, str):
+            if isinstance(tick, int):
+                refusal = self._refusal(order, tick, schedules)
+                tick = refusal or tick
+            if isinstance(tick, str) or order.fault.PLACE != "agent":  # else these answer
                 self._inbox.answer(order, tick)
-            elif of_controllers:
-                self._hand_on(order, tick)
-            else:
-                self._inbox.answer(order, order.act(schedules, tick, self._schedule.period_s))
+
+    def _refusal(
+        self, order: FaultOrder, tick: int, schedules: Mapping[str, FaultSchedule]
+    ) -> str | None:
+        """Have an order act at a tick; why it can't, None if it does."""
+        if order.fault.PLACE == "plant":
+            acts = order.act(schedules, tick, self._schedule.period_s)
+            return acts if isinstance(acts, str) else None
+        refusal = self._unreached(order) or self._absences(order, tick)
+        if refusal is None:
+            self._hand_on(order, tick)
+        return refusal
 
     def _first_heard(self, earliest: int) -> int:
         """The tick at which the first pose is due that isn't taken yet."""
@@ -65,12 +90,30 @@ class PlantOrders:
         taken = -(-max(earliest, 0) // every) * every
         return taken + self._schedule.pose_delay_ticks
 
+    def _absences(self, order: FaultOrder, tick: int) -> str | None:
+        """Plan the absences by a fault, or their end; why that can't be."""
+        absent, period_s = self._absent, self._schedule.period_s
+        planned = [order.planned(target, tick, period_s) for target in order.targets]
+        wanted = absences(planned, self._schedule.ticks)
+        if absent is None or not wanted:
+            return None
+        if order.ends:
+            found = absent.curtail(order.name, order.targets, tick)
+            return None if found else "no controller is absent by it, or will be"
+        if (problem := absent.problem(wanted)) is not None:
+            return problem
+        absent.plan(wanted)
+        return None
+
+    def _unreached(self, order: FaultOrder) -> str | None:
+        """Why a target is out of reach, None if none is."""
+        heard = sum(len(targets_to(order.targets, robot)) for robot in self._relays)
+        if heard < len(order.targets):
+            return "not all of its robots are in this run, in lockstep"
+        return None
+
     def _hand_on(self, order: FaultOrder, tick: int) -> None:
-        heard = {robot: targets_to(order.targets, robot) for robot in self._relays}
-        if sum(map(len, heard.values())) < len(order.targets):
-            self._inbox.answer(order, "not all of its robots are in this run, in lockstep")
-            return
-        for robot, targets in heard.items():
-            if targets:
+        for robot, relay in self._relays.items():
+            if targets := targets_to(order.targets, robot):
                 told = order._replace(targets=targets, from_tick=tick, exact=True)
-                self._relays[robot].put(told.encode())
+                relay.put(told.encode())

@@ -93,11 +93,17 @@ class RowBuffer:
         """Hand on what is left and say that nothing follows."""
         self._flush(final=True)
 
-    def give_up(self, ticks: int) -> None:
-        """Hand on what is left and say that no row of the run's `ticks` follows."""
+    def leave(self, ticks: int, *, final: bool) -> None:
+        """Hand on what is left and say that the rows up to the run's `ticks` may not follow.
+
+        `final`: nobody waits for them; otherwise a process of the same robot will have more.
+        """
         self.hand_on()
-        self._first_tick = ticks
-        self._flush(final=True)
+        self._hand_on(ticks, 0, b"", final)
+
+    def announce(self) -> None:
+        """Say that rows follow, after a process of the same robot has left."""
+        self._hand_on(self._first_tick, 0, b"", False)
 
     def _flush(self, *, final: bool) -> None:
         rows = bytes(memoryview(self._block)[: self._count * self._size])

@@ -1,4 +1,4 @@
-"""The ticks at which the process of a controller is absent by faults of the scenario.
+"""The ticks at which the process of a controller is absent by faults.
 
 The plant, which in lockstep waits for no absent controller, and the launcher, which wakes processes
 and starts them again, go by the same list.
@@ -15,11 +15,18 @@ from configs.faults.processes import ProcessRestart, ProcessStopped
 class Absence(NamedTuple):
     """The process of one robot's controller doesn't act at these ticks."""
 
+    name: str  # of the fault
     robot: str
     from_tick: int
     to_tick: int | None  # the first tick at which it acts again; None: there is none
     frozen: bool
     """Whether the process is there; otherwise it is killed."""
+
+    def ended(self, tick: int) -> "Absence":
+        """The same, ended at a tick if not before; it lasts for a tick at least."""
+        if self.to_tick is not None and self.to_tick <= tick:
+            return self
+        return self._replace(to_tick=max(tick, self.from_tick + 1))
 
 
 def absences(planned: Iterable[PlannedFault], ticks: int = FOREVER) -> tuple[Absence, ...]:
@@ -30,10 +37,11 @@ def absences(planned: Iterable[PlannedFault], ticks: int = FOREVER) -> tuple[Abs
         next_tick = one.from_tick + 1
         match one.fault:
             case ProcessRestart():
-                found.append(Absence(one.target, one.from_tick, next_tick, False))
+                found.append(Absence(one.name, one.target, one.from_tick, next_tick, False))
             case ProcessStopped(kind=kind):
                 until = None if one.to_tick is None else max(one.to_tick, next_tick)
-                found.append(Absence(one.target, one.from_tick, until, kind == "process_freeze"))
+                frozen = kind == "process_freeze"
+                found.append(Absence(one.name, one.target, one.from_tick, until, frozen))
     found = [
         one if one.to_tick is None or one.to_tick < ticks else one._replace(to_tick=None)
         for one in found
@@ -41,12 +49,25 @@ def absences(planned: Iterable[PlannedFault], ticks: int = FOREVER) -> tuple[Abs
     return tuple(sorted(found, key=lambda it: (it.from_tick, it.robot)))
 
 
-def overlapping(absent: Iterable[Absence]) -> tuple[Absence, Absence] | None:
-    """Two absences of one robot at the same time, the earlier first; None if there are none."""
+class Overlap(NamedTuple):
+    """Two absences of one robot at the same time."""
+
+    before: Absence
+    after: Absence
+
+    def problem(self, period_s: float) -> str:
+        """Why the later one can't be."""
+        since_s = round(self.before.from_tick * period_s, 9)
+        remedy = f"of {self.after.robot} is absent from {since_s:g} s on"
+        return f"the process {remedy}, and can't be killed or frozen then"
+
+
+def overlapping(absent: Iterable[Absence]) -> Overlap | None:
+    """Two absences of one robot at the same time; None if there are none."""
     newest: dict[str, Absence] = {}
-    for one in absent:
+    for one in sorted(absent, key=lambda it: it.from_tick):
         before = newest.get(one.robot)
         if before is not None and (before.to_tick is None or one.from_tick < before.to_tick):
-            return before, one
+            return Overlap(before, one)
         newest[one.robot] = one
     return None

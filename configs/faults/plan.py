@@ -120,11 +120,10 @@ def fault_problems(scenario: "Scenario", *, sound_edges: bool) -> Iterator[Probl
         yield from problems_of(fault, f"fault.{n}", scenario, sound_edges=sound_edges)
     of_processes = (one for one in scenario.fault if one.PLACE == "process")
     stopped = absences(one for fault in of_processes for one in plan(fault, "", scenario))
-    if pair := overlapping(stopped):
+    if (overlap := overlapping(stopped)) is not None:
         period_s = scenario.clock.control_period_s
-        before, after = (one.from_tick * period_s for one in pair)
-        remedy = f"of {pair[0].robot} is absent from {before:g} s on, and can't be killed or frozen"
-        yield Problem("fault.at_s", after, f"the process {remedy} then")
+        at_s = overlap.after.from_tick * period_s
+        yield Problem("fault.at_s", at_s, overlap.problem(period_s))
 
 
 def problems_of(
@@ -147,12 +146,12 @@ def problems_of(
         period_s = scenario.clock.control_period_s
         remedy = f"no tick from {fault.at_s:g} s on for so long: they are {period_s:g} s apart"
         yield Problem(f"{where}.for_s", fault.for_s, remedy)
-    if reason := _missing_model(fault, scenario) or _no_return(fault, scenario):
+    if reason := _missing_model(fault, scenario) or no_return(fault, scenario):
         yield Problem(f"{where}.kind", fault.kind, reason)
     yield from sense_problems(fault, where, scenario)
 
 
-def _no_return(fault: Fault, scenario: "Scenario") -> str | None:
+def no_return(fault: Fault, scenario: "Scenario") -> str | None:
     """Why a process that is to be there again can't be, and what lets it."""
     stays_away = isinstance(fault, ProcessStopped) and fault.for_s is None
     if not isinstance(fault, ProcessStopped | ProcessRestart) or stays_away:

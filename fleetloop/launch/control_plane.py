@@ -103,6 +103,11 @@ class ControlPlane:
         """The process of that name on this machine, None if it is on another."""
         return next((child for child in self.children if child.name == process), None)
 
+    @property
+    def absent(self) -> set[str]:
+        """Controllers that are killed, frozen, late or dropped."""
+        return self.held | self.let_go | self.struck.keys()
+
     def lost_controllers(self) -> set[str]:
         """Controllers that are gone without having said so: their last rows will not come."""
         return (self.let_go | self.held) - self.struck.keys()

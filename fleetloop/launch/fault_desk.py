@@ -7,7 +7,9 @@
     fault.clear    names ([]: all)    cleared: those that end, with the tick at which they do
 
 An order without `at_s` begins as soon as it can, and is answered once the run has reached that
-tick. One that can't be carried out is refused with the reason.
+tick. One that can't be carried out is refused with the reason. A controller that a fault has killed
+or frozen can't take an order: in real time the launcher itself ends that fault, in lockstep the
+plant answers for all controllers.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -20,10 +22,12 @@ from bridge.network.fault_orders import FaultAnswer, FaultOrder, targets_to
 from bridge.network.link import Link, Publisher
 from configs.brief import Schedule
 from configs.errors import ScenarioError
+from configs.faults.absences import Absence
 from configs.faults.base import Fault
 from configs.faults.ordered import ordered_fault
-from configs.faults.plan import fresh_name, plan
-from configs.roles import AGENT, PLANT, takes_orders
+from configs.faults.plan import fresh_name, no_return, plan
+from configs.faults.processes import ProcessStopped
+from configs.roles import AGENT, LAUNCHER, PLANT, takes_orders
 from configs.scenario import Scenario
 from fleetloop.door.requests import Request, Respond
 from fleetloop.launch.fault_ledger import Entry, FaultLedger
@@ -63,6 +67,7 @@ class FaultDesk:
         scenario: of the run.
         schedule: of the run.
         fault_problem: why a fault can't act on a robot where the deployment places it.
+        is_absent: whether a process is killed, frozen or dropped.
         tick: how far the run is.
         now_s: seconds on the launcher's clock of awake time.
     """
@@ -72,6 +77,7 @@ class FaultDesk:
         scenario: Scenario,
         schedule: Schedule,
         fault_problem: Callable[[Fault, str], str | None],
+        is_absent: Callable[[str], bool],
         tick: Callable[[], int],
         now_s: Callable[[], float],
     ) -> None:
@@ -79,12 +85,15 @@ class FaultDesk:
         self._scenario = scenario
         self._schedule = schedule
         self._fault_problem = fault_problem
+        self._is_absent = is_absent
         self._tick = tick
         self._clock_s = now_s
         self._publishers: dict[str, Publisher] = {}
         self._pending: dict[int, _Pending] = {}
         self._reached: list[tuple[int, float, Callable[[], None]]] = []
         self._number = 0
+        self.on_absences: Callable[[Iterable[Absence]], None] = lambda _: None
+        """Called with the absences of controllers by all faults when these change."""
         self.requests: Mapping[str, Request] = {
             "fault.list": Request({}, self._list),
             "fault.inject": Request({"fault": dict}, self._inject),
@@ -165,7 +174,7 @@ class FaultDesk:
         planned = plan(ordered, name, self._scenario)
         first, last = planned[0].from_tick, planned[0].to_tick
         entry = Entry(name, ordered, tuple(one.target for one in planned), first, last, True)
-        self._refuse_absent(ordered, entry.targets)
+        self._refuse_unreachable(ordered, entry.targets)
 
         def done(pending: _Pending) -> None:
             if pending.ticks:
@@ -183,6 +192,8 @@ class FaultDesk:
             raise ScenarioError("names must be texts")
         entries = self.ledger.to_end(names, self._tick())
         left, refused = [*entries], []
+        for entry in entries:
+            self._refuse_return(entry)
         if not entries:
             respond({"cleared": []})
 
@@ -190,6 +201,7 @@ class FaultDesk:
             left.remove(pending.entry)
             if pending.ticks:
                 self.ledger.end(pending.entry, pending.tick)
+                self._follow(pending.entry.fault)
             if pending.refusals:
                 refused.append(_refused(pending))
             if left:
@@ -212,30 +224,38 @@ class FaultDesk:
     ) -> None:
         """Order a fault, or its end, of the processes that it concerns."""
         self._number += 1
-        fault, ticks = entry.fault, None
+        fault, lasts = entry.fault, None
         if not ends and entry.to_tick is not None:
-            ticks = entry.to_tick - entry.from_tick
+            lasts = entry.to_tick - entry.from_tick
         from_tick = entry.from_tick if exact else self._soonest()
         order = FaultOrder(
-            self._number, ends, entry.name, entry.targets, fault, from_tick, ticks, exact
+            self._number, ends, entry.name, entry.targets, fault, from_tick, lasts, exact
         )
-        told = self._receivers(fault, entry.targets)
-        awaited = set(told)
-        if fault.PLACE == "agent" and not self._schedule.realtime:
-            awaited, told = set(told), {PLANT.name: entry.targets}
+        told, awaited = self._receivers(fault, entry.targets)
+        ticks: dict[str, int] = {}
+        if ends and self._schedule.realtime and _has_stopped(entry, from_tick):
+            awaited = set()
+            ticks[LAUNCHER.name] = max(from_tick, entry.from_tick + 1)
         limit_s = ANSWER_S + self._schedule.tick_deadline_s
         self._pending[self._number] = _Pending(
-            entry, ends, awaited, self._clock_s() + limit_s, done, not exact
+            entry, ends, awaited, self._clock_s() + limit_s, done, not exact, ticks
         )
         for process, targets in told.items():
             self._publishers[process].put(order._replace(targets=targets).encode())
+        if not awaited:
+            self._complete(self._number)
 
-    def _receivers(self, fault: Fault, targets: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
-        """The processes that carry a fault out, and its targets at each."""
+    def _receivers(
+        self, fault: Fault, targets: tuple[str, ...]
+    ) -> tuple[dict[str, tuple[str, ...]], set[str]]:
+        """The processes that are told of a fault, with its targets at each; those that answer."""
         if fault.PLACE == "plant":
-            return {PLANT.name: targets}
+            return {PLANT.name: targets}, {PLANT.name}
         heard = {name: targets_to(targets, name) for name in self._scenario.names}
-        return {AGENT.process(name): those for name, those in heard.items() if those}
+        told = {AGENT.process(name): those for name, those in heard.items() if those}
+        if self._schedule.realtime:
+            return told, set(told)
+        return {PLANT.name: targets}, {PLANT.name} if fault.PLACE == "process" else set(told)
 
     def _soonest(self) -> int:
         """A tick that no process has computed when the order arrives; in lockstep it chooses."""
@@ -243,19 +263,33 @@ class FaultDesk:
             return 0
         return self._tick() + ceil(AHEAD_S / self._schedule.period_s)
 
-    def _refuse_absent(self, fault: Fault, targets: tuple[str, ...]) -> None:
+    def _refuse_unreachable(self, fault: Fault, targets: tuple[str, ...]) -> None:
         """Refuse what no process of this run can carry out.
 
         Raises:
             ScenarioError: the text says why.
         """
-        if fault.PLACE == "process":
-            raise ScenarioError(
-                f"{fault.kind}: can't be ordered during a run: list it in [[fault]]"
-            )
         for target in targets:
             if (problem := self._fault_problem(fault, target)) is not None:
                 raise ScenarioError(f"{target}: {problem}")
+            if fault.PLACE == "process" and self._is_absent(AGENT.process(target)):
+                raise ScenarioError(f"{target}: its controller is absent: {fault.kind} can't act")
+
+    def _refuse_return(self, entry: Entry) -> None:
+        """Refuse to end an absence where the controller couldn't be there again.
+
+        Raises:
+            ScenarioError: the text says why.
+        """
+        if _has_stopped(entry, self._tick()):
+            problem = no_return(replace(entry.fault, for_s=1.0), self._scenario)
+            if problem is not None:
+                raise ScenarioError(f"{entry.name}: {problem}")
+
+    def _follow(self, fault: Fault) -> None:
+        """Tell of a fault that began, or ended, who follows the absences of controllers."""
+        if fault.PLACE == "process":
+            self.on_absences(self.ledger.absences(self._schedule.ticks))
 
     def _complete(self, number: int) -> None:
         pending = self._pending.pop(number)
@@ -270,6 +304,7 @@ class FaultDesk:
         entry.ticks = {it: at for it, at in pending.ticks.items() if at != tick}
         entry.fault = replace(entry.fault, name=entry.name, at_s=self._seconds(tick))
         self.ledger.add(entry)
+        self._follow(entry.fault)
 
     def _when_reached(self, pending: _Pending, respond: Callable[[], None]) -> None:
         """Answer once the run has reached a tick; what was ordered for a later one at once."""
@@ -278,6 +313,11 @@ class FaultDesk:
 
     def _seconds(self, tick: int) -> float:
         return round(tick * self._schedule.period_s, 9)
+
+
+def _has_stopped(entry: Entry, tick: int) -> bool:
+    """Whether controllers are killed or frozen by a fault at a tick."""
+    return isinstance(entry.fault, ProcessStopped) and entry.from_tick <= tick
 
 
 def _refused(pending: _Pending) -> str:

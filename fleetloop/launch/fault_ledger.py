@@ -5,8 +5,10 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from configs.errors import ScenarioError
-from configs.faults.base import Fault
+from configs.faults.absences import Absence, absences
+from configs.faults.base import Fault, PlannedFault
 from configs.faults.plan import planned_faults, targets_of
+from configs.roles import AGENT
 from configs.scenario import Scenario
 
 
@@ -25,6 +27,11 @@ class Entry:
     """It was ended before its time."""
     ticks: dict[str, int] = field(default_factory=dict)
     """When it began, by process, where one was late (in real time)."""
+
+    @property
+    def never_acted(self) -> bool:
+        """Whether it was ended before it began."""
+        return self.to_tick is not None and self.to_tick <= self.from_tick
 
     def state(self, tick: int) -> str:
         """planned, acting or over at a tick; cleared if it was ended before its time."""
@@ -93,6 +100,20 @@ class FaultLedger:
         ordered = [one for one in entries if one.ordered and one.state(tick) in going]
         return ordered + [one for one in entries if one.cleared and not one.ordered]
 
+    def planned(self) -> list[PlannedFault]:
+        """All faults as they were, or are to be, on each of their targets."""
+        return [
+            PlannedFault(one.name, target, one.fault, first, one.to_tick)
+            for one in self._entries.values()
+            if not one.never_acted
+            for target in one.targets
+            for first in [one.ticks.get(AGENT.process(target), one.from_tick)]
+        ]
+
+    def absences(self, ticks: int) -> tuple[Absence, ...]:
+        """The absences of controllers by all faults, in a run of so many ticks."""
+        return absences(self.planned(), ticks)
+
     def rows(self, tick: int) -> list[dict[str, Any]]:
         """All faults as they are at a tick, for people and programs."""
         return [self.row(one, tick) for one in self._entries.values()]
@@ -120,7 +141,7 @@ class FaultLedger:
 
     def _table(self, entry: Entry) -> dict[str, Any]:
         """The table of [[fault]] that repeats a fault as it was; empty: it never acted."""
-        if entry.to_tick is not None and entry.to_tick <= entry.from_tick:
+        if entry.never_acted:
             return {}
         for_s = None if entry.to_tick is None else self._seconds(entry.to_tick - entry.from_tick)
         fault = replace(

@@ -1,5 +1,7 @@
 """Faults of processes as the launcher sees them: ends that are planned, and what comes after.
 
+They are the scenario's, or ordered (`fleetloop.launch.fault_desk`).
+
     killed by its own fault    an event, no failure of the run; started again if the scenario has
                                it, in real time when the plant is that far, in lockstep when the
                                plant waits for it
@@ -10,7 +12,7 @@
 The processes kill and freeze themselves, at their ticks (`agents.process_faults`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 from bridge.network.link import Link, waiting
 from configs.brief import Schedule
@@ -22,36 +24,32 @@ from fleetloop.launch.machine import WATCH_EVERY_S
 from fleetloop.launch.restarts import Restarts
 
 
-def returning(absent: Sequence[Absence], schedule: Schedule) -> int:
-    """How many of these are ended by a new process."""
-    replaces_frozen = schedule.on_late == "drop"
-    return sum(one.to_tick is not None and (replaces_frozen or not one.frozen) for one in absent)
-
-
 class ProcessFaults:
     """Follows the planned absences of one run.
 
     Args:
         plane: of the run; children that are gone for good are removed.
         schedule: of the run.
-        absent: by the scenario.
         restarts: starts controllers again.
     """
 
-    def __init__(
-        self,
-        plane: ControlPlane,
-        schedule: Schedule,
-        absent: Sequence[Absence],
-        restarts: Restarts,
-    ) -> None:
+    def __init__(self, plane: ControlPlane, schedule: Schedule, restarts: Restarts) -> None:
         self._plane = plane
         self._schedule = schedule
         self._restarts = restarts
         self._stays = schedule.realtime or schedule.on_late == "hold"  # a frozen process
+        self._over: set[tuple[str, str]] = set()  # faults, and robots on which they are over
+        self._ends: list[Absence] = []
+        self._asleep: list[Absence] = []
+        self._killed: list[Absence] = []
+
+    def follow(self, absent: Iterable[Absence]) -> None:
+        """Go by these absences from now on, which are all of the run as far as it is known."""
         ends = [one for one in absent if one.to_tick is not None]
-        self._asleep = [one for one in ends if one.frozen and self._stays]
-        self._killed = [one for one in ends if not one.frozen and schedule.realtime]
+        self._ends = [one for one in ends if (one.name, one.robot) not in self._over]
+        self._asleep = [one for one in self._ends if one.frozen and self._stays]
+        self._killed = [one for one in self._ends if not one.frozen and self._schedule.realtime]
+        self._restarts.plan(sum(not (one.frozen and self._stays) for one in self._ends))
 
     def look(self, link: Link) -> None:
         """Wake and start what is due.
@@ -65,6 +63,7 @@ class ProcessFaults:
             # It may not have come to its own fault yet.
             if child is None or child.ended() or child.wake():
                 self._asleep.remove(absence)
+                self._over.add((absence.name, absence.robot))
                 if self._schedule.realtime:  # in lockstep the plant says when it answers
                     self._plane.held.discard(AGENT.process(absence.robot))
                     self._plane.struck.pop(AGENT.process(absence.robot), None)
@@ -124,5 +123,7 @@ class ProcessFaults:
         plane.let_go.discard(process)
         plane.held.discard(process)
         plane.struck.pop(process, None)
+        begun = [one for one in self._ends if one.robot == robot and one.from_tick < tick]
+        self._over.update((one.name, one.robot) for one in begun)
         plane.note(process, "restarted", "after a fault", tick)
         self._restarts.start_again(robot, link, tick)

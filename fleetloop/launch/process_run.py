@@ -29,8 +29,6 @@ from configs.connections import LEASE_S, LOCAL_LEASE_S, NetworkLink
 from configs.deployment import Deployment
 from configs.errors import InfrastructureError
 from configs.events import Event
-from configs.faults.absences import absences
-from configs.faults.plan import planned_faults
 from configs.resolve import leader_brief, schedule
 from configs.roles import LAUNCHER, PLANT, identity_of, processes_of
 from configs.scenario import Scenario
@@ -46,7 +44,7 @@ from fleetloop.launch.fault_desk import FaultDesk
 from fleetloop.launch.fork_server import ForkServer
 from fleetloop.launch.machine import WATCH_EVERY_S, MachineWatch
 from fleetloop.launch.outcome import Outcome
-from fleetloop.launch.process_faults import ProcessFaults, returning
+from fleetloop.launch.process_faults import ProcessFaults
 from fleetloop.launch.remote_roles import RemoteRoles
 from fleetloop.launch.restarts import Restarts
 from fleetloop.launch.run_requests import run_requests
@@ -119,6 +117,7 @@ class ProcessRun:
             scenario,
             self._schedule,
             self._deployment.fault_problem,
+            lambda process: process in self._plane.absent,
             lambda: self.outcome.ticks,
             self._now,
         )
@@ -269,14 +268,12 @@ class ProcessRun:
         """Follow the run until the plant and all controllers have ended."""
         most, folder = self._scenario.host.restarts, sockets.folder_of(self._run)
         requests = run_requests(self._run, self._orders, self._desk, self._viewer)
-        absent = absences(planned_faults(self._scenario), self._schedule.ticks)
         with (
             Restarts(
                 self._plane,
                 most,
                 folder,
                 self._respawned,
-                planned=returning(absent, self._schedule),
                 batch=not self._schedule.realtime,
                 resume=self._machine.clock.resume,
             ) as restarts,
@@ -284,7 +281,9 @@ class ProcessRun:
         ):
             if self._live:
                 self._viewer.open()
-            faults = ProcessFaults(self._plane, self._schedule, absent, restarts)
+            faults = ProcessFaults(self._plane, self._schedule, restarts)
+            self._desk.on_absences = faults.follow
+            faults.follow(self._desk.ledger.absences(self._schedule.ticks))
             return self._follow(link, stop, restarts, faults, door)
 
     def _follow(
@@ -332,7 +331,8 @@ class ProcessRun:
     def _respawned(self, robot: str, fork_server: ForkServer, tick: int) -> Child:
         """The process of a controller that was started again."""
         folder = sockets.folder_of(self._run)
-        return respawn(self._orders, self._links, folder, robot, fork_server, tick)
+        faults = self._desk.ledger.planned()
+        return respawn(self._orders, self._links, folder, robot, fork_server, faults, tick)
 
     def _report_refusals(self, link: LauncherLink) -> None:
         """Look for floods now and then; announce what the router refused or cut off."""

@@ -25,7 +25,6 @@ class Restarts:
         plane: of the run; its children are replaced.
         most: how often, all robots together.
         folder: of the run's sockets.
-        planned: how often besides, by faults.
         batch: see `ForkServer`.
         resume: told after a start, in which the launcher did nothing else.
         respawn: starts the controller of a robot again, by a fork server, in lockstep at a tick.
@@ -41,13 +40,12 @@ class Restarts:
         folder: Path,
         respawn: Callable[[str, ForkServer, int], Child],
         *,
-        planned: int,
         batch: bool,
         resume: Callable[[], None],
     ) -> None:
         self._plane = plane
         self._most = self._left = most
-        self._planned = planned
+        self._planned = 0
         self._batch = batch
         self._resume = resume
         self._respawn = respawn
@@ -60,6 +58,12 @@ class Restarts:
         """Start the fork server of the next restart, if there may be one."""
         again = self._left > 0 or self._planned > 0
         self._fork_server = ForkServer(self._folder, batch=self._batch) if again else None
+
+    def plan(self, restarts: int) -> None:
+        """Be prepared for so many besides, by faults."""
+        self._planned = restarts
+        if self._fork_server is None:
+            self._prepare()
 
     def __enter__(self) -> Self:
         return self

@@ -4,7 +4,7 @@ Each is told, by its brief, exactly what it may know; its buses' listening socke
 """
 
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,8 +13,9 @@ from bridge.can_bus import sockets
 from configs.brief import AgentBrief, PlantBrief, RecorderBrief, ViewerBrief
 from configs.connections import NetworkLink
 from configs.deployment import Deployment
+from configs.faults.base import PlannedFault
 from configs.loading import to_toml
-from configs.resolve import agent_brief, plant_brief, schedule, signals_of
+from configs.resolve import agent_brief, agent_faults, plant_brief, schedule, signals_of
 from configs.roles import AGENT, PLANT, RECORDER, STARTED, VIEWER
 from configs.scenario import Scenario
 from fleetloop.door.server import NAME as DOOR
@@ -94,16 +95,20 @@ def respawn(
     folder: Path,
     robot: str,
     fork_server: ForkServer,
+    faults: Iterable[PlannedFault],
     resumes_tick: int = 0,
 ) -> Child:
     """Start the controller of a robot again in a run that goes on, in lockstep at a tick.
+
+    Its faults are those of the run, the ordered ones among them.
 
     Raises:
         InfrastructureError: a process can't be had.
     """
     place = Place(orders, links[AGENT.identity(robot)], folder, robot)
     child = Child(fork_server, AGENT.process(robot), AGENT.module)
-    child.tell(replace(_agent(place), rejoins=True, resumes_tick=resumes_tick))
+    known = agent_faults(faults, robot)
+    child.tell(replace(_agent(place), rejoins=True, resumes_tick=resumes_tick, faults=known))
     return child
 
 

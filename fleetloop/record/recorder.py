@@ -37,6 +37,10 @@ GAPS = 8
 """Consecutive blocks after a gap from which on the missing rows count as lost."""
 ROOM_BYTES = 1 << 26
 """Of what waits of one source: a slow disk may take its time."""
+ABSENT_BYTES = 1 << 26
+"""Rows of all others that wait for those of a controller that has left and may come again, if
+that is `ABSENT_TICKS` or more of them: from then on its own count as lost."""
+ABSENT_TICKS = 1 << 12
 _TIME = struct.Struct("<d")
 """t_s, the first signal of every row."""
 _WHOSE = {
@@ -65,9 +69,13 @@ class _Recorder:
         self._row_sizes |= {f"plant/{robot}": PLANT_ROW.size for robot in brief.robots}
         self._row_sizes |= {f"can/{bus}": FRAME_ROW.size for bus in brief.buses}
         self._row_sizes |= dict.fromkeys(inputs, 1)
+        self._absent: set[str] = set()  # sources that have left once, and may come again
+        tick_bytes = sum(size for tag, size in self._row_sizes.items() if tag in sources)
+        self._patience_ticks = min(max(ABSENT_BYTES // tick_bytes, ABSENT_TICKS), AHEAD_TICKS // 2)
         self._lost_inputs: dict[str, int] = {}  # by tag, the byte from which on they are missing
         self.unheard = set(sources)
-        self.unfinished = sources | inputs
+        self._tags = frozenset(sources | inputs)
+        self.unfinished = set(self._tags)
         self.ticks = 0
 
     def process(self, arrival: Arrival) -> bool:
@@ -76,7 +84,14 @@ class _Recorder:
         rows = Rows.decode(arrival.payload, self._row_sizes[arrival.tag])
         if rows is not None and kind == "inputs":
             return self._store_inputs(arrival.tag, robot, rows)
-        if rows is not None and self._fills_gaps and kind != "can":
+        if rows is not None and kind == "controller" and not rows.length:
+            if self._leaves(arrival.tag, rows):
+                return rows.final
+            if arrival.tag in self._absent and not rows.final:  # its first word, or the old one's
+                self.unfinished |= {arrival.tag, f"inputs/{robot}"} & self._tags
+        if rows is not None and arrival.tag in self._absent:
+            rows = self._unfilled(arrival.tag, rows)
+        if rows is not None and kind != "can" and (self._fills_gaps or arrival.tag in self._absent):
             self._fill_gap(arrival.tag, rows)
         wrong = "not well formed" if rows is None else self._wrong(kind, robot, rows)
         if rows is None or wrong is not None:
@@ -111,14 +126,16 @@ class _Recorder:
 
     def _fill_gap(self, tag: str, rows: Rows) -> None:
         """Of rows that a source said while it was cut off, only the time is known."""
-        kind, _, robot = tag.partition("/")
-        source: Source = "plant" if kind == "plant" else "controller"
-        expected = self._record.next_tick(robot, source)
-        first = rows.first_tick
+        expected, first = self._expected(tag), rows.first_tick
         if expected is None or not (rows.length or rows.final) or not expected < first:
             return
         if first + rows.length > self._ticks or first - self._record.written > AHEAD_TICKS:
             return
+        self._fill(tag, expected, first)
+
+    def _fill(self, tag: str, expected: int, first: int) -> None:
+        kind, _, robot = tag.partition("/")
+        source: Source = "plant" if kind == "plant" else "controller"
         unknown = [nan] * (self._row_sizes[tag] // _TIME.size - 1)
         rest = struct.pack(f"<{len(unknown)}d", *unknown)
         for begin in range(expected, first, BLOCK_TICKS):
@@ -126,6 +143,49 @@ class _Recorder:
             block = b"".join(_TIME.pack(tick * self._period_s) + rest for tick in ticks)
             self._record.add(robot, source, begin, block)
         self._filled[tag] += first - expected
+
+    def _expected(self, tag: str) -> int | None:
+        """The tick of the row that a source owes next, None if it has said its last."""
+        kind, _, robot = tag.partition("/")
+        return self._record.next_tick(robot, "plant" if kind == "plant" else "controller")
+
+    # --- controllers that have left and may come again -------------------------------------------
+
+    def _leaves(self, tag: str, rows: Rows) -> bool:
+        """Take note of a controller that leaves with rows that it doesn't have, if this says so."""
+        expected = self._expected(tag)
+        if expected is None or not expected < self._ticks or rows.first_tick != self._ticks:
+            return False
+        self._absent.add(tag)
+        if rows.final:  # nobody waits for another at the end of the run
+            self.unfinished -= {tag, tag.replace("controller", "inputs")}
+        return True
+
+    def _unfilled(self, tag: str, rows: Rows) -> Rows | None:
+        """What counts as lost already is left out of rows that come all the same."""
+        expected = self._expected(tag)
+        known = 0 if expected is None else max(expected - rows.first_tick, 0)
+        if not known or not rows.length:
+            return rows
+        left = rows.rows[known * self._row_sizes[tag] :]
+        return Rows(rows.first_tick + known, max(rows.length - known, 0), left, rows.final)
+
+    def _outwait(self, robot: str) -> None:
+        """The rows of an absent controller count as lost where others would wait for too long."""
+        tag = f"controller/{robot}"
+        expected, reached = self._expected(tag), self._record.next_tick(robot, "plant")
+        if expected is not None and reached is not None:
+            lost = reached - self._patience_ticks
+            if expected < lost:
+                self._fill(tag, expected, lost)
+
+    def end_absences(self) -> None:
+        """The rows of controllers that have not come again are missing to the end of the run."""
+        for tag in self._absent - self.unfinished:
+            expected = self._expected(tag)
+            if expected is not None:
+                self._fill(tag, expected, max(self.ticks, expected))
+                self._record.end(tag.partition("/")[2], "controller")
 
     def gaps(self) -> list[str]:
         """The rows that did not come, in words."""
@@ -146,7 +206,8 @@ class _Recorder:
         """
         expected = self._record.next_input(robot)
         again = rows.first_tick == 0 and rows.length > 0 and expected > 0
-        if rows.first_tick == expected or (again and self._fills_gaps):
+        may_come_again = self._fills_gaps or f"controller/{robot}" in self._absent
+        if rows.first_tick == expected or (again and may_come_again):
             self._record.inputs(robot, rows.first_tick, rows.rows, rows.final)
         elif rows.first_tick > expected:
             self._lost_inputs.setdefault(tag, expected)
@@ -199,6 +260,8 @@ class _Recorder:
         if rows.length:
             self._record.add(robot, source, rows.first_tick, rows.rows)
             self.ticks = max(self.ticks, rows.first_tick + rows.length)
+            if self._absent and source == "plant" and f"controller/{robot}" in self._absent:
+                self._outwait(robot)
         if rows.final:
             self._record.end(robot, source)
 
@@ -264,6 +327,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
                 record.check_place()
                 record.flush()
                 progress.put(Progress(recorder.ticks, 0, 0).encode())
+        recorder.end_absences()
         recorder.note_dropped(link.dropped())
         lost = refused = recorder.refusals.lines()
         if recorder.unfinished:

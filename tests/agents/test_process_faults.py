@@ -25,7 +25,7 @@ class Bench:
             freeze=lambda: self.done.append("frozen"),
             clock=self.clock,
         )
-        self.faults.hand_on = lambda returns: self.done.append(("hands on", returns))
+        self.faults.hand_on = lambda it: self.done.append(("hands on", it.to_tick is not None))
         self.faults.heard = lambda: self.done.append("heard")
         self.faults.last_word = lambda: self.done.append("last word")
 
@@ -67,7 +67,9 @@ def test_rows_end_with_a_process_unless_another_will_have_more(fault: str, retur
 
 def test_a_frozen_process_goes_on_from_where_it_was() -> None:
     bench = Bench('{kind="process_freeze", at_s=1.0, for_s=0.1, name="nap"}')
-    bench.ticks(500, 700)
+    bench.ticks(500, 549)
+    assert bench.faults.mute_tick == 550
+    bench.ticks(550, 700)
     assert bench.done == [
         (500, "fault_applied", "nap (process_freeze)"),
         ("hands on", True),
@@ -75,7 +77,7 @@ def test_a_frozen_process_goes_on_from_where_it_was() -> None:
         *("heard", "frozen"),
         (550, "fault_cleared", "nap (process_freeze)"),
     ]
-    assert bench.faults.mute_tick == 550
+    assert bench.faults.mute_tick == -FOREVER
     assert Bench().faults.mute_tick == -FOREVER
 
 

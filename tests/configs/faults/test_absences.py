@@ -22,10 +22,10 @@ def absent(*faults: str, overrides: tuple[str, ...] = (DROP,)) -> tuple[Absence,
 
 def test_an_absence_lasts_from_the_tick_of_the_fault_to_the_tick_of_its_end() -> None:
     assert absent(KILL, RESTART) == (
-        Absence("r2", 500, 750, frozen=False),
-        Absence("r1", 1000, 1001, frozen=False),
+        Absence("process_kill", "r2", 500, 750, frozen=False),
+        Absence("process_restart", "r1", 1000, 1001, frozen=False),
     )
-    assert absent(FREEZE) == (Absence("r2", 500, 750, frozen=True),)
+    assert absent(FREEZE) == (Absence("process_freeze", "r2", 500, 750, frozen=True),)
     for_good = '{kind="process_kill", at_s=1.0, robots=["r1"]}'
     beyond = '{kind="process_freeze", at_s=1.0, for_s=9.0, robots=["r2"]}'
     assert [one.to_tick for one in absent(for_good, beyond)] == [None, None]

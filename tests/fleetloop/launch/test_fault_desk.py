@@ -23,6 +23,7 @@ class Bench:
     def __init__(self, *overrides: str, real: tuple[str, ...] = ()) -> None:
         self.scenario = load("two_robots", ("duration_s=20.0", *overrides))
         self.tick, self.now_s = 1000, 0.0
+        self.absent: set[str] = set()
         self.sent: list[tuple[str, FaultOrder]] = []
         self.answers: list[dict[str, Any]] = []
         self.desk = FaultDesk(
@@ -31,6 +32,7 @@ class Bench:
             Deployment.model_validate(
                 {"robot": {name: {"bus": VCAN} for name in real}}
             ).fault_problem,
+            lambda process: process in self.absent,
             lambda: self.tick,
             lambda: self.now_s,
         )
