@@ -192,8 +192,10 @@ class FaultDesk:
             raise ScenarioError("names must be texts")
         entries = self.ledger.to_end(names, self._tick())
         left, refused = [*entries], []
-        for entry in entries:
-            self._refuse_return(entry)
+        stay = {one.name: problem for one in entries if (problem := self._no_return(one))}
+        if names and stay:
+            raise ScenarioError("\n".join(f"{name}: {why}" for name, why in stay.items()))
+        entries = [one for one in entries if one.name not in stay]
         if not entries:
             respond({"cleared": []})
 
@@ -275,16 +277,11 @@ class FaultDesk:
             if fault.PLACE == "process" and self._is_absent(AGENT.process(target)):
                 raise ScenarioError(f"{target}: its controller is absent: {fault.kind} can't act")
 
-    def _refuse_return(self, entry: Entry) -> None:
-        """Refuse to end an absence where the controller couldn't be there again.
-
-        Raises:
-            ScenarioError: the text says why.
-        """
-        if _has_stopped(entry, self._tick()):
-            problem = no_return(replace(entry.fault, for_s=1.0), self._scenario)
-            if problem is not None:
-                raise ScenarioError(f"{entry.name}: {problem}")
+    def _no_return(self, entry: Entry) -> str | None:
+        """Why a controller that is absent by a fault couldn't be there again."""
+        if not _has_stopped(entry, self._tick()):
+            return None
+        return no_return(replace(entry.fault, for_s=1.0), self._scenario)
 
     def _follow(self, fault: Fault) -> None:
         """Tell of a fault that began, or ended, who follows the absences of controllers."""
