@@ -37,6 +37,7 @@ class Ending:
             hellos=Hellos(0.02),
             rows=self.bench.agent.rows,
             report=publisher,
+            progress=SimpleNamespace(put=lambda _: None),
         )
         self.stop = Stop()
         self.stop.release()
