@@ -18,7 +18,7 @@ from typing import Literal
 
 from configs.connections import NetworkLink, Settings
 from configs.curves import FormationOffset, ReferencePath
-from configs.edges import InEdge
+from configs.edges import InEdge, Windows
 from configs.events import when
 from configs.faults.absences import Absence
 from configs.faults.base import PlannedFault
@@ -321,6 +321,29 @@ class ViewerBrief:
 
 
 @dataclass(frozen=True, slots=True)
+class DrawnRobot:
+    """A robot as 3-D views draw it."""
+
+    colour: str = "#7d7d7d"
+    wheels: Wheels = Wheels(radius_m=0.04, half_track_m=0.1)
+    path: tuple[ReferencePath, FormationOffset] | None = None
+    s_span: tuple[float, float] = (0.0, 0.0)  # of its path variable in a run [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """What is known of a run besides its rows, for those that draw it; empty: nothing."""
+
+    robots: tuple[DrawnRobot, ...] = ()
+    edges: tuple[tuple[str, str, Windows | None], ...] = ()  # speaker, hearer, when it exists
+    silence_s: float = 2.0  # age from which on what was heard doesn't count
+
+
+NO_DRAWING = Drawing()
+"""Of a run of which nothing is known besides its rows."""
+
+
+@dataclass(frozen=True, slots=True)
 class RecorderBrief:
     """Everything that the recorder receives at its start."""
 
@@ -339,3 +362,4 @@ class RecorderBrief:
     last_frame_ns: int  # bus time after which no frame ends
     fills_gaps: bool = False  # sources may be cut off or start again: missing rows aren't numbers
     logged_inputs: bool = False  # controllers log theirs
+    drawing: Drawing = NO_DRAWING  # for 3-D views of the record

@@ -16,7 +16,7 @@ from bridge.process.lifecycle import Stop
 from configs.connections import NetworkLink
 from configs.deployment import Deployment, load_deployment
 from configs.errors import InfrastructureError, ScenarioError
-from configs.events import Event, in_order
+from configs.events import KINDS, Event, in_order
 from configs.faults.plan import process_fault_problem
 from configs.loading import to_toml
 from configs.overrides import Overrides
@@ -27,10 +27,11 @@ from fleetloop.check.finding import in_words, titled
 from fleetloop.in_process import InProcessRun
 from fleetloop.launch import placement, wall_time
 from fleetloop.launch.accounts import stats_of
+from fleetloop.launch.drawn import drawing
 from fleetloop.launch.fault_ledger import FaultLedger
 from fleetloop.launch.process_run import ProcessRun
 from fleetloop.record.background import BackgroundWriter
-from fleetloop.record.events_file import EVENTS, events_file
+from fleetloop.record.events import add_events
 from fleetloop.record.reader import Record
 from fleetloop.record.run_record import RunRecord
 from fleetloop.results import run_folder
@@ -251,6 +252,7 @@ def run_in_process(
                 buses=scenario.buses,
                 formats=scenario.bus.record,
                 inputs=scenario.names if scenario.records_inputs else (),
+                drawing=drawing(scenario),
             ) as file,
             BackgroundWriter(file) as writer,
         ):
@@ -294,11 +296,11 @@ class Concluded(NamedTuple):
     record: Record
     summary: Summary
     unsaved: InfrastructureError | None
-    """Why the summary, or the events, could not be written."""
+    """Why the summary, the events of the record, or the layout could not be written."""
 
 
 def conclude(scenario: Scenario, carried: Carried) -> Concluded:
-    """Make the summary of a run that began, and write it and the events into its folder.
+    """Make the summary of a run that began, and write it into its folder, events into its record.
 
     Raises:
         RecordError: the record can't be read.
@@ -314,8 +316,13 @@ def conclude(scenario: Scenario, carried: Carried) -> Concluded:
     unsaved: InfrastructureError | None = None
     try:
         run_folder.write(folder / run_folder.SUMMARY, to_json(summary))
-        events = in_order(stats.events, scenario.names)
-        run_folder.write(folder / EVENTS, events_file(events, schedule(scenario).period_ns))
+        add_events(record, _recorded(scenario, stats.events), schedule(scenario).period_ns)
     except InfrastructureError as error:
         unsaved = error
     return Concluded(record, summary, unsaved)
+
+
+def _recorded(scenario: Scenario, events: Sequence[Event]) -> list[Event]:
+    """The events of a run that its record has: in lockstep those that equal runs have alike."""
+    realtime = scenario.clock.mode == "realtime"
+    return [it for it in in_order(events, scenario.names) if realtime or KINDS[it.kind].exact]

@@ -21,6 +21,7 @@ from configs.scenario import Scenario
 from fleetloop.door.server import NAME as DOOR
 from fleetloop.launch import placement
 from fleetloop.launch.child import Child
+from fleetloop.launch.drawn import drawing
 from fleetloop.launch.fork_server import ForkServer
 
 AFTERWARDS_NS = 60 * 10**9
@@ -181,6 +182,7 @@ def _recorder(place: Place) -> RecorderBrief:
         ticks.bus_time_ns(ticks.ticks) + AFTERWARDS_NS,
         fills_gaps=_may_have_gaps(orders),
         logged_inputs=orders.scenario.records_inputs,
+        drawing=drawing(orders.scenario),
     )
 
 

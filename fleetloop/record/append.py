@@ -47,6 +47,13 @@ class AppendedFile:
         self._put(piece)
         self._tail = piece
 
+    def take_tail(self, path: Path, size: int) -> None:
+        """Take what is in the file beyond a size for the tail."""
+        with path.open("rb") as stream:
+            stream.seek(size)
+            self._tail = stream.read()
+        self.size = size
+
     def reserve(self, length: int) -> None:
         """Make sure that so many bytes more can be written, whatever becomes of the disk.
 

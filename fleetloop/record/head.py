@@ -1,6 +1,7 @@
 """The head of a record: its robots, its layout and its scenario.
 
-    magic, Header, Schema (3), Channel (3 per robot), Attachment scenario.toml, Metadata fleetloop
+    magic, Header, Schema (7 or more), Channel (7, and 3 per robot), Attachment scenario.toml,
+    Metadata fleetloop
 
 The metadata say which version wrote the record, and CRC-32 of every byte before them: MCAP itself
 has no check of channels and schemas that holds for a file whose end is missing.
@@ -20,12 +21,12 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
 from fleetloop.record import schema
-from fleetloop.record.schema import Kind, Layout
+from fleetloop.record.schema import SIGNALS, Layout
 
 MAGIC = b"\x89MCAP0\r\n"
 LIBRARY = "fleetloop"
 SCENARIO = "scenario.toml"
-_VERSION, _CRC, _SIGNALS = "version", "crc32_of_all_before", "signals"
+_VERSION, _CRC = "version", "crc32_of_all_before"
 PREFIX = struct.Struct("<BQ")
 """Prefix of every MCAP record: its opcode and the length of its content."""
 _Records = Sequence[tuple[int, bytes]]
@@ -64,9 +65,14 @@ def build(layout: Layout, scenario_toml: str) -> Head:
         for number, name, text in layout.schemas()
     )
     channels = tuple(
-        _channel(layout, schema.channel_id(number, kind), robot, kind)
-        for number, robot in enumerate(layout.robots)
-        for kind in Kind
+        records.Channel(
+            id=channel,
+            schema_id=layout.schema_number(channel),
+            topic=layout.topic(channel),
+            message_encoding="cdr",
+            metadata=layout.metadata(channel),
+        )
+        for channel in layout.channels
     )
     data = MAGIC + b"".join(
         map(encoded, (records.Header(profile="ros2", library=LIBRARY), *schemas, *channels))
@@ -100,17 +106,6 @@ def build(layout: Layout, scenario_toml: str) -> Head:
         channels,
         attachment_index,
         metadata_index,
-    )
-
-
-def _channel(layout: Layout, channel: int, robot: str, kind: Kind) -> records.Channel:
-    names = [] if kind is Kind.POSE else [signal.name for signal in layout.signals(channel)]
-    return records.Channel(
-        id=channel,
-        schema_id=layout.schema_number(channel),
-        topic=schema.topic(robot, kind),
-        message_encoding="cdr",
-        metadata={_SIGNALS: " ".join(names)} if names else {},
     )
 
 
@@ -166,9 +161,9 @@ def _layout(found: _Records) -> Layout:
     texts = {one.id: one.data.decode() for one in _all_of(records.Schema, Opcode.SCHEMA, found)}
     robots = {
         channel.topic.split("/")[1]: schema.signals_of(
-            channel.metadata[_SIGNALS], texts[channel.schema_id]
+            channel.metadata[SIGNALS], texts[channel.schema_id]
         )
-        if _SIGNALS in channel.metadata
+        if SIGNALS in channel.metadata
         else ()
         for channel in _all_of(records.Channel, Opcode.CHANNEL, found)
         if channel.topic.endswith("/controller")

@@ -4,7 +4,8 @@ Chunks come from numpy, a block of messages of one channel each; head and summar
 `mcap` package. Space for the summary is reserved before each chunk, so that the file can be
 completed on a disk that has become full; where a file system reserves nothing, the last chunks make
 room. A file that lost its end (its writer was killed) is whole again after
-`McapFile.resume(path).finish(why)`: what was complete stays, the rest is cut off.
+`McapFile.resume(path).finish(why)`: what was complete stays, the rest is cut off. Of a complete one
+`McapFile.reopen(path, scan)` adds to what is in it.
 """
 
 import zlib
@@ -12,14 +13,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Self
 
-import numpy as np
 from mcap import records
 
 from configs.errors import InfrastructureError
 from fleetloop.record.append import AppendedFile
-from fleetloop.record.chunks import ChunkWriter
+from fleetloop.record.chunks import Block, ChunkWriter
 from fleetloop.record.head import MAGIC, Head, build, encoded
-from fleetloop.record.scan import RecordError, Written, end_record, scan
+from fleetloop.record.scan import RecordError, Scan, Written, end_record, scan
 from fleetloop.record.schema import Layout
 
 _LOST_BYTES = 1024
@@ -40,7 +40,7 @@ class McapFile:
         nothing = records.ChunkIndex(0, 0, "zstd", 0, 0, 0, {1: 0}, 0, 0)
         self._index_bytes = len(encoded(nothing))
         channels = len(head.channels) * 10  # of the statistics
-        self._tail_bytes = len(self._tail("")) + _LOST_BYTES + channels
+        self._tail_bytes = len(self._tail("", 0)) + _LOST_BYTES + channels
 
     @classmethod
     def create(cls, path: Path, layout: Layout, scenario_toml: str) -> Self:
@@ -83,18 +83,49 @@ class McapFile:
         record._crc, record._chunks, record._closed = found.crc, found.chunks, found.closed
         return record
 
-    def chunk(self, channel: int, messages: np.ndarray) -> None:
-        """Write a block of messages of one channel.
+    @classmethod
+    def reopen(cls, path: Path, found: Scan) -> Self:
+        """Take up a complete file, to add to it; `found` is what a scan of it gave.
+
+        Raises:
+            InfrastructureError: it can't be read or written.
+        """
+        try:
+            file = AppendedFile(path, goes_on=True)
+            file.take_tail(path, found.end)
+        except OSError as error:
+            raise InfrastructureError(f"can't write {path}: {error.strerror}") from error
+        record = cls(path, file, found.head)
+        record._crc, record._chunks = found.crc, list(found.chunks)
+        return record
+
+    def add(self, block: Block, lost: str) -> None:
+        """Add messages of one channel to a complete file, and close it.
+
+        Raises:
+            InfrastructureError: it can't be written; the file is as it was.
+        """
+        try:
+            packed, written = self._packed(block)
+            self._chunks.append(written)
+            self._crc = zlib.crc32(packed, self._crc)
+            self._file.append(packed + self._tail(lost, self._file.size + len(packed)))
+        except OSError as error:
+            raise self._unwritable(error) from error
+        finally:
+            self._file.close()
+
+    def chunk(self, block: Block) -> None:
+        """Write messages of one channel.
 
         Raises:
             InfrastructureError: it can't be written; the file is as it was and can be finished.
         """
-        if not len(messages):
+        if not block:
             return
-        crc_before = self._crc
-        packed = self._writer.pack(channel, messages, self._file.size)
-        self._append(packed.data)
-        self._chunks.append(Written(packed.summary, channel, len(messages), crc_before))
+        packed, written = self._packed(block)
+        self._append(packed)
+        self._chunks.append(written)
 
     def finish(self, lost: str = "") -> None:
         """Write end, summary and footer, and close; `lost` says what is missing in the file.
@@ -107,7 +138,7 @@ class McapFile:
             return
         failure: OSError | None = None
         while True:
-            tail = self._tail(lost)
+            tail = self._tail(lost, self._file.size)
             try:
                 self._file.append(tail)
                 break
@@ -120,6 +151,12 @@ class McapFile:
         self._file.close()
         if failure is not None:
             raise self._unwritable(failure) from failure
+
+    def _packed(self, block: Block) -> tuple[bytes, Written]:
+        """The bytes of a chunk behind the last."""
+        packed = self._writer.pack(block, self._file.size)
+        count = len(block.times_ns)
+        return packed.data, Written(packed.summary, block.channel, count, self._crc)
 
     @property
     def in_place(self) -> bool:
@@ -154,14 +191,14 @@ class McapFile:
     def _unwritable(self, error: OSError) -> InfrastructureError:
         return InfrastructureError(f"can't write {self._path}: {error.strerror or error}")
 
-    def _tail(self, lost: str) -> bytes:
-        """Everything behind the last chunk."""
+    def _tail(self, lost: str, begin: int) -> bytes:
+        """Everything behind the last chunk, which ends there."""
         end = end_record(lost.encode()[:_LOST_BYTES].decode(errors="ignore"))
         ended = encoded(end)
         rows_end = ended + encoded(records.DataEnd(zlib.crc32(ended, self._crc)))
-        index = records.MetadataIndex(self._file.size, len(ended), end.name)
+        index = records.MetadataIndex(begin, len(ended), end.name)
         summary = b"".join(map(encoded, self._summary(index)))
-        start = self._file.size + len(rows_end)
+        start = begin + len(rows_end)
         footer = encoded(records.Footer(start, 0, 0))[:-4]
         crc = zlib.crc32(footer, zlib.crc32(summary))
         return rows_end + summary + footer + crc.to_bytes(4, "little") + MAGIC

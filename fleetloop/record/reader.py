@@ -7,7 +7,7 @@ import numpy as np
 
 from configs.signals import Signal
 from fleetloop.record import schema
-from fleetloop.record.scan import RecordError, scan
+from fleetloop.record.scan import RecordError, Scan, scan
 from fleetloop.record.schema import Kind
 
 
@@ -28,6 +28,8 @@ class Record:
     scenario_toml: str
     lost: str
     """The missing part, and the cause; empty for a complete, undamaged record."""
+    file: Scan | None = None
+    """How it is in its file; of a record in memory None."""
 
     @classmethod
     def open(cls, path: Path, *, damaged: bool = False) -> "Record":
@@ -63,7 +65,7 @@ class Record:
         plant, controller = rows(Kind.PLANT), rows(Kind.CONTROLLER)
         toml = found.head.scenario_toml
         signals = dict(zip(layout.robots, layout.controllers, strict=True))
-        return cls(path, layout.robots, plant, controller, signals, toml, found.lost)
+        return cls(path, layout.robots, plant, controller, signals, toml, found.lost, found)
 
     def shortage(self) -> str:
         """The missing part and the extent of the rest; empty for a complete record."""

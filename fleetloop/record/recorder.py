@@ -286,6 +286,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
             buses=brief.buses,
             formats=brief.bus_formats,
             inputs=brief.robots if brief.logged_inputs else (),
+            drawing=brief.drawing,
         ) as record,
     ):
         name = brief.network.run

@@ -7,6 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from configs.brief import NO_DRAWING, Drawing
 from configs.errors import InfrastructureError
 from configs.signals import Signal
 from fleetloop.record import inputs_file
@@ -26,6 +27,7 @@ class RunRecord:
         buses: names of the buses that are recorded.
         formats: "blf" and "log": Vector's format and candump's.
         inputs: robots whose controllers log their inputs.
+        drawing: for the views of the record.
 
     Raises:
         InfrastructureError: a file can't be written; so do `add` and `traffic`.
@@ -41,10 +43,11 @@ class RunRecord:
         buses: Sequence[str] = (),
         formats: Sequence[str] = (),
         inputs: Sequence[str] = (),
+        drawing: Drawing = NO_DRAWING,
     ) -> None:
         self._inputs: dict[str, InputsFile] = {}
         self._logs: dict[str, CanLogWriter] = {}
-        self._rows = RecordWriter(path, robots, scenario_toml, period_ns)
+        self._rows = RecordWriter(path, robots, scenario_toml, period_ns, drawing=drawing)
         try:
             if formats and buses:
                 self._open_logs(_folder(path.parent / CAN_FOLDER), buses, formats)

@@ -78,7 +78,7 @@ def end_record(lost: str) -> records.Metadata:
 
 
 def scan(path: Path, visit: Visit = lambda _channel, _messages: None) -> Scan:
-    """Scan a record file; `visit` gets channel and messages of every chunk before a damage.
+    """Scan a record file; `visit` gets channel and messages of a robot's chunks before a damage.
 
     Raises:
         RecordError: it is no record, its head isn't whole, or it can't be read.
@@ -167,11 +167,13 @@ def _body(file: _File, found: Scan, visit: Visit) -> None:
         with _naming_place(record.start):
             if index.opcode != Opcode.MESSAGE_INDEX:
                 raise DamageError("a chunk without index")
-            channel, messages = chunks.unpack(record.content, index.content)
+            block, messages = chunks.unpack(record.content, index.content)
         length, packed = index.start - record.start, packed_size(record.content)
-        summary = summary_of(channel, messages, record.start, length, packed)
-        found.chunks.append(Written(summary, channel, len(messages), record.crc_before))
-        visit(channel, messages)
+        summary = summary_of(block, record.start, length, packed)
+        count = len(block.times_ns)
+        found.chunks.append(Written(summary, block.channel, count, record.crc_before))
+        if messages is not None:
+            visit(block.channel, messages)
         found.end, found.crc = file.at, file.crc
         record = file.record()
     with _naming_place(record.start):

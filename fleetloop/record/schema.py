@@ -1,21 +1,31 @@
 """The channels of a record, their message layouts and schemas.
 
-    channel                    schema                          one message
-    robot/<name>/plant         fleetloop_msgs/msg/Plant        a tick: the truth
-    robot/<name>/controller    fleetloop_msgs/msg/Controller   a tick: what was used and commanded
-    robot/<name>/pose          geometry_msgs/msg/PoseStamped   every 20 ms: for 3-D views
+    channel                    schema                            one message
+    robot/<name>/plant         fleetloop_msgs/msg/Plant          a tick: the truth
+    robot/<name>/controller    fleetloop_msgs/msg/Controller     a tick: what was used and commanded
+    robot/<name>/pose          geometry_msgs/msg/PoseStamped     every 20 ms
+    scene/paths                foxglove_msgs/msg/SceneUpdate     at tick 0: the robots' paths
+    scene/robots               foxglove_msgs/msg/SceneUpdate     every 50 ms: the robots
+    scene/references           foxglove_msgs/msg/SceneUpdate     every 50 ms: their references
+    scene/edges                foxglove_msgs/msg/SceneUpdate     every 50 ms: the graph
+    tf                         foxglove_msgs/msg/FrameTransforms every 50 ms: the robots' frames
+    fleet                      fleetloop_msgs/msg/Fleet          every 50 ms: differences of s
+    log                        foxglove_msgs/msg/Log             an event
 
-Messages are CDR (little endian) with ROS 2 schemas, which Foxglove opens, and of fixed size, so
-that a block of them is one numpy array: MCAP's record header, the CDR header, then the fields.
+Messages are CDR (little endian) with ROS 2 schemas, which Foxglove opens. Those of a robot's
+channel are of fixed size, so that a block of them is one numpy array: MCAP's record header, the CDR
+header, then the fields; the others are made of these (`fleetloop.record.views`), but for events.
 Field names in the schemas are the signals' in lower case, as ROS wants them; the names as they are
-stand in the channels' metadata, units and meanings in the schemas. Robots with different laws have
-different schemas `Controller`, `Controller2`, ... So a record needs nothing else to be read. Times
-are scenario time; nothing in a record knows the wall clock, so equal runs leave equal files.
+and the units stand in the channels' metadata, units and meanings in the schemas. Robots with
+different laws have different schemas `Controller`, `Controller2`, ... So a record needs nothing
+else to be read. Times are scenario time; nothing in a record knows the wall clock, so equal runs
+leave equal files.
 
 Before the messages stand channels and scenario (`fleetloop.record.head`), behind them what is
 missing in the file (`fleetloop.record.scan`); every byte is under some check sum.
 """
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -24,10 +34,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from configs.signals import PLANT_SIGNALS, Signal
+from configs.signals import PLANT_SIGNALS, SPREAD, Signal
+from fleetloop.record.foxglove_schemas import schema_text
 
-POSE_PERIOD_NS = 20_000_000
-_MESSAGE = 0x05  # MCAP's opcode
+SIGNALS, UNITS, ROBOTS = "signals", "units", "robots"
+"""Metadata of channels: names of the signals in the order of the fields, and, as JSON, the units by
+field; of `fleet` the robots in the order of its arrays."""
 _MESSAGE_HEADER = [
     ("opcode", "<u1"),
     ("length", "<u8"),
@@ -36,8 +48,18 @@ _MESSAGE_HEADER = [
     ("log_time", "<u8"),
     ("publish_time", "<u8"),
 ]
-_HEADER_BYTES = 9
-_CDR_LITTLE_ENDIAN = 0x0000_0100
+
+
+class View(IntEnum):
+    """Channels of the whole fleet, by their ids: 3-D views, plots and log panels show them."""
+
+    PATHS = 1
+    ROBOTS = 2
+    REFERENCES = 3
+    EDGES = 4
+    TRANSFORMS = 5
+    FLEET = 6
+    LOG = 7
 
 
 class Kind(IntEnum):
@@ -48,6 +70,23 @@ class Kind(IntEnum):
     POSE = 2
 
 
+VIEW_TOPICS: Mapping[View, str] = {
+    View.PATHS: "scene/paths",
+    View.ROBOTS: "scene/robots",
+    View.REFERENCES: "scene/references",
+    View.EDGES: "scene/edges",
+    View.TRANSFORMS: "tf",
+    View.FLEET: "fleet",
+    View.LOG: "log",
+}
+SCENES = (View.PATHS, View.ROBOTS, View.REFERENCES, View.EDGES)
+FLEET_SIGNALS: tuple[Signal, ...] = (
+    Signal(SPREAD, "m", "largest s_i minus the smallest"),
+    Signal("s_difference", "m", "s_i minus the mean of all s, of the robots in their order"),
+)
+"""Of the robots whose controllers gave a finite s; the second one of each robot."""
+
+
 @cache
 def row_type(signals: tuple[Signal, ...]) -> np.dtype[np.void]:
     """One row: the tick, then the signals by name."""
@@ -55,8 +94,15 @@ def row_type(signals: tuple[Signal, ...]) -> np.dtype[np.void]:
     return np.dtype(fields)
 
 
+def fleet_type(robots: int) -> np.dtype[np.void]:
+    """The payload of `fleet`."""
+    spread, difference = (signal.name for signal in FLEET_SIGNALS)
+    return np.dtype([("tick", "<i8"), (spread, "<f8"), (difference, "<f8", robots)])
+
+
 @cache
-def _message_type(payload: np.dtype[np.void]) -> np.dtype[np.void]:
+def message_type(payload: np.dtype[np.void]) -> np.dtype[np.void]:
+    """One message, as it is in the file: MCAP's header, CDR's, then the fields."""
     return np.dtype([*_MESSAGE_HEADER, ("cdr", "<u4"), ("payload", payload)])
 
 
@@ -74,18 +120,23 @@ POSE_TYPE = np.dtype(
 
 
 def channel_id(robot_number: int, kind: Kind) -> int:
-    """MCAP's channel id of a robot's channel; from 1."""
-    return robot_number * len(Kind) + kind + 1
+    """MCAP's channel id of a robot's channel; behind those of the views."""
+    return len(View) + robot_number * len(Kind) + kind + 1
+
+
+def view_of(channel: int) -> View | None:
+    """The view that a channel is by its id; None: a robot's channel."""
+    return View(channel) if channel <= len(View) else None
 
 
 def kind_of(channel: int) -> Kind:
-    """The kind of a channel by its id."""
-    return Kind((channel - 1) % len(Kind))
+    """The kind of a robot's channel by its id."""
+    return Kind((channel - len(View) - 1) % len(Kind))
 
 
 def robot_number_of(channel: int) -> int:
-    """The robot of a channel by its id."""
-    return (channel - 1) // len(Kind)
+    """The robot of a robot's channel by its id."""
+    return (channel - len(View) - 1) // len(Kind)
 
 
 def topic(robot: str, kind: Kind) -> str:
@@ -126,71 +177,79 @@ class Layout:
     def message_type(self, channel: int) -> np.dtype[np.void]:
         """One message of a channel, as it is in the file."""
         if kind_of(channel) is Kind.POSE:
-            return _message_type(POSE_TYPE)
-        return _message_type(self.row_type(channel))
+            return message_type(POSE_TYPE)
+        return message_type(self.row_type(channel))
+
+    @property
+    def channels(self) -> range:
+        """The ids of all channels."""
+        return range(1, len(View) + len(self.robots) * len(Kind) + 1)
+
+    def topic(self, channel: int) -> str:
+        """The topic of a channel."""
+        view = view_of(channel)
+        if view is not None:
+            return VIEW_TOPICS[view]
+        return topic(self.robots[robot_number_of(channel)], kind_of(channel))
+
+    def metadata(self, channel: int) -> dict[str, str]:
+        """What a channel says of its fields: signals by name, and units by field."""
+        if view_of(channel) is View.FLEET:
+            return {ROBOTS: " ".join(self.robots), UNITS: _units(FLEET_SIGNALS)}
+        if view_of(channel) is not None or kind_of(channel) is Kind.POSE:
+            return {}
+        signals = self.signals(channel)
+        return {SIGNALS: " ".join(signal.name for signal in signals), UNITS: _units(signals)}
 
     def schemas(self) -> Iterator[SchemaText]:
         """Every schema once."""
         yield SchemaText(1, "fleetloop_msgs/msg/Plant", _row_schema(PLANT_SIGNALS))
-        yield SchemaText(2, "geometry_msgs/msg/PoseStamped", _POSE_SCHEMA)
+        yield _published(2, "geometry_msgs/PoseStamped")
+        yield _published(3, "foxglove_msgs/SceneUpdate")
+        yield _published(4, "foxglove_msgs/FrameTransforms")
+        yield _published(5, "foxglove_msgs/Log")
+        yield SchemaText(6, "fleetloop_msgs/msg/Fleet", _fleet_schema(len(self.robots)))
         for n, signals in enumerate(dict.fromkeys(self.controllers)):
             name = f"fleetloop_msgs/msg/Controller{n + 1 if n else ''}"
-            yield SchemaText(3 + n, name, _row_schema(signals))
+            yield SchemaText(7 + n, name, _row_schema(signals))
 
     def schema_number(self, channel: int) -> int:
         """The schema of a channel."""
+        match view_of(channel):
+            case None:
+                pass
+            case View.TRANSFORMS:
+                return 4
+            case View.LOG:
+                return 5
+            case View.FLEET:
+                return 6
+            case _:
+                return 3
         match kind_of(channel):
             case Kind.PLANT:
                 return 1
             case Kind.POSE:
                 return 2
-        return 3 + list(dict.fromkeys(self.controllers)).index(self.signals(channel))
+        return 7 + list(dict.fromkeys(self.controllers)).index(self.signals(channel))
 
 
-def row_messages(
-    layout: Layout, channel: int, first_tick: int, rows: np.ndarray, period_ns: int
-) -> np.ndarray:
-    """Messages of consecutive ticks; `rows` are float64, one line per tick."""
-    ticks = np.arange(first_tick, first_tick + len(rows))
-    messages = _blank(layout.message_type(channel), channel, ticks, period_ns)
-    payload = messages["payload"]
-    payload["tick"] = messages["sequence"]
-    for column, (name, *_) in enumerate(layout.signals(channel)):
-        payload[name] = rows[:, column]
-    return messages
+def _published(number: int, name: str) -> SchemaText:
+    return SchemaText(number, name.replace("/", "/msg/"), schema_text(name))
 
 
-def pose_messages(channel: int, first_tick: int, rows: np.ndarray, period_ns: int) -> np.ndarray:
-    """Pose messages of those ticks that begin a new pose period; `rows` are the plant's."""
-    ticks = np.arange(first_tick, first_tick + len(rows))
-    every = max(1, POSE_PERIOD_NS // period_ns)
-    chosen = ticks % every == 0
-    messages = _blank(_message_type(POSE_TYPE), channel, ticks[chosen], period_ns)
-    payload = messages["payload"]
-    payload["sec"] = messages["log_time"] // 1_000_000_000
-    payload["nanosec"] = messages["log_time"] % 1_000_000_000
-    payload["frame_length"] = 6
-    payload["frame"] = b"world"
-    names = [signal.name for signal in PLANT_SIGNALS]
-    payload["position"][:, 0] = rows[chosen, names.index("x_m")]
-    payload["position"][:, 1] = rows[chosen, names.index("y_m")]
-    heading = rows[chosen, names.index("theta_rad")]
-    payload["orientation"][:, 2] = np.sin(heading / 2)
-    payload["orientation"][:, 3] = np.cos(heading / 2)
-    return messages
+def _units(signals: Sequence[Signal]) -> str:
+    return json.dumps({s.name.lower(): s.unit for s in signals}, ensure_ascii=False)
 
 
-def _blank(
-    layout: np.dtype[np.void], channel: int, ticks: np.ndarray, period_ns: int
-) -> np.ndarray:
-    messages = np.zeros(len(ticks), layout)
-    messages["opcode"] = _MESSAGE
-    messages["length"] = messages.dtype.itemsize - _HEADER_BYTES
-    messages["channel"] = channel
-    messages["sequence"] = ticks
-    messages["log_time"] = messages["publish_time"] = ticks * period_ns
-    messages["cdr"] = _CDR_LITTLE_ENDIAN
-    return messages
+def _fleet_schema(robots: int) -> str:
+    spread, difference = FLEET_SIGNALS
+    lines = (
+        "int64 tick  # control tick",
+        f"float64 {spread.name}  # [{spread.unit}] {spread.meaning}",
+        f"float64[{robots}] {difference.name}  # [{difference.unit}] {difference.meaning}",
+    )
+    return "\n".join(lines) + "\n"
 
 
 def _row_schema(signals: Sequence[Signal]) -> str:
@@ -205,31 +264,3 @@ def signals_of(names: str, text: str) -> tuple[Signal, ...]:
         unit, _, meaning = line.partition("  # [")[2].partition("] ")
         signals.append(Signal(name, unit, meaning))
     return tuple(signals)
-
-
-_POSE_SCHEMA = """std_msgs/Header header
-geometry_msgs/Pose pose
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-================================================================================
-MSG: geometry_msgs/Pose
-geometry_msgs/Point position
-geometry_msgs/Quaternion orientation
-================================================================================
-MSG: geometry_msgs/Point
-float64 x
-float64 y
-float64 z
-================================================================================
-MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-"""

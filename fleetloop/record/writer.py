@@ -14,11 +14,14 @@ from typing import Literal, Self
 
 import numpy as np
 
+from configs.brief import NO_DRAWING, Drawing
 from configs.errors import InfrastructureError
 from configs.signals import Signal
-from fleetloop.record.chunks import CHUNK_TICKS
+from fleetloop.record.chunks import CHUNK_TICKS, Block
 from fleetloop.record.mcap_file import McapFile
-from fleetloop.record.schema import Kind, Layout, channel_id, pose_messages, row_messages
+from fleetloop.record.messages import pose_messages, row_messages
+from fleetloop.record.schema import Kind, Layout, channel_id
+from fleetloop.record.views import Views
 
 Source = Literal["plant", "controller"]
 _KINDS: dict[str, Kind] = {"plant": Kind.PLANT, "controller": Kind.CONTROLLER}
@@ -57,6 +60,7 @@ class RecordWriter:
         robots: in their order, each with the table of its controller's rows.
         scenario_toml: the scenario, for readers of the record.
         period_ns: of the rows.
+        drawing: for the views.
     """
 
     def __init__(
@@ -65,11 +69,14 @@ class RecordWriter:
         robots: Mapping[str, Sequence[Signal]],
         scenario_toml: str,
         period_ns: int,
+        *,
+        drawing: Drawing = NO_DRAWING,
     ) -> None:
         self._path = Path(path)
         self._robots = tuple(robots)
         self._period_ns = period_ns
         self._layout = Layout.of(robots)
+        self._views = Views(self._layout, drawing, period_ns)
         self._file = McapFile.create(self._path, self._layout, scenario_toml)
         self._sources = {
             (number, kind): _Rows()
@@ -161,18 +168,26 @@ class RecordWriter:
         self._file.discard()
 
     def _write_group(self, ticks: int) -> None:
+        """Write the next ticks of every source: rows and poses of each robot, then the views."""
+        first = 0
+        taken: dict[Kind, list[np.ndarray]] = {kind: [] for kind in _KINDS.values()}
         for (number, kind), held in self._sources.items():
-            first = held.first_tick
             rows = held.pop(ticks)
+            taken[kind].append(rows)
             if not len(rows):
                 continue
+            first = held.first_tick - len(rows)
             channel = channel_id(number, kind)
-            self._file.chunk(
-                channel, row_messages(self._layout, channel, first, rows, self._period_ns)
-            )
+            self._chunk(channel, row_messages(self._layout, channel, first, rows, self._period_ns))
             if kind is Kind.PLANT:
                 channel = channel_id(number, Kind.POSE)
-                self._file.chunk(channel, pose_messages(channel, first, rows, self._period_ns))
+                self._chunk(channel, pose_messages(channel, first, rows, self._period_ns))
+        plant, controller = taken[Kind.PLANT], taken[Kind.CONTROLLER]
+        for view, messages in self._views.messages(first, plant, controller):
+            self._chunk(view, *messages)
+
+    def _chunk(self, channel: int, *messages: np.ndarray) -> None:
+        self._file.chunk(Block.of(channel, *messages))
 
     def __enter__(self) -> Self:
         return self

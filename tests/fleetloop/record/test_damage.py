@@ -15,6 +15,10 @@ from mcap.opcode import Opcode
 from mcap.writer import Writer
 from support.controller_rows import SIGNALS
 
+from configs.brief import Drawing, DrawnRobot
+from configs.events import Event
+from configs.paths import Circle, World
+from fleetloop.record.events import add_events
 from fleetloop.record.head import MAGIC, build, encoded
 from fleetloop.record.reader import Record
 from fleetloop.record.scan import RecordError
@@ -40,12 +44,19 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def write(path: Path, ticks: int) -> Path:
+    """A record with messages on every channel."""
     draw = np.random.default_rng(1)
-    with RecordWriter(path, dict.fromkeys(ROBOTS, SIGNALS), 'name = "x"\n', 1_000_000) as writer:
+    circle = DrawnRobot(
+        path=(Circle(kind="circle", radius_m=2.0), World(kind="world", x_m=1.0)), s_span=(0.0, 3.0)
+    )
+    drawing = Drawing((circle,) * len(ROBOTS), (("r1", "r2", None),))
+    layout = dict.fromkeys(ROBOTS, SIGNALS)
+    with RecordWriter(path, layout, 'name = "x"\n', 1_000_000, drawing=drawing) as writer:
         for robot in ROBOTS:
             for source, width in (("plant", 12), ("controller", 35)):
                 rows = draw.normal(size=(ticks, width)).round(2)
                 writer.add(robot, source, 0, rows.tobytes())
+    add_events(Record.open(path), [Event(1, "r1", "stopped"), Event(1, "r2", "left")], 1_000_000)
     return path
 
 
@@ -130,7 +141,7 @@ def test_no_overwritten_stretch_passes(whole: Path, truth: Record, tmp_path: Pat
 def test_a_flipped_bit_is_seen_wherever_it_is(tmp_path: Path) -> None:
     content = write(tmp_path / "whole.mcap", 2).read_bytes()
     truth = Record.open(tmp_path / "whole.mcap")
-    for at in range(0, len(content), 7):
+    for at in range(0, len(content), 31):
         hurt = bytearray(content)
         hurt[at] ^= 1 << (at % 8)
         check(tmp_path / "a.mcap", hurt, truth)
@@ -146,7 +157,7 @@ def test_a_file_cut_at_any_border_says_so_and_gives_what_is_before(tmp_path: Pat
 
 def test_zeros_to_the_end_are_a_cut(whole: Path, truth: Record, tmp_path: Path) -> None:
     content = whole.read_bytes()
-    at = pieces(content)[15].start
+    at = next(it.start for it in pieces(content)[30:] if it.opcode == Opcode.CHUNK)
     word = check(tmp_path / "a.mcap", content[:at] + bytes(len(content) - at), truth)
     assert f"cut at byte {at}, only zeros follow" in word
 
@@ -159,11 +170,14 @@ def test_chunks_that_are_swapped_doubled_or_missing_are_damage(
     found = chunks(content)
     start = content.index(found[0])
     end = content[start + sum(map(len, found)) :] if kept == "end" else b""
+    # Of each robot rows, poses, rows; then five views, before the first ones the paths.
+    first, second, rest = found[:12], found[12:23], found[23:]
+    assert len(rest) == 12  # with the events
     for other in (
-        found[6:12] + found[:6] + found[12:],
+        second + first + rest,
         found[:1] + found,
-        found[6:],
-        found[:6] + found[12:],
+        second + rest,
+        first + rest,
     ):
         body = content[:start] + b"".join(other)
         assert "damaged at byte" in check(tmp_path / "a.mcap", body + end, truth)

@@ -14,8 +14,10 @@ from mcap.stream_reader import StreamReader
 from support.controller_rows import SIGNALS
 
 from configs.errors import InfrastructureError
+from configs.events import Event
 from fleetloop.record.append import AppendedFile
 from fleetloop.record.can_log import FRAME, CanLogWriter
+from fleetloop.record.events import add_events
 from fleetloop.record.reader import Record
 from fleetloop.record.run_record import RunRecord
 from fleetloop.record.writer import RecordWriter
@@ -160,3 +162,18 @@ def test_a_recording_of_a_bus_keeps_what_it_has(small_disk: Path, ending: str) -
         read = b"".join(bytes(message.data) for message in reader)
     assert len(read) > 100_000
     assert read == (data * (1 + len(read) // len(data)))[: len(read)]
+
+
+def test_a_record_to_which_no_event_can_be_added_stays_as_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with RecordWriter(path, {"r1": SIGNALS}, "", 1_000_000) as writer:
+        for source, rows in ROWS.items():
+            writer.add("r1", source, 0, rows)
+    before, record = path.read_bytes(), Record.open(path)
+    for room in (0, 60):
+        with (
+            largest_file(len(before) + room),
+            pytest.raises(InfrastructureError, match=r"can't write .*a\.mcap: File too large"),
+        ):
+            add_events(record, [Event(3, "r1", "stopped", "why " * 99)], 1_000_000)
+        assert path.read_bytes() == before

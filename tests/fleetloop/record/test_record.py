@@ -13,6 +13,7 @@ from support.controller_rows import SIGNALS
 from configs.errors import InfrastructureError, ScenarioError
 from configs.signals import PLANT_SIGNALS
 from fleetloop.record.reader import Record
+from fleetloop.record.schema import VIEW_TOPICS
 from fleetloop.record.writer import CHUNK_TICKS, RecordWriter, finish_truncated
 
 ROBOTS = ("r1", "r2")
@@ -104,8 +105,10 @@ def test_the_stock_reader_and_a_ros_2_decoder_open_it(tmp_path: Path) -> None:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
         summary = reader.get_summary()
         topics = {channel.topic for channel in summary.channels.values()}
-        assert topics == {f"robot/{r}/{k}" for r in ROBOTS for k in ("plant", "controller", "pose")}
-        assert summary.statistics.message_count == 2 * (700 + 700 + 35)
+        robots = {f"robot/{r}/{k}" for r in ROBOTS for k in ("plant", "controller", "pose")}
+        assert topics == robots | set(VIEW_TOPICS.values())
+        # Every 50 ms robots, references, frames and the fleet; no path and no edge is known.
+        assert summary.statistics.message_count == 2 * (700 + 700 + 35) + 4 * 14
         decoded = list(reader.iter_decoded_messages(topics=["robot/r2/plant"]))
         assert len(decoded) == 700
         _, _, message, content = decoded[600]
