@@ -59,6 +59,23 @@ def load_own(module: str, *later: str) -> ModuleType:
         sys.modules.update(theirs)
 
 
+def refuse_others() -> None:
+    """Refuse a program that has packages of others under our names: it would get theirs.
+
+    Raises:
+        ImportError: it names the package, and where it is.
+    """
+    for name in NAMES:
+        folders = _folders(name)
+        if folders != [HOME / name]:
+            where = folders[0] if folders else "a module without a folder"
+            raise ImportError(
+                f"fleetloop has a package {name!r} of its own, but here {name!r} is {where}:"
+                " rename that, or run from another folder (python -P)",
+                name=name,
+            )
+
+
 def _shadows(entry: str) -> bool:
     """Whether a place on the path, other than ours, has a package or module of our names."""
     place = Path(entry).resolve()  # "" is the current folder

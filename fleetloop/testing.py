@@ -1,13 +1,18 @@
-"""Emulated robots for tests of your own CAN host code: a pytest plug-in, and a class without it.
+"""Fixtures for tests of your own: runs of scenarios, and emulated robots for CAN host code.
+
+    def test_the_fleet_stays_together(fleetloop_run):
+        run = fleetloop_run("two_robots")           # fails the test if it doesn't hold
+        assert run.signal("s_spread").max() < 0.01
 
     def test_my_host(fleetloop_plant):
         plant = fleetloop_plant("two_robots", robots=["r1"])
         with can.Bus(**plant.buses["r1"]) as bus:
             ...
 
-pytest finds the fixture where Fleetloop is installed. It starts `fleetloop plant`, a process of its
-own in real time: two emulated drives per robot on a bus, and the body that they move. With the test
-it is gone, its sockets too; if the test's own process is killed, it ends by itself.
+pytest finds the fixtures where Fleetloop is installed. `fleetloop_plant` starts `fleetloop plant`,
+a process of its own in real time: two emulated drives per robot on a bus, and the body that they
+move. With the test it is gone, its sockets too; if the test's own process is killed, it ends by
+itself.
 """
 
 import json
@@ -20,9 +25,13 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any, NamedTuple, Self
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, Self
 
 import pytest
+
+if TYPE_CHECKING:
+    from configs.scenario import Scenario
+    from fleetloop.api.result import Run
 
 READY_S = 20.0
 ANSWER_S = 5.0
@@ -200,3 +209,32 @@ def fleetloop_plant() -> Iterator[Callable[..., EmulatedPlant]]:
             return plants.enter_context(EmulatedPlant(scenario, **options))
 
         yield start
+
+
+@pytest.fixture
+def fleetloop_run(tmp_path: Path) -> "Callable[..., Run]":
+    """Run scenarios; one that doesn't hold fails the test, in the words of its verdict.
+
+        fleetloop_run(scenario, *, must_hold=True, allow_unchecked=False, **options)
+
+    The scenario is one of `fleetloop.load`, a file, or the name of a shipped one; the options are
+    those of `fleetloop.run`, as `in_process=False`. Folders of runs are in `tmp_path`.
+    """
+
+    def run(
+        scenario: "Scenario | str | Path",
+        *,
+        must_hold: bool = True,
+        allow_unchecked: bool = False,
+        **options: Any,
+    ) -> "Run":
+        import fleetloop
+
+        number = sum(1 for _ in tmp_path.glob("run-*")) + 1
+        made = fleetloop.run(scenario, **({"out": tmp_path / f"run-{number}"} | options))
+        try:
+            return made.raise_for_verdict(allow_unchecked=allow_unchecked) if must_hold else made
+        except fleetloop.NotHeldError as error:
+            pytest.fail(f"{error}\n{made.folder}", pytrace=False)
+
+    return run

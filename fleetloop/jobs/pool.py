@@ -112,6 +112,7 @@ def work(
     *,
     at_once: int | None = None,
     silence_s: float = SILENCE_S,
+    grace_s: float = TERM_GRACE_S,
     clock: Clock = SYSTEM_CLOCK,
 ) -> dict[int, Any]:
     """Do jobs; by number, what each brought, or why it didn't (`Failed`).
@@ -123,6 +124,7 @@ def work(
         on_told: told at once what else a job says, by its number.
         at_once: processes at a time; as many as there are processors if not given.
         silence_s: a process that tells nothing for so long is killed.
+        grace_s: a process that was asked to stop has so long before it is killed.
         clock: of the caller.
 
     Raises:
@@ -149,7 +151,7 @@ def work(
     finally:
         for worker in workers.values():
             worker.ask_to_stop()
-        deadline_s = clock.monotonic_s() + TERM_GRACE_S
+        deadline_s = clock.monotonic_s() + grace_s
         for worker in workers.values():
             worker.close(deadline_s - clock.monotonic_s())
     return done

@@ -133,7 +133,11 @@ def prepare(
             f"{words.deployment} {manner.deployment}: {words.in_process} has no buses and no"
             " network to place"
         )
-    deployment = load_deployment(manner.deployment, scenario) if manner.deployment else Deployment()
+    if manner.in_process and manner.speed:
+        raise ScenarioError(
+            f"{words.speed} {manner.speed:g}: {words.in_process} runs as fast as it can"
+        )
+    deployment = deployment_of(scenario, manner)
     placement.check_credentials(scenario, deployment)
     for user, why in placement.kept_out(deployment).items():
         note(f"{user}: kept out: {why}")
@@ -152,6 +156,17 @@ def prepare(
             f" {words.force} runs it all the same"
         )
     return deployment
+
+
+def deployment_of(scenario: Scenario, manner: Manner) -> Deployment:
+    """Where roles and buses are.
+
+    Raises:
+        ScenarioError: its file is wrong, or not for this scenario.
+    """
+    if manner.deployment is None:
+        return Deployment()
+    return load_deployment(manner.deployment, scenario)
 
 
 class Carried(NamedTuple):

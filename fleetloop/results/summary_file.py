@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BaseModel, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
 
 from configs.errors import ScenarioError
 from fleetloop.results.run_folder import SUMMARY
@@ -21,36 +21,52 @@ def _of_every_error(values: dict[str, Any]) -> dict[str, Any]:
     return values
 
 
-class _Worst(BaseModel):
+class _Table(BaseModel):
+    """Keys that aren't named here are attributes, too."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+
+class Worst(_Table):
+    """Of a robot, or the worst of all: settle times [s], greatest errors at the end, torque."""
+
     settle_s: Annotated[dict[str, float | None], AfterValidator(_of_every_error)]
     final_max: Annotated[dict[str, float | None], AfterValidator(_of_every_error)]
     peak_torque_wheel_N_m: float | None
 
 
-class _Robot(_Worst):
+class RobotSummary(Worst):
+    """Of one robot."""
+
     ticks: int
     settle_s_dot_s: float | None
     joined_s: float = 0.0
     left_s: float | None = None
 
 
-class _Spread(BaseModel):
+class Spread(_Table):
+    """Of the path variables, max − min over the robots [m]."""
+
     peak: float | None
     settle_s: float | None
     final: float | None
 
 
-class _Place(BaseModel):
+class Place(_Table):
+    """Where something was at its worst."""
+
     robots: list[str]
     t_s: float | None
 
 
-class _Expectation(BaseModel):
+class Expectation(_Table):
+    """What was expected, and what was found."""
+
     name: str | None = None
     claim: str
     held: bool | None
     value: float | None
-    worst: _Place | None
+    worst: Place | None
     bound: dict[str, float] | None
     margin: float | None
     unit: str
@@ -63,13 +79,15 @@ class _Expectation(BaseModel):
         return self
 
 
-class _Age(BaseModel):
+class Age(_Table):
+    """Age of what an edge gave [s]."""
+
     mean: float
     p99: float
     max: float
 
 
-class _Edge(BaseModel):
+class EdgeSummary(_Table):
     """Counts of an emulated edge; the age where it is recorded."""
 
     sent: int = 0
@@ -78,10 +96,12 @@ class _Edge(BaseModel):
     duplicated: int = 0
     reordered: int = 0
     late: int = 0
-    age_s: _Age | None = None
+    age_s: Age | None = None
 
 
-class _Realtime(BaseModel):
+class RealtimeSummary(_Table):
+    """How well the wall clock was kept."""
+
     miss_percent: float
     late_us: dict[str, float]
     round_trip_us: dict[str, float]
@@ -89,25 +109,46 @@ class _Realtime(BaseModel):
     missing_privileges: list[str]
 
 
-class _ClockOffset(BaseModel):
+class ClockOffset(_Table):
+    """Of another machine."""
+
     ahead_ms: float
     uncertain_ms: float
     drift_ms: float
 
 
-class _Event(BaseModel):
+class Fault(_Table):
+    """A fault of the scenario, or one that was ordered."""
+
+    name: str
+    kind: str
+    targets: list[str]
+    parameters: dict[str, Any]
+    ordered: bool
+    state: str
+    from_tick: int
+    from_s: float
+    to_tick: int | None
+    to_s: float | None
+
+
+class Event(_Table):
+    """What happened, at scenario time `t_s`."""
+
     t_s: float
     source: str
     kind: str
     text: str
 
 
-class _Stall(BaseModel):
+class Stall(_Table):
+    """A standstill."""
+
     t_s: float
     lasted_s: float
 
 
-class _Machine(BaseModel):
+class MachineSummary(_Table):
     """Of the launcher's view all is there or nothing."""
 
     stalls: int = 0
@@ -115,7 +156,7 @@ class _Machine(BaseModel):
     longest_stall_s: float | None = None
     longest_stall_at_s: float | None = None
     stopped_and_continued: int | None = None
-    plant_stalls: list[_Stall] = []
+    plant_stalls: list[Stall] = []
 
     @model_validator(mode="after")
     def _tells_of_its_stalls(self) -> Self:
@@ -129,7 +170,9 @@ class _Machine(BaseModel):
         return self
 
 
-class _Summary(BaseModel):
+class RunSummary(_Table):
+    """summary.json."""
+
     verdict: str
     reason: str
     scenario: str
@@ -141,23 +184,24 @@ class _Summary(BaseModel):
     real_time_factor: float | None
     startup_s: float
     teardown_s: float
-    robots: dict[str, _Robot]
-    worst: _Worst | None
-    s_spread: _Spread | None
-    expectations: list[_Expectation]
+    robots: dict[str, RobotSummary]
+    worst: Worst | None
+    s_spread: Spread | None
+    expectations: list[Expectation]
     cut_short: dict[str, str]
     record_lost: str
     stopped_robots: dict[str, str]
     notices: dict[str, list[str]]
-    events: list[_Event] = []
-    network: dict[str, _Edge] | None = None
+    faults: list[Fault] = []
+    events: list[Event] = []
+    network: dict[str, EdgeSummary] | None = None
     overruns: int
     frames_per_bus: dict[str, int]
     bus_troubles: dict[str, str]
     cpu_s: dict[str, float]
-    realtime: _Realtime | None
-    clock_offsets: dict[str, _ClockOffset] = {}
-    machine: _Machine | None
+    realtime: RealtimeSummary | None
+    clock_offsets: dict[str, ClockOffset] = {}
+    machine: MachineSummary | None
     seed: int
     versions: dict[str, str]
 
@@ -186,7 +230,7 @@ def read_summary(folder: Path) -> Summary | None:
     if not isinstance(summary, dict):
         raise _refusal(path, "not an object of what a run came to")
     try:
-        _Summary.model_validate(summary, strict=True)
+        RunSummary.model_validate(summary, strict=True)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(map(str, first["loc"])) or "its robots"

@@ -1,0 +1,61 @@
+"""The report's figures of a run, one at a time; they show themselves in a notebook."""
+
+from collections.abc import Callable, Mapping
+from io import BytesIO
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from configs.errors import ScenarioError
+from configs.scenario import Scenario
+from fleetloop.record.reader import Record
+from fleetloop.results import figures
+
+_Draw = Callable[[Record, Scenario], Figure]
+_ERRORS: Mapping[str, tuple[str, str]] = {
+    "x_e_m": ("x$_e$", "m"),
+    "y_e_m": ("y$_e$", "m"),
+    "theta_e_rad": ("θ$_e$", "rad"),
+}
+_FIGURES: Mapping[str, _Draw] = {
+    "graph": figures.graph,
+    "positions": figures.positions,
+    "path_variables": figures.path_variables,
+    "parameter_errors": figures.parameter_errors,
+    "speed_estimates": figures.speed_estimates,
+    "torques": figures.torques,
+    "law_signals": figures.law_signals,
+} | {name: figures.error_of(name, *about) for name, about in _ERRORS.items()}
+
+
+def draw(name: str, record: Record, scenario: Scenario) -> Figure:
+    """One figure.
+
+    Raises:
+        ScenarioError: there is none of that name.
+    """
+    if name not in _FIGURES:
+        raise ScenarioError(f"signal = {name!r}: one of {', '.join(_ERRORS)}")
+    with mpl.rc_context(figures.STYLE), np.errstate(all="ignore"):
+        return _shows_itself(_FIGURES[name](record, scenario))
+
+
+def all_of(record: Record, scenario: Scenario) -> Mapping[str, Figure]:
+    """Every figure of the report, by name."""
+    made = figures.all_figures(record, scenario)
+    return {one.name: _shows_itself(one.figure) for one in made}
+
+
+def _shows_itself(figure: Figure) -> Figure:
+    """Notebooks ask an object for a picture; a figure that isn't pyplot's has none of its own."""
+
+    def picture() -> bytes:
+        buffer = BytesIO()
+        figure.savefig(buffer, format="png")
+        return buffer.getvalue()
+
+    shown: Any = figure
+    shown._repr_png_ = picture
+    return figure
