@@ -9,6 +9,7 @@ ruff format --check .
 ruff check .
 mypy
 lint-imports
+docs/site/build.sh
 # A hang ends red long before CI's patience does.
 if [[ $# -gt 0 ]]; then
     tests/support/within.sh 60m pytest "$@"

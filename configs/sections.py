@@ -66,16 +66,22 @@ class Clock(Parameters):
 class Body(Parameters):
     """Physical parameters, equations (2)-(4); the defaults are the paper's EtsRo robot."""
 
-    wheel_radius_m: Positive = 0.04
-    half_track_m: Positive = 0.1
-    com_offset_m: Finite = 0.02
-    body_mass_kg: Positive = 2.3
-    wheel_mass_kg: NotNegative = 0.28
-    body_inertia_kg_m2: Positive = 0.01
-    wheel_axle_inertia_kg_m2: NotNegative = 0.0056
-    wheel_diameter_inertia_kg_m2: NotNegative = 0.002
-    damping_right_wheel_N_m_s: NotNegative = 0.02
-    damping_left_wheel_N_m_s: NotNegative = 0.02
+    wheel_radius_m: Positive = parameter(0.04, "r")
+    half_track_m: Positive = parameter(0.1, "b, half the distance of the wheels")
+    com_offset_m: Finite = parameter(0.02, "a, from the axle ahead to the centre of mass")
+    body_mass_kg: Positive = parameter(2.3, "m_c")
+    wheel_mass_kg: NotNegative = parameter(0.28, "m_w, with its motor")
+    body_inertia_kg_m2: Positive = parameter(
+        0.01, "I_c, about the vertical axis through the centre of mass"
+    )
+    wheel_axle_inertia_kg_m2: NotNegative = parameter(
+        0.0056, "I_w, of a wheel with its motor about the axle"
+    )
+    wheel_diameter_inertia_kg_m2: NotNegative = parameter(
+        0.002, "I_m, of a wheel with its motor about a diameter"
+    )
+    damping_right_wheel_N_m_s: NotNegative = parameter(0.02, "d_11")
+    damping_left_wheel_N_m_s: NotNegative = parameter(0.02, "d_22")
     wheels_in_mass: Literal[1, 2] = parameter(
         1, "m = m_c + n m_w: 1 as the paper prints it, 2 physically"
     )
@@ -121,10 +127,10 @@ Control = Annotated[Choice, LAW]
 class Coordination(Parameters):
     """Equations (38), (40), (45)."""
 
-    p: Positive = 2.0
-    q: Positive = 1.0
-    v_hat_0: Finite = 0.0
-    mu_0: Finite = 0.0
+    p: Positive = parameter(2.0, "(45), of mu [1/s]")
+    q: Positive = parameter(1.0, "(45), of the differences of s [1/s²]")
+    v_hat_0: Finite = parameter(0.0, "(38), the first estimate of v_r [m/s]")
+    mu_0: Finite = parameter(0.0, "(40), at the start [m/s]")
     compensation: Literal["extrapolate", "hold", "both"] = parameter(
         "extrapolate",
         "of the age of a neighbour's s: s + v_r_hat * age; as received; or compared with the"
@@ -160,7 +166,7 @@ class Robot(Parameters):
     pose: Pose
     v_m_s: Finite = 0.0
     omega_rad_s: Finite = 0.0
-    s_0: Finite = 0.0
+    s_0: Finite = parameter(0.0, "path variable at the start [m]")
     offset: Offset = AT_CENTRE
     body: BodyChanges = parameter(BodyChanges(), "parameters that differ from its type's")
     control: Changes = parameter(Changes({}), "law and gains that differ from [control]")

@@ -19,9 +19,13 @@ FLEET = "".join(
 UsageError = typer.BadParameter.__base__ or Exception
 
 
+ELSEWHERE = ("own", "pyproject", "fleet", "flower", "drives")
+"""Files that tests/system/test_own_laws.py and tests/docs/test_pages.py write and run."""
 TABLES = [
-    one for one in snippets("toml") if not one.text.startswith(("# own.toml", "# pyproject.toml"))
-]  # runs elsewhere
+    one
+    for one in snippets("toml")
+    if not one.text.startswith(tuple(f"# {name}.toml" for name in ELSEWHERE))
+]
 
 
 @pytest.mark.parametrize("snippet", TABLES, ids=lambda s: s.where)
@@ -62,3 +66,22 @@ def test_commands_that_are_shown_are_understood() -> None:
                 pytest.fail(f"{where}: {' '.join(words)}: {error.format_message()}")
         seen += 1
     assert seen > 30
+
+
+OURS = re.compile(r"(\.uv/bin/)?(uv run )?fleetloop ")
+PLACES = re.compile(r"\. \.venv/bin/activate$|mkdir \S+ && cd \S+$")
+
+
+def test_a_line_of_shell_that_no_test_runs_has_a_reason_on_its_page() -> None:
+    blocks = snippets("sh")
+    for block in blocks:
+        others = [it for it in block.text.splitlines() if not OURS.match(it) and it[:1] not in "#"]
+        others = [line for line in others if not PLACES.match(line)]
+        why = "put <!-- not run: REASON --> before it" if others else "take its reason away"
+        assert bool(others) == bool(block.not_run), f"{block.where}: {others}: {why}"
+
+
+def test_few_blocks_are_not_run() -> None:
+    everything = snippets("sh", "python", "toml")
+    assert len(everything) > 60
+    assert sum(bool(block.not_run) for block in everything) <= 10

@@ -7,8 +7,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 HOME = Path(__file__).resolve().parents[2]
-PAGES = (HOME / "README.md", *sorted((HOME / "docs").rglob("*.md")))
+MADE = HOME / "docs" / "reference"
+"""Pages that are made of the types in the code: see tests/docs/test_reference.py."""
+PAGES = (
+    HOME / "README.md",
+    *(page for page in sorted((HOME / "docs").rglob("*.md")) if MADE not in page.parents),
+)
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+_NOT_RUN = re.compile(r"<!-- not run: ([^\n]+) -->\n+\Z")
 _COMMAND = re.compile(r"(?:^|&& |uv run |\$ )(fleetloop [^\n]*)", re.MULTILINE)
 
 
@@ -18,6 +24,8 @@ class Snippet(NamedTuple):
     where: str  # page and line
     language: str
     text: str
+    not_run: str = ""
+    """The page's reason why no test runs all of it: `<!-- not run: REASON -->` before the block."""
 
 
 def snippets(*languages: str) -> list[Snippet]:
@@ -28,7 +36,8 @@ def snippets(*languages: str) -> list[Snippet]:
         for block in _BLOCK.finditer(text):
             line = text.count("\n", 0, block.start()) + 1
             where = f"{page.relative_to(HOME)}:{line}"
-            found.append(Snippet(where, block[1], block[2]))
+            reason = _NOT_RUN.search(text[: block.start()])
+            found.append(Snippet(where, block[1], block[2], reason[1] if reason else ""))
     return [snippet for snippet in found if snippet.language in languages]
 
 

@@ -27,6 +27,7 @@ FIXTURE = "(fleetloop_plant):"
 SERIAL = 'can.Bus(interface="slcan"'
 POSES = "motion_capture()"  # in test_real_robot.py
 OWN = "# my_law.py", "# my_shapes.py", "# my_analysed_law.py"  # in tests of own laws
+WALKED = "# chase.py", "# my_path.py", "# my_drive.py"  # in tests/docs/test_pages.py
 
 
 def shown(mark: str) -> list[Snippet]:
@@ -37,7 +38,7 @@ def shown(mark: str) -> list[Snippet]:
 
 def test_every_program_that_is_shown_is_tried_here() -> None:
     for snippet in snippets("python"):
-        marks = (LISTENS, FROM_AFAR, FIXTURE, SERIAL, POSES, *OWN)
+        marks = (LISTENS, FROM_AFAR, FIXTURE, SERIAL, POSES, *OWN, *WALKED)
         assert sum(mark in snippet.text for mark in marks) == 1, snippet.where
 
 
