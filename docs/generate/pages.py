@@ -75,7 +75,7 @@ _PAGES = {
     ),
     "commands.md": _Page(
         "Commands",
-        """Every verb with its arguments and options, as `-h` prints them, and the exit statuses.""",
+        """Every verb with its arguments and options, as `-h` prints them; exit statuses.""",
         commands_page,
     ),
     "deployment.md": _Page(

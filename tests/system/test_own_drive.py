@@ -8,6 +8,8 @@ from shutil import copytree
 import pytest
 from support import second_drive
 from support.processes import completed
+from support.snippets import snippets
+from support.walkthrough import write
 
 pytestmark = pytest.mark.system
 QUICK = ("--duration", "1", "--allow-unchecked", "--clock", "lockstep")
@@ -50,6 +52,17 @@ def test_processes_import_it_from_there_and_leave_the_same_record(own: Path) -> 
     (own / "my_drive" / "__init__.py").unlink()
     done = fleetloop(own.parent, "report", "own/a")
     assert done.returncode == 0, done.stderr
+
+
+def test_the_protocol_of_the_page_leaves_the_same_record_over_processes(tmp_path: Path) -> None:
+    shown = [one for one in snippets("toml", "python") if one.where.startswith("docs/drive-pro")]
+    for block in shown:
+        write(tmp_path, block)
+    scenario = str(tmp_path / "drives.toml")
+    assert completed(tmp_path / "a", scenario, "--in-process", *QUICK)[0] == 0
+    assert completed(tmp_path / "b", scenario, *QUICK)[0] == 0
+    done = fleetloop(tmp_path, "diff", "a", "b")
+    assert (done.returncode, done.stdout.partition(":")[0]) == (0, "identical"), done.stdout
 
 
 @pytest.mark.parametrize(
