@@ -91,6 +91,14 @@ DeploymentOption = Annotated[
         help="CAN interfaces, router and roles on other machines. Default: all on this machine.",
     ),
 ]
+JsonLinesOption = Annotated[
+    bool,
+    typer.Option(
+        "--json-lines",
+        help="Print what happens as it does, an object of JSON per line; the last one has the"
+        " outcome.",
+    ),
+]
 JunitOption = Annotated[
     Path | None,
     typer.Option("--junit", metavar="FILE", help="Write the verdicts as JUnit XML, for CI."),
@@ -142,6 +150,12 @@ def overrides_of(
     if record_inputs:
         named.append(Override("--record-inputs", "record.inputs", True))
     return (*(overrides or ()), *named)
+
+
+def refuse_both(as_json: bool, json_lines: bool) -> None:
+    """Refuse one document and lines at once."""
+    if as_json and json_lines:
+        raise ScenarioError("--json and --json-lines: choose one")
 
 
 def refuse_lockstep(clock: str | None) -> None:

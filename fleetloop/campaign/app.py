@@ -7,7 +7,14 @@ import typer
 
 from configs.errors import ScenarioError
 from fleetloop import numbers
-from fleetloop.options import JunitOption, ScenarioArg, SetOption, listed
+from fleetloop.options import (
+    JsonLinesOption,
+    JunitOption,
+    ScenarioArg,
+    SetOption,
+    listed,
+    refuse_both,
+)
 
 _FOR_S, _RECOVER_S, _HOLD_S, _LIMIT_S = 2.0, 5.0, 1.0, 300.0
 
@@ -94,13 +101,15 @@ def campaign(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print campaign.json on standard output, no matrix.")
     ] = False,
+    json_lines: JsonLinesOption = False,
 ) -> None:
     """Faults by times by seeds: what a scenario survives, as a matrix of verdicts."""
     from fleetloop.campaign import command, plan
     from fleetloop.campaign.matrix import Conditions
     from fleetloop.campaign.verdicts import verdicts_named
 
-    ways = command.Ways(jobs, as_json, junit, verdicts_named(allow))
+    refuse_both(as_json, json_lines)
+    ways = command.Ways(jobs, as_json, junit, verdicts_named(allow), json_lines)
     if resume is not None:
         if scenario is not None:
             raise ScenarioError(f"{scenario}: --resume {resume} has its scenario in its folder")

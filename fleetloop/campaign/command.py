@@ -1,7 +1,7 @@
 """`fleetloop campaign`: faults by times by seeds on one scenario, from its file to a matrix."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +24,9 @@ from fleetloop.campaign.verdicts import Result, Verdict
 from fleetloop.campaign.whole import WholeRun
 from fleetloop.jobs import pool
 from fleetloop.jobs.job import Told
+from fleetloop.json_lines import JsonLines
 from fleetloop.results import run_folder
-from fleetloop.results.summary import to_json
+from fleetloop.results.summary import finite, to_json
 from fleetloop.signals import stop_on_signals
 from fleetloop.terminal import note, say, say_json
 
@@ -41,6 +42,12 @@ class Ways:
     as_json: bool = False
     junit: Path | None = None
     allowed: frozenset[Verdict] = frozenset({Verdict.HELD, Verdict.RECOVERED})
+    json_lines: bool = False
+
+    @property
+    def quiet(self) -> bool:
+        """Whether standard output is JSON."""
+        return self.as_json or self.json_lines
 
 
 def begin(plan: Plan, scenario: Scenario, out: Path | None, ways: Ways) -> int:
@@ -102,15 +109,27 @@ def _go(folder: Folder, scenario: Scenario, kinds: Kinds, ways: Ways) -> int:
         if cell.kind in kinds.refused:
             folder.add(Result(cell, Verdict.REFUSED, kinds.refused[cell.kind]))
     left = [cell for cell in left if cell not in folder.results]
+    lines = JsonLines() if ways.json_lines else None
+    if lines is not None:
+        told = {"scenario": scenario.name, "folder": str(folder.path), "cells": len(cells)}
+        lines.say("started", command="campaign", **told, left=len(left))
     with (
         stop_on_signals() as stop,
-        Meter(scenario.name, len(cells), len(cells) - len(left), quiet=ways.as_json) as meter,
+        Meter(scenario.name, len(cells), len(cells) - len(left), quiet=ways.quiet) as meter,
     ):
-        _Work(folder, scenario, kinds.faults, left, stop, meter, ways).do()
+        _Work(folder, scenario, kinds.faults, left, stop, meter, ways, lines).do()
     if stop.requested:
         note(f"{stop.reason}: go on with fleetloop campaign --resume {folder.path}")
+        if lines is not None:
+            _say_end(lines, folder, ExitStatus.INTERRUPTED, None)
         return ExitStatus.INTERRUPTED
-    return _finish(folder, scenario, cells, SYSTEM_CLOCK.monotonic_s() - began_s, ways)
+    return _finish(folder, scenario, cells, SYSTEM_CLOCK.monotonic_s() - began_s, ways, lines)
+
+
+def _say_end(lines: JsonLines, folder: Folder, status: int, numbers: Any) -> None:
+    """The last line; no numbers of a campaign that was interrupted."""
+    lines.say("ended", exit_status=int(status), folder=str(folder.path), campaign=finite(numbers))
+    lines.end()
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +143,7 @@ class _Work:
     stop: Stop
     meter: Meter
     ways: Ways
+    lines: JsonLines | None = None
 
     def do(self) -> None:
         """First those of one process, seed by seed, then those over processes, one by one."""
@@ -189,6 +209,7 @@ class _Work:
             if isinstance(said, Baseline | Result):
                 self.folder.add(said)
                 self.meter.advance(said)
+                self._say(said)
 
         done = pool.work(
             [job for job, _ in jobs],
@@ -204,15 +225,29 @@ class _Work:
                 if cell not in self.folder.results and not self.stop.requested:
                     keep(Result(cell, Verdict.ERROR, str(brought)))
 
+    def _say(self, said: Baseline | Result) -> None:
+        match said:
+            case _ if self.lines is None:
+                return
+            case Baseline():
+                self.lines.say("baseline", **finite(asdict(said)))
+            case Result():
+                self.lines.say("cell", **finite(said.as_table()))
+
 
 def _finish(
-    folder: Folder, scenario: Scenario, cells: Sequence[Cell], wall_s: float, ways: Ways
+    folder: Folder,
+    scenario: Scenario,
+    cells: Sequence[Cell],
+    wall_s: float,
+    ways: Ways,
+    lines: JsonLines | None,
 ) -> int:
     results = [folder.results[cell] for cell in cells if cell in folder.results]
     numbers = described(folder, scenario, results, wall_s)
     if ways.as_json:
         say_json(numbers | {"folder": str(folder.path)})
-    else:
+    elif lines is None:
         print_matrix(folder, scenario, results)
         say(summary_line(results, wall_s))
     run_folder.write(folder.path / NUMBERS, to_json(numbers))
@@ -220,8 +255,11 @@ def _finish(
     write_tables(folder.path, results)
     if ways.junit is not None:
         write_junit(ways.junit, scenario.name, folder.baselines.values(), results, ways.allowed)
-    if not ways.as_json:
+    if not ways.quiet:
         say(f"page     {folder.path / PAGE}")
     sound = all(one.verdict == "held" for one in folder.baselines.values())
     bad = [result for result in results if result.verdict not in ways.allowed]
-    return ExitStatus.FAILED if bad or not sound else ExitStatus.OK
+    status = ExitStatus.FAILED if bad or not sound else ExitStatus.OK
+    if lines is not None:
+        _say_end(lines, folder, status, numbers)
+    return status

@@ -9,12 +9,14 @@ from fleetloop import numbers
 from fleetloop.options import (
     ClockOption,
     DeploymentOption,
+    JsonLinesOption,
     JunitOption,
     ScenarioArg,
     SeedOption,
     SetOption,
     listed,
     overrides_of,
+    refuse_both,
     refuse_lockstep,
 )
 
@@ -60,6 +62,7 @@ def run(
             " or the problems of the scenario.",
         ),
     ] = False,
+    json_lines: JsonLinesOption = False,
     junit: JunitOption = None,
     profile: Annotated[
         bool,
@@ -94,6 +97,7 @@ def run(
     """Run a scenario, record everything, check its expectations, print and save the results."""
     from fleetloop.launch.run import RunOptions, run_scenario
 
+    refuse_both(as_json, json_lines)
     options = RunOptions(
         in_process=in_process,
         speed=speed,
@@ -102,6 +106,7 @@ def run(
         ),
         out=out,
         as_json=as_json,
+        json_lines=json_lines,
         figures=figures,
         profile=profile,
         deployment=deployment,
@@ -157,6 +162,7 @@ def plant(
             "--json", help="When ready, print the arguments of can.Bus(**...) on one line."
         ),
     ] = False,
+    json_lines: JsonLinesOption = False,
     stdin: Annotated[
         bool,
         typer.Option(
@@ -172,12 +178,14 @@ def plant(
     from fleetloop.launch.plant import PlantOptions, run_plant
 
     refuse_lockstep(clock)
+    refuse_both(as_json, json_lines)
     options = PlantOptions(
         robots=listed("--robots", robots),
         duration_s=duration,
         deployment=deployment,
         overrides=overrides_of(overrides, clock=clock, seed=seed),
         as_json=as_json,
+        json_lines=json_lines,
         serve_stdin=stdin,
         join=join,
     )

@@ -16,7 +16,7 @@ import json
 import os
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,7 @@ from configs.resolve import plant_brief
 from configs.roles import PLANT
 from configs.scenario import Scenario
 from configs.signals import PLANT_SIGNALS
+from fleetloop.json_lines import JsonLines
 from fleetloop.launch import open_files, placement
 from fleetloop.launch.plant_faults import PlantFaults
 from fleetloop.signals import stop_on_signals
@@ -63,6 +64,7 @@ class PlantOptions:
     deployment: Path | None = None
     overrides: Overrides = ()
     as_json: bool = False
+    json_lines: bool = False
     serve_stdin: bool = False
     join: bool = False
 
@@ -77,8 +79,11 @@ class _Nowhere:
 class _Watch:
     """Says which robot's motion diverged, as soon as it is seen."""
 
-    def __init__(self, robots: Sequence[EmulatedRobot], period_ns: int) -> None:
+    def __init__(
+        self, robots: Sequence[EmulatedRobot], period_ns: int, say: Callable[[str, str], None]
+    ) -> None:
         self._robots = robots
+        self._say = say
         self._period_ns = period_ns
         self._told: set[str] = set()
 
@@ -87,7 +92,7 @@ class _Watch:
         for robot, why in diverged_robots(self._robots, self._period_ns).items():
             if robot not in self._told:
                 self._told.add(robot)
-                note(f"STOPPED {robot}: {why}; its drives are disarmed for good")
+                self._say(robot, f"STOPPED {robot}: {why}; its drives are disarmed for good")
 
 
 def run_plant(source: str, options: PlantOptions) -> int:
@@ -101,6 +106,8 @@ def run_plant(source: str, options: PlantOptions) -> int:
     deployment = Deployment()
     if options.deployment is not None:
         deployment = load_deployment(options.deployment, scenario)
+    if options.json_lines and (options.join or options.serve_stdin):
+        raise ScenarioError("--json-lines: for a plant on its own, without --join and --stdin")
     if options.join:
         return _join(scenario, deployment)
     brief = plant_brief(scenario, network=NetworkLink("alone", "", "", ""))
@@ -187,7 +194,15 @@ def _run(
 ) -> None:
     robots = [emulated_robot(robot) for robot in brief.robots]
     nowhere = _Nowhere()
-    watch = _Watch(robots, brief.schedule.period_ns)
+    lines = JsonLines() if options.json_lines else None
+
+    def tell(source: str, text: str) -> None:
+        if lines is None:
+            note(text)
+        else:
+            lines.say("note", source=source, text=text)
+
+    watch = _Watch(robots, brief.schedule.period_ns, tell)
     rows = [RowBuffer(PLANT_ROW, lambda *_: None) for _ in robots]
     poses = [nowhere] * len(robots)
     loop = RealtimeLoop(brief, robots, end, hub, poses, rows, watch.look, {}, orders=faults.orders)
@@ -196,12 +211,27 @@ def _run(
         threading.Thread(
             target=_serve_stdin, args=(robots, loop, faults, stop), daemon=True
         ).start()
-    _say_ready(brief, buses, as_json=options.as_json)
+    if lines is not None:
+        named = {robot: dict(bus) for robot, bus in buses.items()}
+        lines.say("started", command="plant", buses=named)
+    else:
+        _say_ready(brief, buses, as_json=options.as_json)
     with settled_memory():
         loop.run(SYSTEM_CLOCK.monotonic_ns() + GO_AHEAD_NS, stop)
     watch.look()
     for bus, trouble in bus_troubles(end.troubles(), robots).items():
-        note(f"BUS {bus}: {trouble}")
+        tell(f"bus/{bus}", f"BUS {bus}: {trouble}")
+    if lines is not None:
+        counters = loop.counters
+        lines.say(
+            "ended",
+            exit_status=int(ExitStatus.OK),
+            wall_s=counters.wall_ns * 1e-9,
+            frames=counters.frames,
+            late_ticks=counters.overruns,
+        )
+        lines.end()
+        return
     frames = ", ".join(f"{bus} {count}" for bus, count in loop.counters.frames.items())
     late = f"; late ticks: {loop.counters.overruns}" if loop.counters.overruns else ""
     jitter = f" (missing privileges: {', '.join(missing)})" if late and missing else ""

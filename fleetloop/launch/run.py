@@ -1,6 +1,7 @@
 """`fleetloop run`: one scenario from file to results."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ from configs.loading import load
 from configs.overrides import Overrides
 from configs.resolve import schedule
 from configs.roles import short_name
+from fleetloop.json_lines import JsonLines
 from fleetloop.launch.conduct import (
     Concluded,
     Listener,
@@ -21,6 +23,7 @@ from fleetloop.launch.conduct import (
     conclude,
     prepare,
 )
+from fleetloop.launch.run_lines import RunLines
 from fleetloop.record.scan import RecordError
 from fleetloop.results.junit import write_junit
 from fleetloop.results.outcome import Outcome, of_error, of_summary, unbegun
@@ -48,6 +51,7 @@ class RunOptions:
     overrides: Overrides = ()
     out: Path | None = None
     as_json: bool = False
+    json_lines: bool = False
     figures: bool = True
     profile: bool = False
     deployment: Path | None = None
@@ -56,12 +60,22 @@ class RunOptions:
     """Run what `fleetloop check` calls an error."""
     junit: Path | None = None
 
+    @property
+    def for_programs(self) -> bool:
+        """Whether standard output is JSON."""
+        return self.as_json or self.json_lines
+
 
 class _Live(NamedTuple):
     """Says what happens while a run goes on."""
 
     progress: RunProgress
     period_ns: int
+
+    @property
+    def listener(self) -> Listener:
+        """To be told of the run."""
+        return Listener(self.on_progress, self.on_event, self.on_notice, self.on_start)
 
     def on_start(self, start: Start) -> None:
         """Know where the robots are seen."""
@@ -86,6 +100,7 @@ class _Teller:
 
     def __init__(self, source: str, options: RunOptions) -> None:
         self._source, self._options = source, options
+        self.lines = JsonLines() if options.json_lines else None
         self.told = False
 
     def tell(self, outcome: Outcome) -> int:
@@ -93,6 +108,9 @@ class _Teller:
         options, self.told = self._options, True
         if options.as_json:
             say_json(outcome)
+        if self.lines is not None:
+            self.lines.say("outcome", scenario=self._source, outcome=outcome)
+            self.lines.end()
         if options.junit is not None:
             allowed = options.allow_unchecked
             write_junit(options.junit, {self._source: outcome}, allow_unchecked=allowed)
@@ -103,7 +121,8 @@ class _Teller:
 def run_scenario(source: str, options: RunOptions) -> int:
     """Run a scenario, save and print its results; return the exit status.
 
-    With `as_json` an error is told as an outcome, too, and not raised.
+    Where standard output is JSON an error, or an early Ctrl-C, is told as an outcome, too, and not
+    raised.
 
     Raises:
         ScenarioError: the scenario or an option is wrong; nothing was started.
@@ -116,9 +135,14 @@ def run_scenario(source: str, options: RunOptions) -> int:
         if teller.told:
             raise
         status = teller.tell(of_error(source, error))
-        if options.as_json:
+        if options.for_programs:
             return status
         raise
+    except KeyboardInterrupt:
+        if teller.told or not options.for_programs:
+            raise
+        reason = "interrupted before it began"
+        return teller.tell(unbegun(source, "interrupted", reason, ExitStatus.INTERRUPTED))
 
 
 def _run(source: str, options: RunOptions, teller: _Teller) -> int:
@@ -132,13 +156,15 @@ def _run(source: str, options: RunOptions, teller: _Teller) -> int:
     )
     if not options.in_process:
         keep_to_itself()
-    deployment = prepare(source, scenario, manner, note, overrides=options.overrides)
+    told = None if teller.lines is None else RunLines(teller.lines, scenario)
+    say = note if told is None else partial(told.note, "check")
+    deployment = prepare(source, scenario, manner, say, overrides=options.overrides)
     with (
         stop_on_signals() as stop,
-        RunProgress(scenario.name, scenario.ends_at_s, quiet=options.as_json) as progress,
+        RunProgress(scenario.name, scenario.ends_at_s, quiet=options.for_programs) as progress,
     ):
         live = _Live(progress, schedule(scenario).period_ns)
-        listener = Listener(live.on_progress, live.on_event, live.on_notice, live.on_start)
+        listener = live.listener if told is None else told.listener
         carried = carry_out(scenario, options.out, manner, deployment, listener, stop)
     ended, reason = carried.stats.ended, carried.stats.reason
     if not carried.stats.began:
@@ -156,7 +182,7 @@ def _run(source: str, options: RunOptions, teller: _Teller) -> int:
 
 def _show(concluded: Concluded, folder: Path, options: RunOptions, teller: _Teller) -> int:
     record, summary, unsaved = concluded
-    if not options.as_json:
+    if not options.for_programs:
         print_results(summary, folder)
     status = exit_status(summary, allow_unchecked=options.allow_unchecked)
     teller.tell(of_summary(summary, folder, status))
@@ -166,7 +192,7 @@ def _show(concluded: Concluded, folder: Path, options: RunOptions, teller: _Tell
         from fleetloop.results.report import write_report
 
         page = write_report(folder, record)
-        if not options.as_json:
+        if not options.for_programs:
             print_report(page)
     return status
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from fleetloop import numbers
-from fleetloop.options import JunitOption, SetOption
+from fleetloop.options import JsonLinesOption, JunitOption, SetOption, refuse_both
 
 _bound = numbers.between(0.1, numbers.LONGEST_S)
 
@@ -53,9 +53,12 @@ def test(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print all outcomes as JSON, no lines.")
     ] = False,
+    json_lines: JsonLinesOption = False,
 ) -> None:
     """Run every scenario of files and folders as a test: what each expects has to hold."""
     from fleetloop.suite.command import SuiteOptions, run_tests
+
+    refuse_both(as_json, json_lines)
 
     options = SuiteOptions(
         select=select,
@@ -67,6 +70,7 @@ def test(
         out=out,
         keep=keep,
         as_json=as_json,
+        json_lines=json_lines,
         junit=junit,
     )
     raise typer.Exit(run_tests(paths, options))

@@ -12,8 +12,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.lifecycle import Stop
 from configs.errors import ExitStatus
 from fleetloop.jobs.pool import processors
+from fleetloop.json_lines import JsonLines
 from fleetloop.results import run_folder
 from fleetloop.results.junit import write_junit
 from fleetloop.results.outcome import Outcome
@@ -39,6 +41,7 @@ class SuiteOptions:
     keep: bool = False
     """Keep the folders of runs that held."""
     as_json: bool = False
+    json_lines: bool = False
     junit: Path | None = None
 
 
@@ -51,17 +54,23 @@ def run_tests(paths: Sequence[str], options: SuiteOptions) -> int:
     """
     sources = selected(paths, options.select)
     at_once = options.jobs or processors()
-    if not options.as_json:
+    lines = JsonLines() if options.json_lines else None
+    quiet = options.as_json or options.json_lines
+    if lines is not None:
+        lines.say("started", command="test", scenarios=list(sources), at_once=at_once)
+    if not quiet:
         say(header(version("fleetloop"), len(sources), at_once))
     created = run_folder.create("test", options.out, SYSTEM_CLOCK.wall_ns()) if sources else None
     began_s = SYSTEM_CLOCK.monotonic_s()
-    listing = Listing(sources, options.overrides, quiet=options.as_json)
+    listing = Listing(sources, options.overrides, quiet=quiet)
 
     def on_done(case: Case, outcome: Outcome) -> None:
         if status_of(outcome) == HELD and not options.keep:
             shutil.rmtree(case.folder, ignore_errors=True)
             outcome["folder"] = None
         listing.show(case.source, outcome)
+        if lines is not None:
+            lines.say("outcome", scenario=case.source, outcome=outcome)
 
     outcomes: dict[str, Outcome] = {}
     cases = [] if created is None else _cases(sources, created.path, options)
@@ -76,8 +85,17 @@ def run_tests(paths: Sequence[str], options: SuiteOptions) -> int:
         write_junit(options.junit, outcomes)
     if options.as_json:
         say_json(_document(outcomes, options, took_s))
-    else:
+    elif lines is None:
         listing.end(outcomes, took_s)
+    status = _exit_status(outcomes, stop)
+    if lines is not None:
+        said = _document(outcomes, options, took_s)
+        lines.say("ended", exit_status=int(status), **said)
+        lines.end()
+    return status
+
+
+def _exit_status(outcomes: Mapping[str, Outcome], stop: Stop) -> ExitStatus:
     if stop.requested:
         return ExitStatus.INTERRUPTED
     if not outcomes:
