@@ -22,6 +22,7 @@ from fleetloop.compare.app import compare
 from fleetloop.fault.app import app as fault_app
 from fleetloop.graph.app import graph
 from fleetloop.launch.app import agent, network, plant, run
+from fleetloop.live.app import live
 from fleetloop.options import VersionOption
 from fleetloop.replay.app import replay
 from fleetloop.results.app import diff, export, report
@@ -64,6 +65,7 @@ for verb in (
     campaign,
     graph,
     network,
+    live,
     report,
     export,
     diff,

@@ -39,6 +39,14 @@ def run(
             help="Hold the run to this multiple of real time; 0: as fast as the machine allows.",
         ),
     ] = 0.0,
+    live: Annotated[
+        bool,
+        typer.Option(
+            "--live",
+            help="With a page that shows the run and has its controls; its address is printed when"
+            " it is there (fleetloop live opens it later).",
+        ),
+    ] = False,
     clock: ClockOption = None,
     duration: Annotated[
         float | None,
@@ -101,6 +109,7 @@ def run(
     options = RunOptions(
         in_process=in_process,
         speed=speed,
+        live=live,
         overrides=overrides_of(
             overrides, clock=clock, seed=seed, duration=duration, record_inputs=record_inputs
         ),

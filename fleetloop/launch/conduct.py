@@ -81,6 +81,7 @@ class Words(NamedTuple):
     """What a caller calls the options of `Manner`; the default is the command line."""
 
     in_process: str = "--in-process"
+    live: str = "--live"
     lockstep: str = "--clock lockstep"
     speed: str = "--speed"
     deployment: str = "--deployment"
@@ -128,6 +129,8 @@ def prepare(
         )
     if manner.in_process and (problem := process_fault_problem(scenario)):
         raise ScenarioError(f"{source}: {problem}, without {words.in_process}")
+    if manner.in_process and manner.live:
+        raise ScenarioError(f"{words.live}: {words.in_process} has no viewer")
     if manner.in_process and manner.deployment is not None:
         raise ScenarioError(
             f"{words.deployment} {manner.deployment}: {words.in_process} has no buses and no"

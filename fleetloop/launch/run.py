@@ -48,6 +48,7 @@ class RunOptions:
 
     in_process: bool = False
     speed: float = 0.0
+    live: bool = False
     overrides: Overrides = ()
     out: Path | None = None
     as_json: bool = False
@@ -152,6 +153,7 @@ def _run(source: str, options: RunOptions, teller: _Teller) -> int:
         speed=options.speed,
         deployment=options.deployment,
         profile=options.profile,
+        live=options.live,
         force=options.force,
     )
     if not options.in_process:

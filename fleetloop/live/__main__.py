@@ -1,83 +1,140 @@
-"""The viewer's process: hears rows, progress and notices of a run, and asks its launcher.
+"""The viewer's process: hears the rows of a run, serves its page, and asks its launcher.
 
 Started by the launcher when the run's door is asked for it (`fleetloop.launch.viewer`). It yields
-the processor to everything else (nice 19), and its end is nothing to the run.
+the processor to everything else (nice 19), and its end is nothing to the run. Asked to stop, it
+shows the verdict to those who look, and goes.
 """
 
+import asyncio
 import os
-from collections import Counter
 from pathlib import Path
 
 from bridge.network import keys
 from bridge.network.client import StoppedError, open_client
-from bridge.network.link import Arrival, Link
+from bridge.network.link import Arrival, Link, waiting
 from bridge.network.messages import Rows
 from bridge.network.telemetry import PLANT_ROW, row_of
 from bridge.process.lifecycle import Stop, serve
 from configs.brief import ViewerBrief
+from configs.errors import FleetloopError
+from configs.events import KINDS, Event
 from configs.loading import loads
 from configs.resolve import signals_of
-from configs.roles import VIEWER, processes_of
+from configs.roles import VIEWER
 from configs.scenario import Scenario
-from fleetloop.door.client import RunClient
+from fleetloop.live.door import RunDoor
+from fleetloop.live.hub import Hub
+from fleetloop.live.server import LiveServer
+from fleetloop.live.state import LiveState
 from fleetloop.results import run_folder
 
 NICE = 19
 ROOM_BYTES = 1 << 22
 """Of what waits of one source: a viewer that falls behind misses rows."""
-LOOK_S = 0.1
+_DRAIN_S, _IDLE_S = 0.02, 0.1
+_STATUS_S, _FAULTS_S = 0.1, 0.5
+_ASK_S = 5.0
+_LAST_ROWS_S, _LAST_LOOK_S = 0.2, 1.0
+"""Of the end: for rows that are on their way, and for browsers to draw the verdict."""
 
 
 class Heard:
-    """Counts the rows of each source, and other messages by their kind.
+    """The rows of a run on their way into the picture.
 
     Args:
         scenario: of the run.
+        state: takes the rows.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        self.counts: Counter[str] = Counter()
-        """Rows by truth/<robot> and telemetry/<robot>; messages by progress and notice."""
+    def __init__(self, scenario: Scenario, state: LiveState) -> None:
+        self._state = state
         self._row_bytes = {
-            f"telemetry/{robot.name}": row_of(signals_of(scenario, robot)).size
+            f"controller/{robot.name}": row_of(signals_of(scenario, robot)).size
             for robot in scenario.robot
-        } | {f"truth/{robot.name}": PLANT_ROW.size for robot in scenario.robot}
+        } | {f"plant/{robot.name}": PLANT_ROW.size for robot in scenario.robot}
 
     def subscribe(self, link: Link, run: str) -> None:
-        """Subscribe to what the viewer may hear."""
-        robots = tuple(tag.partition("/")[2] for tag in self._row_bytes if tag.startswith("truth/"))
-        for robot in robots:
-            link.subscribe(keys.truth(run, robot), f"truth/{robot}", room_bytes=ROOM_BYTES)
-            link.subscribe(keys.telemetry(run, robot), f"telemetry/{robot}", room_bytes=ROOM_BYTES)
-        for process in processes_of(robots):
-            link.subscribe(keys.progress(run, process), "progress")
-            link.subscribe(keys.notice(run, process), "notice")
+        """Subscribe to the rows."""
+        for robot in self._state.robots:
+            link.subscribe(keys.truth(run, robot), f"plant/{robot}", room_bytes=ROOM_BYTES)
+            telemetry = keys.telemetry(run, robot)
+            link.subscribe(telemetry, f"controller/{robot}", room_bytes=ROOM_BYTES)
 
     def take(self, arrival: Arrival) -> None:
-        """Count a message."""
-        row_bytes = self._row_bytes.get(arrival.tag)
-        if row_bytes is None:
-            self.counts[arrival.tag] += 1
-        elif (rows := Rows.decode(arrival.payload, row_bytes)) is not None:
-            self.counts[arrival.tag] += rows.length
+        """Take a block of rows; what is none is passed over."""
+        rows = Rows.decode(arrival.payload, self._row_bytes[arrival.tag])
+        if rows is not None and rows.length and 0 <= rows.first_tick < self._state.schedule.ticks:
+            source, _, robot = arrival.tag.partition("/")
+            plant = source == "plant"
+            self._state.hear(robot, "plant" if plant else "controller", rows.first_tick, rows.rows)
+
+
+async def _hear(link: Link, heard: Heard, hub: Hub) -> None:
+    """Rows, as they come; they are looked at when somebody does."""
+    while True:
+        for arrival in waiting(link):
+            heard.take(arrival)
+        if not hub.watched:
+            hub.idle()
+        await asyncio.sleep(_DRAIN_S if hub.watched else _IDLE_S)
+
+
+async def _ask(door: RunDoor, hub: Hub) -> None:
+    """The run's status, its faults and events, several times a second."""
+    state, since, faults_s = hub.state, 0, 0.0
+    loop = asyncio.get_running_loop()
+    while door.open_:
+        try:
+            state.status = await door.ask("run.status", within_s=_ASK_S)
+            said = await door.ask("run.events", within_s=_ASK_S, since=since)
+            since = said["next"]
+            state.note_events(_event(one) for one in said["events"] if one["kind"] in KINDS)
+            if loop.time() >= faults_s:
+                faults_s = loop.time() + _FAULTS_S
+                state.faults = (await door.ask("fault.list", within_s=_ASK_S))["faults"]
+        except FleetloopError:
+            pass  # the run is ending, or stands still; the page goes on with what it has
+        await asyncio.sleep(_STATUS_S if hub.watched else 1.0)
+
+
+def _event(said: dict[str, object]) -> Event:
+    return Event(*(said[key] for key in Event._fields))  # type: ignore[arg-type]
+
+
+async def _serve(brief: ViewerBrief, link: Link, stop: Stop) -> str:
+    scenario = loads(run_folder.SCENARIO, brief.scenario_toml, recorded=True)
+    state = LiveState(scenario)
+    door = await RunDoor.open(Path(brief.door))
+    hub = Hub(state, door, brief.network.run)
+    server = LiveServer(hub, brief.token)
+    heard = Heard(scenario, state)
+    heard.subscribe(link, brief.network.run)
+    link.declare_live(keys.live(brief.network.run, VIEWER.name))
+    os.nice(NICE)
+    await door.ask("live.listening", token=brief.token, url=server.address)
+    tasks = [asyncio.create_task(one) for one in (_hear(link, heard, hub), _ask(door, hub))]
+    while not stop.requested:
+        await asyncio.sleep(_IDLE_S)
+    await asyncio.sleep(_LAST_ROWS_S)
+    for task in tasks:
+        task.cancel()
+    for arrival in waiting(link):
+        heard.take(arrival)
+    hub.end("ended")
+    await hub.shown(_LAST_LOOK_S)
+    server.stop()
+    await door.close()
+    return f"{state.tick + 1} ticks seen"
 
 
 def run(brief: ViewerBrief, stop: Stop) -> str:
-    """Hear and count until told to stop."""
-    os.nice(NICE)
-    heard = Heard(loads(run_folder.SCENARIO, brief.scenario_toml, recorded=True))
+    """Serve the page until told to stop."""
     try:
         link = open_client(brief.network, brief.start_deadline_s, stop)
     except StoppedError:
         return ""
-    with link, RunClient(Path(brief.door)) as client:
-        heard.subscribe(link, brief.network.run)
-        link.declare_live(keys.live(brief.network.run, VIEWER.name))
-        client.ask("live.listening", token=brief.token, url="")
-        while not stop.requested:
-            if (arrival := link.receive(LOOK_S)) is not None:
-                heard.take(arrival)
-    return f"heard {heard.counts.total()} rows and messages"
+    with link:
+        return asyncio.run(_serve(brief, link, stop))
 
 
 def main() -> int:
