@@ -69,7 +69,8 @@ class _Recorder:
         self._row_sizes |= {f"plant/{robot}": PLANT_ROW.size for robot in brief.robots}
         self._row_sizes |= {f"can/{bus}": FRAME_ROW.size for bus in brief.buses}
         self._row_sizes |= dict.fromkeys(inputs, 1)
-        self._absent: set[str] = set()  # sources that have left once, and may come again
+        self._away: set[str] = set()  # controllers that have left and may come again
+        self._absent: set[str] = set()  # those that have been away
         tick_bytes = sum(size for tag, size in self._row_sizes.items() if tag in sources)
         self._patience_ticks = min(max(ABSENT_BYTES // tick_bytes, ABSENT_TICKS), AHEAD_TICKS // 2)
         self._lost_inputs: dict[str, int] = {}  # by tag, the byte from which on they are missing
@@ -84,13 +85,10 @@ class _Recorder:
         rows = Rows.decode(arrival.payload, self._row_sizes[arrival.tag])
         if rows is not None and kind == "inputs":
             return self._store_inputs(arrival.tag, robot, rows)
-        if rows is not None and kind == "controller" and not rows.length:
-            if self._leaves(arrival.tag, rows):
-                return rows.final
-            if arrival.tag in self._absent and not rows.final:  # its first word, or the old one's
-                self.unfinished |= {arrival.tag, f"inputs/{robot}"} & self._tags
+        if rows is not None and kind == "controller" and self._leaves(arrival.tag, rows):
+            return rows.final
         if rows is not None and arrival.tag in self._absent:
-            rows = self._unfilled(arrival.tag, rows)
+            rows = self._of_returned(arrival.tag, rows)
         if rows is not None and kind != "can" and (self._fills_gaps or arrival.tag in self._absent):
             self._fill_gap(arrival.tag, rows)
         wrong = "not well formed" if rows is None else self._wrong(kind, robot, rows)
@@ -116,11 +114,10 @@ class _Recorder:
         """
         kind, _, robot = tag.partition("/")
         if kind != "can":
-            source: Source = "plant" if kind == "plant" else "controller"
-            expected = self._record.next_tick(robot, source)
+            expected = self._expected(tag)
             self._gaps[tag] += expected is not None and rows.first_tick > expected
             if expected is not None and (rows.final or self._gaps[tag] >= GAPS):
-                self._record.end(robot, source)
+                self._record.end(robot, "plant" if kind == "plant" else "controller")
         if rows.final:
             self.unfinished.discard(tag)
 
@@ -154,34 +151,36 @@ class _Recorder:
     def _leaves(self, tag: str, rows: Rows) -> bool:
         """Take note of a controller that leaves with rows that it doesn't have, if this says so."""
         expected = self._expected(tag)
-        if expected is None or not expected < self._ticks or rows.first_tick != self._ticks:
+        away = rows.first_tick == self._ticks and not rows.length
+        if not away or expected is None or expected >= self._ticks:
             return False
         self._absent.add(tag)
+        self._away.add(tag)
         if rows.final:  # nobody waits for another at the end of the run
             self.unfinished -= {tag, tag.replace("controller", "inputs")}
         return True
 
-    def _unfilled(self, tag: str, rows: Rows) -> Rows | None:
-        """What counts as lost already is left out of rows that come all the same."""
+    def _of_returned(self, tag: str, rows: Rows) -> Rows:
+        """Rows of a controller that is there again, without those that count as lost already."""
+        self._away.discard(tag)
+        if not rows.final:
+            self.unfinished |= {tag, tag.replace("controller", "inputs")} & self._tags
         expected = self._expected(tag)
-        known = 0 if expected is None else max(expected - rows.first_tick, 0)
-        if not known or not rows.length:
-            return rows
+        known = 0 if expected is None else min(max(expected - rows.first_tick, 0), rows.length)
         left = rows.rows[known * self._row_sizes[tag] :]
-        return Rows(rows.first_tick + known, max(rows.length - known, 0), left, rows.final)
+        return Rows(rows.first_tick + known, rows.length - known, left, rows.final)
 
     def _outwait(self, robot: str) -> None:
         """The rows of an absent controller count as lost where others would wait for too long."""
         tag = f"controller/{robot}"
         expected, reached = self._expected(tag), self._record.next_tick(robot, "plant")
-        if expected is not None and reached is not None:
-            lost = reached - self._patience_ticks
-            if expected < lost:
-                self._fill(tag, expected, lost)
+        lost = 0 if reached is None else reached - self._patience_ticks
+        if expected is not None and expected < lost:
+            self._fill(tag, expected, lost)
 
     def end_absences(self) -> None:
         """The rows of controllers that have not come again are missing to the end of the run."""
-        for tag in self._absent - self.unfinished:
+        for tag in self._away:
             expected = self._expected(tag)
             if expected is not None:
                 self._fill(tag, expected, max(self.ticks, expected))
@@ -234,8 +233,7 @@ class _Recorder:
             return self._wrong_frames(rows)
         if not rows.length:
             return None  # a hello, or nothing more to say
-        source: Source = "plant" if kind == "plant" else "controller"
-        expected = self._record.next_tick(robot, source)
+        expected = self._expected(f"{kind}/{robot}")
         if expected is None:
             return f"tick {rows.first_tick} after its last"
         if rows.first_tick != expected:
@@ -260,7 +258,7 @@ class _Recorder:
         if rows.length:
             self._record.add(robot, source, rows.first_tick, rows.rows)
             self.ticks = max(self.ticks, rows.first_tick + rows.length)
-            if self._absent and source == "plant" and f"controller/{robot}" in self._absent:
+            if source == "plant" and f"controller/{robot}" in self._away:
                 self._outwait(robot)
         if rows.final:
             self._record.end(robot, source)

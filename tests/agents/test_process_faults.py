@@ -5,7 +5,9 @@ from support.clocks import ManualClock
 from support.robot_bench import NOWHERE
 
 from agents.process_faults import ProcessFaults
+from bridge.network.fault_orders import FaultOrder
 from configs.edges import FOREVER
+from configs.faults.kinds import KINDS
 from configs.loading import load
 from configs.resolve import agent_brief
 
@@ -110,3 +112,48 @@ def test_faults_of_others_and_of_the_process_before_do_nothing() -> None:
     assert bench.clock.monotonic_s() == pytest.approx(100 * 0.25)
     bench.ticks(600, 600)
     assert bench.done[-1] == "killed"
+
+
+def ordered(kind: str, *, ends: bool = False, at: int = 0, lasts: int | None = None) -> FaultOrder:
+    fault = KINDS[kind](kind=kind, at_s=0.0)
+    return FaultOrder(1, ends, kind, ("r2",), fault, at, lasts, at > 0)
+
+
+def test_an_order_acts_at_the_next_tick_at_the_earliest() -> None:
+    bench = Bench()
+    assert bench.faults.take(ordered("process_kill"), 100) == 101
+    bench.ticks(100, 100)
+    assert bench.done == []
+    bench.ticks(101, 101)
+    assert bench.done[-1] == "killed"
+
+
+@pytest.mark.parametrize(
+    ("order", "why"),
+    [
+        (ordered("process_kill", at=100), "tick 100 has gone: tick 101 is the next"),
+        (ordered("process_restart", at=5000), "the run ends before: it has 2000 ticks"),
+        (ordered("process_freeze", at=490, lasts=20), "the process of r2 is absent from 0.98 s"),
+        (ordered("process_kill", at=520), "the process of r2 is absent from 1 s on"),
+    ],
+)
+def test_an_order_that_cannot_act_is_refused(order: FaultOrder, why: str) -> None:
+    bench = Bench('{kind="process_freeze", at_s=1.0, for_s=0.1}')
+    assert str(bench.faults.take(order, 100)).startswith(why)
+    bench.ticks(100, 499)
+    assert bench.done == []
+
+
+def test_slow_and_frozen_processes_are_let_go_by_order() -> None:
+    bench = Bench()
+    bench.faults.take(ordered("process_slow"), 100)
+    bench.faults.take(ordered("process_freeze", at=120), 100)
+    bench.ticks(100, 120)
+    assert bench.faults.mute_tick == FOREVER
+    assert bench.faults.take(ordered("process_slow", ends=True), 120) == 121
+    assert bench.faults.take(ordered("process_freeze", ends=True, at=150), 120) == 150
+    assert bench.faults.mute_tick == 150
+    bench.ticks(121, 160)
+    assert bench.clock.monotonic_s() == pytest.approx(20 * 0.002)
+    ticks = [(it[0], it[1]) for it in bench.done if isinstance(it, tuple) and it[0] in (121, 150)]
+    assert ticks == [(121, "fault_cleared"), (150, "fault_cleared")]

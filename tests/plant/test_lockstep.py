@@ -1,22 +1,27 @@
 """Lockstep whose controllers are late, gone, or come again: what the plant does by its policy."""
 
+from collections import deque
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from support.clocks import ManualClock
 from support.robot_bench import BARE, NOWHERE
 from support.scripted_hub import Controller, ScriptedHub
 
+from bridge.network.fault_orders import FaultOrder
 from bridge.network.messages import Silence
 from bridge.network.telemetry import PLANT_ROW, RowBuffer
 from bridge.process.lifecycle import Stop
 from configs.errors import InfrastructureError, PeerLostError
 from configs.events import Event
+from configs.faults.kinds import KINDS
 from configs.loading import load
 from configs.resolve import plant_brief
 from plant.absent import AbsentControllers
 from plant.lockstep import ANSWER_SHARE, LockstepLoop
+from plant.orders import PlantOrders
 from plant.robot import emulated_robot
 
 TICKS = 100
@@ -38,6 +43,15 @@ class Bench:
         self.ticks: list[int] = []
         silences = {robot: SimpleNamespace(put=self._hear(robot)) for robot in self.silent}
         absent = AbsentControllers(brief, self.hub, silences, self.events.append)
+        self.orders: deque[FaultOrder] = deque()
+        self.answers: list[int | str] = []
+        self.relayed: list[tuple[str, FaultOrder | None]] = []
+        inbox = SimpleNamespace(
+            waiting=self.orders,
+            take=lambda: [self.orders.popleft() for _ in range(len(self.orders))],
+            answer=lambda _, tick: self.answers.append(tick),
+        )
+        relays = {robot: SimpleNamespace(put=self._relay(robot)) for robot in self.silent}
         nowhere = SimpleNamespace(put=lambda _: None)
         self.schedule = brief.schedule
         robots = [emulated_robot(robot) for robot in brief.robots]
@@ -50,6 +64,7 @@ class Bench:
             lambda state: self.ticks.append(state.tick),
             {},
             absent,
+            PlantOrders(brief.schedule, inbox, relays, absent),
             clock=self.clock,
         )
 
@@ -60,6 +75,16 @@ class Bench:
             self.silent[robot].append(silence.tick)
 
         return put
+
+    def _relay(self, robot: str) -> Callable[[bytes], None]:
+        return lambda payload: self.relayed.append((robot, FaultOrder.decode(payload)))
+
+    def order(self, tick: int, kind: str, **order: Any) -> None:
+        """Order a fault of r2's process, or its end, while the buses are at a tick."""
+        fault = KINDS[kind](kind=kind, at_s=0.0)
+        rest = {"from_tick": 0, "ticks": None, "exact": False} | order
+        made = FaultOrder(1, rest.pop("ends", False), kind, ("r2",), fault, **rest)
+        self.at("r1", tick, lambda: self.orders.append(made))
 
     def controller(self, robot: str) -> Controller:
         return self.hub.controllers[robot]
@@ -202,18 +227,23 @@ def test_a_frozen_controller_is_not_waited_for_from_its_tick_until_its_tick(benc
 KILL = "{kind='process_kill', at_s=0.08, for_s=0.1, robots=['r2']}"
 
 
-def test_time_stands_still_until_a_killed_controller_has_come_again(benches) -> None:
-    bench = benches("drop", KILL)
-    bench.at("r2", 40, bench.controller("r2").leave)
+def comes_again(bench: Bench, tick: int) -> None:
+    """Let a new process of r2 be on its bus a while after it is awaited."""
     before = bench.hub.script
 
-    def come_again() -> None:
+    def script() -> None:
         before()
-        if bench.told()[-1:] == [(90, "r2", "awaited")] and bench.clock.now_ns > 5 * 10**9:
+        if bench.told()[-1:] == [(tick, "r2", "awaited")] and bench.clock.now_ns > 5 * 10**9:
             bench.hub.again("r2")
             bench.hub.script = before
 
-    bench.hub.script = come_again
+    bench.hub.script = script
+
+
+def test_time_stands_still_until_a_killed_controller_has_come_again(benches) -> None:
+    bench = benches("drop", KILL)
+    bench.at("r2", 40, bench.controller("r2").leave)
+    comes_again(bench, 90)
     bench.run()
     said = [(40, "dropped"), (90, "awaited"), (90, "back")]
     assert bench.told() == [(tick, "r2", kind) for tick, kind in said]
@@ -228,3 +258,66 @@ def test_a_killed_controller_that_does_not_come_again_ends_the_run(benches) -> N
     bench.at("r2", 40, bench.controller("r2").leave)
     with pytest.raises(InfrastructureError, match=r"tick 90 .* r2 did not come again within 20 s"):
         bench.run()
+
+
+def test_an_ordered_kill_is_planned_where_its_controller_has_the_order(benches) -> None:
+    bench = benches("drop")
+    bench.order(30, "process_kill")
+    ordered: list[int] = []
+
+    def leave() -> None:
+        (tick,) = bench.answers
+        assert isinstance(tick, int)
+        ordered.append(tick)
+        bench.at("r2", tick, bench.controller("r2").leave)
+
+    bench.at("r2", 32, leave)
+    bench.order(60, "process_kill", ends=True)
+    bench.at("r1", 62, lambda: comes_again(bench, int(bench.answers[1])))
+    bench.run()
+    kill, end = bench.answers
+    # Buses are two ticks apart at most: the next pose that is due there, and the tick after.
+    every, delay = bench.schedule.localise_every, bench.schedule.pose_delay_ticks
+    assert (kill - 1 - delay) % every == 0
+    assert 31 < kill <= 33 + every + delay
+    assert bench.told() == [
+        (tick, "r2", kind) for tick, kind in ((kill, "dropped"), (end, "awaited"), (end, "back"))
+    ]
+    relayed = [(robot, it.ends, it.from_tick, it.exact) for robot, it in bench.relayed]
+    assert relayed == [("r2", False, kill, True), ("r2", True, end, True)]
+
+
+def test_orders_that_cannot_act_are_refused_and_a_planned_absence_is_forgotten(benches) -> None:
+    bench = benches("drop", "{kind='process_kill', at_s=0.16, robots=['r2']}")
+    bench.order(30, "process_freeze", from_tick=70, ticks=20, exact=True)
+    bench.order(32, "process_restart", from_tick=20, exact=True)
+    bench.order(34, "process_kill", ends=True)
+    bench.order(50, "process_kill", ends=True)
+    bench.run()
+    overlap, gone, ended, nothing = bench.answers
+    assert overlap == (
+        "the process of r2 is absent from 0.14 s on, and can't be killed or frozen then"
+    )
+    assert str(gone).startswith("tick 20 has gone: tick ")
+    assert 34 < int(ended) < 80
+    assert nothing == "no controller is absent by it, or will be"
+    assert bench.told() == []
+    assert [(it.name, it.ends) for _, it in bench.relayed] == [("process_kill", True)]
+
+
+def test_an_ordered_freeze_is_held_until_it_is_ended(benches) -> None:
+    bench = benches("hold")
+    late = bench.controller("r2")
+    bench.order(30, "process_freeze")
+    bench.at("r2", 32, lambda: bench.stops("r2", int(bench.answers[0])))
+    bench.order(70, "process_freeze", ends=True)
+    bench.at("r1", 72, lambda: bench.at("r1", int(bench.answers[1]), awake))
+
+    def awake() -> None:
+        late.answers = True
+
+    began_s = bench.clock.monotonic_s()
+    bench.run()
+    frozen_tick, end = bench.answers
+    assert bench.told() == [(frozen_tick, "r2", "held"), (end, "r2", "back")]
+    assert bench.clock.monotonic_s() - began_s < 0.5

@@ -31,6 +31,24 @@ def test_blocks_are_consecutive_whole_and_end_with_a_final_one() -> None:
     assert ticks == [float(k) for k in range(2 * BLOCK_TICKS + 3)]
 
 
+def test_before_an_absence_all_is_handed_on_and_the_end_of_the_run_is_named() -> None:
+    blocks: list[tuple[int, int, bool]] = []
+    buffer = RowBuffer(
+        PLANT_ROW, lambda first, count, _, final: blocks.append((first, count, final))
+    )
+    for tick in range(5):
+        buffer.add(tick, [0.0] * len(PLANT_SIGNALS))
+    buffer.leave(2000, final=False)
+    buffer.leave(2000, final=True)
+    buffer.announce()
+    buffer.add(5, [0.0] * len(PLANT_SIGNALS))
+    buffer.finish()
+    assert blocks == [
+        *((0, 5, False), (2000, 0, False), (2000, 0, True)),
+        *((5, 0, False), (5, 1, True)),
+    ]
+
+
 def handed_on(row_every_ns: int, within_ns: int, rows: int) -> list[tuple[int, int, int]]:
     """When blocks are handed on, their first tick and length; rows and looks come evenly."""
     blocks: list[tuple[int, int, int]] = []

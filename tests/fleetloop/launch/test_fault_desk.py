@@ -1,5 +1,6 @@
 """Orders of faults and what becomes of them, as the launcher keeps account."""
 
+from collections.abc import Iterable
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,6 +9,7 @@ import pytest
 from bridge.network.fault_orders import FaultAnswer, FaultOrder
 from configs.deployment import Deployment
 from configs.errors import ScenarioError
+from configs.faults.absences import Absence
 from configs.loading import load
 from configs.resolve import schedule
 from configs.roles import processes_of
@@ -36,8 +38,13 @@ class Bench:
             lambda: self.tick,
             lambda: self.now_s,
         )
+        self.absences: list[tuple[str, str, int, int | None]] = []
+        self.desk.on_absences = self._absences
         link = SimpleNamespace(subscribe=lambda *_: None, publisher=self._publisher)
         self.desk.open(link, "run", processes_of(self.scenario.names))
+
+    def _absences(self, absent: Iterable[Absence]) -> None:
+        self.absences = [one[:4] for one in absent]
 
     def _publisher(self, key: str) -> SimpleNamespace:
         process = key.partition("@order/")[2]
@@ -198,3 +205,87 @@ def test_two_faults_have_two_names_though_the_first_is_not_answered_yet() -> Non
     assert [order.name for _, order in bench.sent] == ["push", "push_2"]
     with pytest.raises(ScenarioError, match="another fault of this run has this name"):
         bench.inject(kind="push", name="push_2")
+
+
+REALTIME = "clock.mode='realtime'"
+
+
+def test_in_lockstep_the_plant_answers_for_the_controllers_that_are_killed() -> None:
+    bench = Bench("clock.on_late='drop'")
+    bench.inject(kind="process_kill")
+    ((process, order),) = bench.sent
+    assert (process, order.targets) == ("plant", ("r1", "r2"))
+    bench.answer("plant", 1017)
+    bench.tick = 1017
+    bench.ask("fault.clear", names=["process_kill"])
+    assert [process for process, _ in bench.sent] == ["plant", "plant"]
+    assert {it[2:] for it in bench.absences} == {(1017, None)}
+    bench.answer("plant", 1040)
+    assert bench.absences == [("process_kill", robot, 1017, 1040) for robot in ("r1", "r2")]
+    planned = [one for one in bench.desk.ledger.planned() if one.target == "r2"]
+    assert [(one.from_tick, one.to_tick) for one in planned] == [(1017, 1040)]
+
+
+def test_in_real_time_the_launcher_ends_the_absence_of_who_does_not_answer() -> None:
+    bench = Bench(REALTIME)
+    bench.inject(kind="process_freeze", name="nap", for_s=5.0)
+    assert [process for process, _ in bench.sent] == ["agent/r1", "agent/r2"]
+    bench.answer("agent/r1", 1100)
+    bench.answer("agent/r2", 1103)
+    assert bench.absences == [("nap", "r1", 1100, 3600), ("nap", "r2", 1103, 3600)]
+    bench.sent.clear()
+    bench.tick = 1200
+    bench.ask("fault.clear", names=["nap"])
+    # They are told all the same: they note the end once they are awake.
+    assert [(process, it.ends, it.from_tick) for process, it in bench.sent] == [
+        *(("agent/r1", True, 1300), ("agent/r2", True, 1300))
+    ]
+    assert bench.absences == [("nap", "r1", 1100, 1300), ("nap", "r2", 1103, 1300)]
+    bench.tick = 1300
+    bench.desk.look()
+    assert bench.answers[-1]["cleared"][0]["state"] == "cleared"
+
+
+def test_what_slows_a_process_is_ended_by_it() -> None:
+    bench = Bench(REALTIME)
+    bench.inject(kind="process_slow", robots=["r1"])
+    bench.answer("agent/r1", 1100)
+    bench.tick = 1200
+    bench.ask("fault.clear", names=["process_slow"])
+    assert bench.sent[-1][1].ends
+    assert bench.faults()["process_slow"] == ("acting", 1100, None)
+    bench.answer("agent/r1", 1300)
+    assert bench.faults()["process_slow"] == ("acting", 1100, 1300)
+    assert bench.absences == []
+
+
+def test_no_fault_of_a_process_is_ordered_of_one_that_is_absent() -> None:
+    bench = Bench(REALTIME)
+    bench.absent = {"agent/r2"}
+    with pytest.raises(ScenarioError, match="r2: its controller is absent: process_slow can't act"):
+        bench.inject(kind="process_slow")
+    bench.inject(kind="process_slow", robots=["r1"])
+
+
+def test_where_none_could_come_again_none_is_ordered_to_or_started() -> None:
+    bench = Bench()
+    with pytest.raises(
+        ScenarioError, match=r"\"process_kill\": ends a lockstep run: needs clock\."
+    ):
+        bench.inject(kind="process_kill", for_s=1.0)
+    odometry = "localisation.source='odometry'"
+    bench = Bench(REALTIME, odometry)
+    with pytest.raises(ScenarioError, match="odometry alone doesn't know where the robot is"):
+        bench.inject(kind="process_restart")
+    bench.inject(kind="process_kill", robots=["r1"])
+    bench.answer("agent/r1", 1100)
+    bench.inject(kind="process_freeze", robots=["r2"])
+    bench.answer("agent/r2", 1100)
+    bench.tick = 1100
+    with pytest.raises(ScenarioError, match="process_kill: odometry alone doesn't know"):
+        bench.ask("fault.clear", names=["process_kill"])
+    bench.ask("fault.clear", names=[])
+    assert bench.absences == [
+        ("process_kill", "r1", 1100, None),
+        ("process_freeze", "r2", 1100, 1200),
+    ]

@@ -51,6 +51,7 @@ def record(
         recorder = _Recorder(brief, file)
         for arrival in arrivals:
             recorder.process(arrival)
+        recorder.end_absences()
     return recorder, Record.open(path)
 
 
@@ -128,6 +129,49 @@ def test_rows_of_a_source_that_was_cut_off_are_not_a_number_but_at_their_time(
     assert mine[SIGNALS[0].name][100:240] == pytest.approx(np.arange(100, 240) * 1e-3)
 
 
+LEAVES = (rows("controller/r1", 0, 100), rows("controller/r1", 300, 0, final=True))
+
+
+def test_nobody_waits_for_a_controller_that_has_left_and_its_rows_are_no_numbers(
+    tmp_path: Path,
+) -> None:
+    others = whole("plant/r1", "plant/r2", "controller/r2")
+    recorder, found = record(tmp_path / "a.mcap", *LEAVES, *others)
+    assert not recorder.unfinished
+    values = found.controller["r1"][SIGNALS[1].name]
+    assert np.flatnonzero(np.isnan(values)).tolist() == list(range(100, 300))
+    assert recorder.gaps() == ["200 rows of r1's controller did not come: not a number"]
+
+
+def test_one_that_comes_again_is_waited_for_and_goes_on_where_it_is(tmp_path: Path) -> None:
+    others = whole("plant/r1", "plant/r2", "controller/r2")
+    again = rows("controller/r1", 0, 0)  # says so first
+    recorder, _ = record(tmp_path / "a.mcap", *LEAVES, again, *others)
+    assert recorder.unfinished == {"controller/r1"}
+    last = rows("controller/r1", 250, 50, final=True)
+    recorder, found = record(tmp_path / "b.mcap", *LEAVES, *others, again, last)
+    assert not recorder.unfinished
+    assert not recorder.refusals.lines()
+    values = found.controller["r1"][SIGNALS[1].name]
+    assert np.flatnonzero(np.isnan(values)).tolist() == list(range(100, 250))
+    assert len(values) == 300
+
+
+def test_others_do_not_wait_for_an_absent_one_without_bound(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("fleetloop.record.recorder.ABSENT_BYTES", 0)
+    monkeypatch.setattr("fleetloop.record.recorder.ABSENT_TICKS", 50)
+    frozen = rows("controller/r1", 100, 100)  # it has all its rows once it is awake
+    last = rows("controller/r1", 200, 100, final=True)
+    late = (*whole("plant/r1")[:2], frozen, *whole("plant/r1")[2:], last)
+    recorder, found = record(
+        tmp_path / "a.mcap", *LEAVES, *late, *whole("plant/r2", "controller/r2")
+    )
+    values = found.controller["r1"][SIGNALS[1].name]
+    # The plant was at tick 256 when r1 was awake.
+    assert np.flatnonzero(np.isnan(values)).tolist() == list(range(100, 206))
+    assert not recorder.refusals.lines()
+
+
 def test_what_is_no_rows_is_counted(tmp_path: Path) -> None:
     short = Rows(0, 2, bytes(8), final=False).encode()
     junk = (Arrival("plant/r1", "", b"x"), Arrival("plant/r1", "", short))
@@ -174,3 +218,17 @@ def test_only_a_controller_that_may_start_again_begins_a_second_log(
     assert others == ([InputLog(b"again", True)] if may_restart else [])
     refused = "refused 1 block of the inputs of r1's controller: begins at byte 0, expected 3"
     assert recorder.refusals.lines() == ([] if may_restart else [refused])
+
+
+def test_the_log_of_a_controller_that_has_left_is_followed_by_that_of_the_next(
+    tmp_path: Path,
+) -> None:
+    blocks = (
+        *(block("r1", 0, b"abc", final=True), *LEAVES, rows("controller/r1", 0, 0)),
+        *(block("r1", 0, b"again", final=True), rows("controller/r1", 200, 100, final=True)),
+    )
+    recorder, _ = record(tmp_path / "a.mcap", *blocks, inputs=True)
+    logs = read_inputs(path_of(tmp_path, "r1"))
+    assert logs == [InputLog(b"abc", True), InputLog(b"again", True)]
+    assert not recorder.refusals.lines()
+    assert "inputs/r1" not in recorder.unfinished
