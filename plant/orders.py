@@ -4,7 +4,8 @@ A controller waits for the pose of each tick at which the localisation system ta
 that is put before such a pose arrives before it; so the tick at which that pose is due is the first
 one at which all controllers have the order, however far they are now. Faults of their processes act
 before a tick's messages are heard: they begin and end at the tick after that. The plant plans the
-absences that they make, and answers for all.
+absences that they make. It answers for all controllers: of those that are absent one that is held
+comes to the order when it catches up, a new process is told when it is started.
 """
 
 from collections import deque
@@ -67,10 +68,8 @@ class PlantOrders:
                 first = self._first_heard(earliest) + (order.fault.PLACE == "process")
             tick = order.tick(first, self._schedule.ticks)
             if isinstance(tick, int):
-                refusal = self._refusal(order, tick, schedules)
-                tick = refusal or tick
-            if isinstance(tick, str) or order.fault.PLACE != "agent":  # else these answer
-                self._inbox.answer(order, tick)
+                tick = self._refusal(order, tick, schedules) or tick
+            self._inbox.answer(order, tick)
 
     def _refusal(
         self, order: FaultOrder, tick: int, schedules: Mapping[str, FaultSchedule]

@@ -7,9 +7,9 @@
     fault.clear    names ([]: all)    cleared: those that end, with the tick at which they do
 
 An order without `at_s` begins as soon as it can, and is answered once the run has reached that
-tick. One that can't be carried out is refused with the reason. A controller that a fault has killed
-or frozen can't take an order: in real time the launcher itself ends that fault, in lockstep the
-plant answers for all controllers.
+tick. One that can't be carried out is refused with the reason. In lockstep the plant answers for
+all controllers. In real time each does, but for those that are absent: they have the order once
+they are awake, or are told when they are started again, to which the launcher sees by itself.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -118,10 +118,10 @@ class FaultDesk:
         pending = None if answer is None else self._pending.get(answer.number)
         if answer is None or pending is None:
             return answer is not None  # else it comes late
+        if process not in pending.awaited:  # in lockstep the plant answers for all
+            return True
         if answer.refusal:
             pending.refusals[process] = answer.refusal
-            if not self._schedule.realtime:  # the plant speaks for all
-                pending.awaited.clear()
         else:
             pending.ticks[process] = answer.tick
         pending.awaited.discard(process)
@@ -233,11 +233,13 @@ class FaultDesk:
         order = FaultOrder(
             self._number, ends, entry.name, entry.targets, fault, from_tick, lasts, exact
         )
-        told, awaited = self._receivers(fault, entry.targets)
+        told = self._receivers(fault, entry.targets)
+        awaited = {process for process in told if not self._is_absent(process)}
         ticks: dict[str, int] = {}
         if ends and self._schedule.realtime and _has_stopped(entry, from_tick):
-            awaited = set()
-            ticks[LAUNCHER.name] = max(from_tick, entry.from_tick + 1)
+            awaited, from_tick = set(), max(from_tick, entry.from_tick + 1)
+        if not awaited:
+            ticks[LAUNCHER.name] = from_tick
         limit_s = ANSWER_S + self._schedule.tick_deadline_s
         self._pending[self._number] = _Pending(
             entry, ends, awaited, self._clock_s() + limit_s, done, not exact, ticks
@@ -247,17 +249,12 @@ class FaultDesk:
         if not awaited:
             self._complete(self._number)
 
-    def _receivers(
-        self, fault: Fault, targets: tuple[str, ...]
-    ) -> tuple[dict[str, tuple[str, ...]], set[str]]:
-        """The processes that are told of a fault, with its targets at each; those that answer."""
-        if fault.PLACE == "plant":
-            return {PLANT.name: targets}, {PLANT.name}
+    def _receivers(self, fault: Fault, targets: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+        """The processes that are told of a fault, with its targets at each."""
+        if fault.PLACE == "plant" or not self._schedule.realtime:
+            return {PLANT.name: targets}
         heard = {name: targets_to(targets, name) for name in self._scenario.names}
-        told = {AGENT.process(name): those for name, those in heard.items() if those}
-        if self._schedule.realtime:
-            return told, set(told)
-        return {PLANT.name: targets}, {PLANT.name} if fault.PLACE == "process" else set(told)
+        return {AGENT.process(name): those for name, those in heard.items() if those}
 
     def _soonest(self) -> int:
         """A tick that no process has computed when the order arrives; in lockstep it chooses."""

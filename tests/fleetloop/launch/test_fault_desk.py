@@ -15,6 +15,7 @@ from configs.resolve import schedule
 from configs.roles import processes_of
 from fleetloop.launch.fault_desk import ANSWER_S, REACHED_S, FaultDesk
 
+REALTIME = "clock.mode='realtime'"
 VCAN = {"interface": "socketcan", "channel": "vcan0"}
 CUT = {"kind": "link_partition", "edges": ["r1 -> r2", "leader -> r1"]}
 
@@ -90,15 +91,15 @@ def test_a_fault_is_ordered_of_the_plant_and_answered_when_the_run_has_reached_i
     assert bench.faults() == {"push": ("over", 1017, 1267)}
 
 
-def test_in_lockstep_the_plant_hands_on_what_controllers_answer() -> None:
+def test_in_lockstep_the_plant_answers_for_controllers() -> None:
     bench = Bench()
     bench.inject(**CUT, at_s=3.0)
     ((process, order),) = bench.sent
     assert (process, order.targets) == ("plant", ("r1 -> r2", "leader -> r1"))
     assert (order.from_tick, order.exact) == (1500, True)
-    bench.answer("agent/r1", 1500)
+    bench.answer("agent/r1", 1500)  # it may be absent, and isn't waited for
     assert bench.answers == []
-    bench.answer("agent/r2", 1500)
+    bench.answer("plant", 1500)
     assert bench.answers[0]["fault"]["state"] == "planned"
 
 
@@ -119,6 +120,18 @@ def test_in_real_time_every_controller_is_ordered_what_concerns_it_some_time_ahe
         (1100, {"agent/r2": 1103}),
         (1103, {"agent/r1": 1100}),
     )
+
+
+def test_in_real_time_who_is_absent_has_the_order_later() -> None:
+    bench = Bench(REALTIME)
+    bench.absent = {"agent/r1"}
+    bench.inject(**CUT)
+    assert [process for process, _ in bench.sent] == ["agent/r1", "agent/r2"]
+    bench.answer("agent/r2", 1103)
+    assert bench.faults() == {"link_partition": ("planned", 1103, None)}
+    bench.absent.add("agent/r2")
+    bench.ask("fault.clear", names=[])
+    assert bench.faults() == {"link_partition": ("cleared", 1103, 1103)}
 
 
 def test_a_refusal_of_a_process_is_the_answer_and_the_fault_is_none() -> None:
@@ -205,9 +218,6 @@ def test_two_faults_have_two_names_though_the_first_is_not_answered_yet() -> Non
     assert [order.name for _, order in bench.sent] == ["push", "push_2"]
     with pytest.raises(ScenarioError, match="another fault of this run has this name"):
         bench.inject(kind="push", name="push_2")
-
-
-REALTIME = "clock.mode='realtime'"
 
 
 def test_in_lockstep_the_plant_answers_for_the_controllers_that_are_killed() -> None:
