@@ -1,5 +1,6 @@
 """Markdown tables of the keys of a JSON Schema, as pydantic makes it of our dataclasses."""
 
+import html
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -75,13 +76,20 @@ def unit_of(key: str) -> str:
 
 def cell(text: str) -> str:
     """A text in one cell of a table."""
-    return _no_tags(" ".join(text.split())).replace("|", r"\|")
+    parts = " ".join(text.split()).split("`")
+    return "".join(_code(part) if n % 2 else _words(part) for n, part in enumerate(parts))
 
 
-def _no_tags(text: str) -> str:
-    """A text whose angle brackets are no HTML; within backticks they are none anyway."""
-    parts = text.split("`")
-    return "`".join(part if n % 2 else part.replace("<", "&lt;") for n, part in enumerate(parts))
+def _words(text: str) -> str:
+    """Words with no HTML and no end of a cell in them."""
+    return text.replace("<", "&lt;").replace("|", r"\|")
+
+
+def _code(text: str) -> str:
+    """Code; that a bar ends a cell or not, renderers of Markdown don't agree about."""
+    if "|" not in text:
+        return f"`{text}`"
+    return f"<code>{html.escape(text, quote=False).replace('|', '&#124;')}</code>"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -99,7 +107,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def prose(doc: str | None) -> str:
     """A docstring, its paragraphs in a line each."""
     paragraphs = re.split(r"\n\s*\n", (doc or "").strip())
-    return "\n\n".join(_no_tags(" ".join(paragraph.split())) for paragraph in paragraphs)
+    return "\n\n".join(cell(paragraph).replace(r"\|", "|") for paragraph in paragraphs)
 
 
 def code(value: object) -> str:

@@ -96,14 +96,14 @@ _PAGES = {
 def pages() -> dict[str, str]:
     """The text of every page by its name."""
     made = {
-        name: f"{_NOTE}\n\n# {page.title}\n\n{prose(page.about)}\n\n{page.body().rstrip()}\n"
+        name: f"# {page.title}\n\n{_NOTE}\n\n{prose(page.about)}\n\n{page.body().rstrip()}\n"
         for name, page in _PAGES.items()
     }
     lines = [
         f"* [{page.title}]({name}): {_first(prose(page.about))}" for name, page in _PAGES.items()
     ]
     made["README.md"] = (
-        f"{_NOTE}\n\n# Reference\n\nMade of the types in the code.\n\n" + "\n".join(lines) + "\n"
+        f"# Reference\n\n{_NOTE}\n\nMade of the types in the code.\n\n" + "\n".join(lines) + "\n"
     )
     return made
 

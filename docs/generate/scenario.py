@@ -42,7 +42,7 @@ class _Page:
         self._schema = schema
         self._types: Mapping[str, Schema] = schema["$defs"]
         self._titles = dict(self._titled())
-        self._tables = Tables({name: f"#{_slug(title)}" for name, title in self._titles.items()})
+        self._tables = Tables({name: f"#{slug(title)}" for name, title in self._titles.items()})
 
     def text(self) -> str:
         sections = [
@@ -142,7 +142,7 @@ def _header(key: str, about: Schema) -> str:
     return f"`[{key}]`"
 
 
-def _slug(title: str) -> str:
+def slug(title: str) -> str:
     """The address of a heading, as GitHub and the site make it."""
     return re.sub(r"[^\w\- ]", "", title).lower().replace(" ", "-")
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from latex2mathml.converter import convert
+from mkdocs.exceptions import PluginError
 
 HOW_TO = "How to"
 _FORMULA = re.compile(
@@ -41,4 +42,8 @@ def on_page_content(content: str, **_: Any) -> str:
 
 def _math(formula: re.Match[str]) -> str:
     display = "block" if formula[1] == "div" else "inline"
-    return convert(html.unescape(formula[2]).strip(), display=display)
+    tex = html.unescape(formula[2]).strip()
+    made: str = convert(tex, display=display)
+    if "\\" in made:
+        raise PluginError(f"latex2mathml doesn't know all commands of: {tex}")
+    return made
