@@ -24,7 +24,7 @@ from fleetloop.compare.results import Row, described
 from fleetloop.compare.runs import Planned, rows_of
 from fleetloop.compare.tables import print_tables
 from fleetloop.results import run_folder
-from fleetloop.results.report import write_figures
+from fleetloop.results.publication import write_figures
 from fleetloop.results.summary import finite, to_json
 from fleetloop.signals import stop_on_signals
 from fleetloop.terminal import note, say, say_json

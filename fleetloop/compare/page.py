@@ -12,7 +12,7 @@ from fleetloop.compare.contenders import gains_in_words
 from fleetloop.compare.results import Row
 from fleetloop.compare.tables import TABLES, notes, trouble_lines
 from fleetloop.results.figures import Captioned
-from fleetloop.results.report import figure_tag, table_tag
+from fleetloop.results.pages import figure_tag, table_tag
 
 _COLOUR = {Verdict.HOLDS: "yes", Verdict.DOES_NOT_HOLD: "no", Verdict.NOT_TESTABLE: "open"}
 
@@ -47,7 +47,7 @@ def page(
             " Left the whole run on a logarithmic scale, right the final part at the scale of the"
             " laws that have settled."
         ),
-        figures="\n".join(figure_tag(item, data) for item, data in figures),
+        figures="\n".join(figure_tag(item.caption, data) for item, data in figures),
         gains=table_tag(
             ("law", "gains of the fleet; a robot's own are in its scenario.toml"), gains
         ),

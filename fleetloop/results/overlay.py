@@ -18,7 +18,9 @@ from fleetloop.results import run_folder, tables
 from fleetloop.results.drawing import COLOURS
 from fleetloop.results.known import Known, known_of
 from fleetloop.results.overlay_figures import PANELS, overlay_figures, robots_of
-from fleetloop.results.report import PAGE, figure_tag, write_figures
+from fleetloop.results.pages import figure_tag
+from fleetloop.results.publication import write_figures
+from fleetloop.results.report import PAGE
 from fleetloop.results.summary import Summary
 from fleetloop.results.tables import finding, mark, number, settled_at
 
@@ -48,7 +50,7 @@ def write_overlay(runs: Sequence[Path], records: Sequence[Record], out: Path | N
     folder = run_folder.create("overlay", out, SYSTEM_CLOCK.wall_ns()).path
     figures = write_figures(folder, overlay_figures(known))
     page = folder / PAGE
-    run_folder.write(page, _page(known, [figure_tag(item, data) for item, data in figures]))
+    run_folder.write(page, _page(known, [figure_tag(item.caption, data) for item, data in figures]))
     return page
 
 

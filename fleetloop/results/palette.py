@@ -91,6 +91,10 @@ DARK: Final = Theme(
 )
 MARKS: Final = {"held": "✓", "failed": "✕", "open": "○"}
 """Of a state, beside its colour."""
+STATE_LINES: Final = {"held": ROBOTS[2], "failed": ROBOTS[1], "open": ROBOTS[4]}
+"""Of a state's lines in plots, on both grounds."""
+ROBOT_OUTLINE: Final = ((1.0, 0.0), (-0.8, 0.65), (-0.45, 0.0), (-0.8, -0.65))
+"""Corners of a robot as it is drawn in the plane, in body: x forward, y left."""
 
 _PLOT: Final = {
     "background-fill-color": "ground",
@@ -118,7 +122,9 @@ def theme_css() -> str:
     return "\n".join(
         (
             f":root {{ color-scheme: light; {light}{_plot_variables()} }}",
-            f':root[data-theme="dark"] {{ color-scheme: dark; {dark} }}',
+            "@media screen {",
+            f'  :root[data-theme="dark"] {{ color-scheme: dark; {dark} }}',
+            "}",
             "@media screen and (prefers-color-scheme: dark) {",
             f'  :root:not([data-theme="light"]) {{ color-scheme: dark; {dark} }}',
             "}",
@@ -148,6 +154,7 @@ def plot_theme() -> "PlotTheme":
                     "major_label_text_font_size": "11px",
                     "minor_tick_line_color": None,
                 },
+                "BasicTickFormatter": {"power_limit_low": -5, "power_limit_high": 6},
                 "Title": {"text_font_size": "13px", "text_font_style": "bold"},
                 "Legend": {
                     "label_text_font_size": text,

@@ -1,27 +1,27 @@
-"""`fleetloop report`: the figures of a run as PNG files, and one HTML page that holds them all.
+"""`fleetloop report`: one interactive page of a run, and figures for papers.
 
-<run>/figures/*.png      <run>/report.html: needs nothing beside it, no network, no script
+<run>/report.html: needs nothing beside it, and no network      <run>/figures/*
 """
 
-import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
-from importlib import resources
-from io import BytesIO
 from pathlib import Path
-from string import Template
-from typing import Any
 
-from configs.errors import InfrastructureError
-from configs.scenario import Scenario
 from fleetloop.record.reader import Record
 from fleetloop.results import run_folder
-from fleetloop.results.figures import Captioned, all_figures
-from fleetloop.results.known import known_of
+from fleetloop.results.figures import all_figures
+from fleetloop.results.interactive import plots_of
+from fleetloop.results.known import Known, known_of
+from fleetloop.results.marks import state_of
+from fleetloop.results.pages import figure_tag, list_tag, page, resource, table_tag
+from fleetloop.results.palette import MARKS
+from fleetloop.results.publication import Drawn, write_figures
 from fleetloop.results.summary import Summary
 from fleetloop.results.tables import (
-    claim,
     final_line,
+    found_value,
+    label,
+    margin,
     mark,
     network_lines,
     realtime_lines,
@@ -29,12 +29,13 @@ from fleetloop.results.tables import (
     robot_rows,
     spread_line,
     trouble_lines,
+    worst_place,
 )
+from fleetloop.results.view import View
 
 PAGE = "report.html"
 MOST_EVENTS = 200
 """Of a page; summary.json has all."""
-FIGURES = "figures"
 
 
 def write_report(run: Path, record: Record | None = None) -> Path:
@@ -53,66 +54,100 @@ def write_report(run: Path, record: Record | None = None) -> Path:
     known = known_of(record)
     folder = record.path.parent
     figures = write_figures(folder, all_figures(record, known.scenario))
-    page = folder / PAGE
-    run_folder.write(page, _page(known.summary, known.scenario, record, figures))
-    return page
+    target = folder / PAGE
+    run_folder.write(target, page_of(known, figures))
+    return target
 
 
-def write_figures(run: Path, figures: Iterable[Captioned]) -> list[tuple[Captioned, bytes]]:
-    """Write figures into a run's folder of them; return each with its PNG file.
-
-    Raises:
-        InfrastructureError: one can't be written.
-    """
-    drawn = [(item, png(item)) for item in figures]
-    folder = run / FIGURES
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise InfrastructureError(f"can't make {folder}: {error.strerror or error}") from error
-    for item, data in drawn:
-        run_folder.write(folder / f"{item.name}.png", data)
-    return drawn
-
-
-def png(item: Captioned) -> bytes:
-    """A figure as a PNG file."""
-    buffer = BytesIO()
-    # No software name or date in the file: equal runs make equal figures.
-    item.figure.savefig(buffer, format="png", metadata={"Software": None})
-    return buffer.getvalue()
+def page_of(known: Known, figures: Sequence[Drawn]) -> str:
+    """The page of a run."""
+    scenario = known.scenario
+    plots = plots_of(View(*known))
+    static = "\n".join(figure_tag(item.caption, data) for item, data in figures)
+    above, below = words_of_run(known)
+    body = "\n".join(
+        (
+            above,
+            f'<div class="screen interactive">{plots.body}</div>',
+            f'<div class="paper"><h2>Figures</h2><div class="figures">{static}</div></div>',
+            "<noscript><style>.interactive { display: none; } .paper { display: block; }</style>"
+            "</noscript>",
+            below,
+            plots.scripts,
+        )
+    )
+    title = f"Fleetloop: {scenario.name}"
+    return page(title, scenario.description, body, style=resource("report.css"), head=plots.head)
 
 
-def _page(
-    summary: Summary,
-    scenario: Scenario,
-    record: Record,
-    figures: Sequence[tuple[Captioned, bytes]],
-) -> str:
-    page = resources.files("fleetloop.results").joinpath("report.html")
-    template = Template(page.read_text("utf-8"))
-    return template.substitute(
-        title=escape(f"Fleetloop: {scenario.name}"),
-        subtitle=escape(scenario.description),
-        lost=escape(f"The record isn't all there: {record.shortage()}." if record.lost else ""),
-        verdict=escape(summary["verdict"]),
-        verdict_class=summary["verdict"].replace(" ", "-"),
-        reason=escape(summary["reason"]),
-        troubles=_list(trouble_lines(summary)),
-        robots=table_tag(robot_header(), robot_rows(summary)),
-        spread=escape(f"{final_line(summary)}. {spread_line(summary)}"),
-        expectations=table_tag(
-            ("", "expectation"), ((mark(item), claim(item)) for item in summary["expectations"])
-        ),
-        events=_events(summary.get("events", [])),
-        figures="\n".join(figure_tag(item, data) for item, data in figures),
-        facts=table_tag(("", ""), _facts(summary)),
-        scenario=escape(record.scenario_toml),
+def words_of_run(known: Known) -> tuple[str, str]:
+    """What stands above the plots and below them."""
+    return _results(known), "\n".join(_rest(known))
+
+
+def _results(known: Known) -> str:
+    """The verdict, and why; the table of the robots."""
+    record, _, summary = known
+    verdict, reason = summary["verdict"], summary["reason"]
+    lost = f"The record isn't all there: {record.shortage()}." if record.lost else ""
+    troubles = list_tag(trouble_lines(summary), "troubles")
+    return "\n".join(
+        (
+            f'<p><span class="verdict {escape(verdict.replace(" ", "-"))}">{escape(verdict)}</span>'
+            f" {escape(reason)}</p>",
+            f'<p class="lost">{escape(lost)}</p>',
+            f"<h2>Why</h2>{list_tag(why(summary), 'why')}",
+            _expectations(summary),
+            f"<h2>What went wrong</h2>{troubles}" if troubles else "",
+            "<h2>Path following</h2>",
+            f'<div class="wide">{table_tag(robot_header(), robot_rows(summary))}</div>',
+            f"<p>{escape(f'{final_line(summary)}. {spread_line(summary)}')}</p>",
+        )
     )
 
 
-def _events(events: Sequence[dict[str, Any]]) -> str:
+def why(summary: Summary) -> Iterator[str]:
+    """The reasons of the verdict, the gravest first."""
+    expected = summary["expectations"]
+    for robot, reason in summary["stopped_robots"].items():
+        yield f"{robot} stopped itself: {reason}"
+    for held, words in ((False, "failed"), (None, "not reached"), (True, "held")):
+        found = [one for one in expected if one["held"] is held]
+        if found:
+            yield f"{len(found)} of {len(expected)} expectations {words}"
+    if not expected:
+        yield "nothing was expected"
+
+
+def _expectations(summary: Summary) -> str:
+    rows = "".join(
+        f'<tr><td class="state {state_of(one)}">{MARKS[state_of(one)]} {escape(mark(one))}</td>'
+        f'<td class="text">{escape(label(one))}</td><td>{escape(found_value(one))}</td>'
+        f'<td class="text">{escape(worst_place(one))}</td><td>{escape(margin(one))}</td></tr>'
+        for one in sorted(summary["expectations"], key=_gravity)
+    )
+    head = "".join(
+        f'<th class="text">{name}</th>' for name in ("", "expectation", "found", "worst", "margin")
+    )
+    table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+    return f'<div class="wide">{table}</div>' if rows else ""
+
+
+def _gravity(expect: dict[str, object]) -> int:
+    return {False: 0, None: 1, True: 2}[expect["held"]]  # type: ignore[index]
+
+
+def _rest(known: Known) -> Iterator[str]:
+    record, _, summary = known
+    yield _events(summary)
+    yield f'<h2>The run</h2><div class="wide">{table_tag(("", ""), _facts(summary))}</div>'
+    toml = escape(record.scenario_toml)
+    yield f"<details><summary>The scenario</summary><pre>{toml}</pre></details>"
+
+
+def _events(summary: Summary) -> str:
     """The events of a run as a section; nothing without any."""
+    events = summary.get("events", [])
     rows = [
         (f"{it['t_s']:.6g} s", ": ".join(filter(None, (it["source"], it["kind"], it["text"]))))
         for it in events[:MOST_EVENTS]
@@ -142,24 +177,3 @@ def _facts(summary: Summary) -> Iterable[tuple[str, str]]:
     yield "seed", f"{summary['seed']}"
     versions = (f"{name} {number}" for name, number in summary["versions"].items())
     yield "versions", ", ".join(versions)
-
-
-def figure_tag(item: Captioned, data: bytes) -> str:
-    """A figure within a page."""
-    text = escape(item.caption)
-    source = f"data:image/png;base64,{base64.b64encode(data).decode()}"
-    return f'<figure><img alt="{text}" src="{source}"><figcaption>{text}</figcaption></figure>'
-
-
-def _list(lines: Iterable[str]) -> str:
-    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
-    return f'<h2>What went wrong</h2><ul class="troubles">{items}</ul>' if items else ""
-
-
-def table_tag(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table within a page; one of two columns is text."""
-    css = ' class="text"' if len(header) == 2 else ""
-    head = "".join(f"<th{css}>{escape(cell)}</th>" for cell in header)
-    lines = ("".join(f"<td{css}>{escape(cell)}</td>" for cell in row) for row in rows)
-    body = "".join(f"<tr>{line}</tr>" for line in lines)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

@@ -59,9 +59,23 @@ class Place(_Table):
     t_s: float | None
 
 
+class Extent(_Table):
+    """The window of an expectation [s]."""
+
+    from_s: float
+    to_s: float
+
+
 class Expectation(_Table):
     """What was expected, and what was found."""
 
+    signal: str | None = None
+    robots: list[str] | None = None
+    max_abs: float | None = None
+    min: float | None = None
+    max: float | None = None
+    settle_within_s: float | None = None
+    window: Extent | None = None
     name: str | None = None
     claim: str
     held: bool | None

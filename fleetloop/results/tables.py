@@ -25,6 +25,7 @@ MOST_EDGES = 8
 """Of which lines tell; summary.json has all."""
 EARLY_S = 0.05
 """A robot whose rows end so long before the run's took part in a part of it [s]."""
+UNSETTLED = "not settled"
 _SYMBOLS = {"x_e_m": ("x_e", "m"), "y_e_m": ("y_e", "m"), "theta_e_rad": ("θ_e", "rad")}
 
 
@@ -254,25 +255,45 @@ def label(expect: dict[str, Any]) -> str:
 
 def finding(expect: dict[str, Any]) -> str:
     """The result of an expectation: value, where and when, and the margin."""
-    unit = f" {expect['unit']}" if expect["unit"] not in ("", "1") else ""
-    if expect["worst"] is None and expect["value"] is None:
-        shown = "found nothing"
-    elif expect["value"] is None and "settle_within_s" in (expect["bound"] or ()):
-        shown = f"not settled{_at(expect['worst'])}"
-    else:
-        shown = f"found {number(expect['value'], '.3g')}{unit}{_at(expect['worst'])}"
-    if expect["margin"] is not None and isfinite(expect["margin"]):
-        shown += f", margin {number(expect['margin'], '+.2g')}{unit}"
+    value = found_value(expect)
+    shown = value if value == UNSETTLED else f"found {value}"
+    if place := worst_place(expect):
+        shown += f" {place}"
+    if least := margin(expect):
+        shown += f", margin {least}"
     if expect["held"] is None:
         shown += f"; seen to {expect['seen_to_s']:.6g} s only"
     return shown
 
 
-def _at(worst: dict[str, Any] | None) -> str:
+def found_value(expect: dict[str, Any]) -> str:
+    """The value of an expectation, in words if it has none."""
+    if expect["worst"] is None and expect["value"] is None:
+        return "nothing"
+    if expect["value"] is None and "settle_within_s" in (expect["bound"] or ()):
+        return UNSETTLED
+    return f"{number(expect['value'], '.3g')}{_unit(expect)}"
+
+
+def worst_place(expect: dict[str, Any]) -> str:
+    """Robots and time of the worst tick, as far as there is one."""
+    worst = expect["worst"]
     if worst is None:
         return ""
-    robots = f" ({', '.join(worst['robots'])})" if worst["robots"] else ""
-    return robots if worst["t_s"] is None else f"{robots} at {worst['t_s']:.6g} s"
+    robots = f"({', '.join(worst['robots'])})" if worst["robots"] else ""
+    at = "" if worst["t_s"] is None else f"at {worst['t_s']:.6g} s"
+    return " ".join(filter(None, (robots, at)))
+
+
+def margin(expect: dict[str, Any]) -> str:
+    """The margin with its sign and unit; nothing without one."""
+    if expect["margin"] is None or not isfinite(expect["margin"]):
+        return ""
+    return f"{number(expect['margin'], '+.2g')}{_unit(expect)}"
+
+
+def _unit(expect: dict[str, Any]) -> str:
+    return f" {expect['unit']}" if expect["unit"] not in ("", "1") else ""
 
 
 def _cells(values: dict[str, Any]) -> list[str]:

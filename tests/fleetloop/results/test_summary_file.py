@@ -12,9 +12,13 @@ import pytest
 from configs.errors import ScenarioError
 from configs.loading import load
 from fleetloop.record.reader import Record
-from fleetloop.results.report import _page, write_report
+from fleetloop.results.interactive import windows_of
+from fleetloop.results.known import Known
+from fleetloop.results.panel import Panel
+from fleetloop.results.report import words_of_run, write_report
 from fleetloop.results.summary import RunStats, summarise, to_json
 from fleetloop.results.summary_file import read_summary
+from fleetloop.results.view import View
 
 GONE = object()
 """Instead of a value: it isn't there at all."""
@@ -110,7 +114,12 @@ def test_whatever_is_read_can_be_shown(finished_run: Path, folder: Path) -> None
                 assert str(at[0]) in str(error) or "robots" in str(error)
                 refused += 1
                 continue
-            _page(found, scenario, record, [])
+            known = Known(record, scenario, found)
+            words_of_run(known)
+            view = View(*known)
+            windows_of(view)
+            for signal in ("x_e_m", "s_spread"):
+                view.expect(Panel("", "m"), signal)
     assert refused > 300
 
 
@@ -126,4 +135,4 @@ def test_a_run_that_diverged_to_no_number_is_shown(finished_run: Path, tmp_path:
     summary = summarise(record, scenario, RunStats("lockstep"))
     (tmp_path / "summary.json").write_text(to_json(summary))
     for shown in (summary, read_summary(tmp_path)):
-        assert "no number" in _page(shown, scenario, record, [])
+        assert "no number" in "".join(words_of_run(Known(record, scenario, shown)))
