@@ -19,6 +19,7 @@ from fleetloop.can.app import app as can_app
 from fleetloop.certificates.app import app as certs_app
 from fleetloop.check.app import check
 from fleetloop.compare.app import compare
+from fleetloop.doctor.app import doctor
 from fleetloop.fault.app import app as fault_app
 from fleetloop.graph.app import graph
 from fleetloop.launch.app import agent, network, plant, run
@@ -61,6 +62,7 @@ for verb in (
     agent,
     plant,
     check,
+    doctor,
     compare,
     campaign,
     graph,

@@ -22,7 +22,7 @@ from configs.errors import InfrastructureError
 
 SUFFIX = ".can"
 LOCK = ".fleetloop-lock"
-_MAX_PATH_BYTES = 107
+MAX_PATH_BYTES = 107
 _BACKLOG = 4096
 
 
@@ -132,9 +132,9 @@ def listen(folder: Path, buses: Iterable[str]) -> dict[str, socket.socket]:
     """
     paths = {bus: socket_path(folder, bus) for bus in buses}
     for path in paths.values():
-        if len(os.fsencode(path)) > _MAX_PATH_BYTES:
+        if len(os.fsencode(path)) > MAX_PATH_BYTES:
             raise InfrastructureError(
-                f"the socket path {path} is longer than {_MAX_PATH_BYTES} bytes; set"
+                f"the socket path {path} is longer than {MAX_PATH_BYTES} bytes; set"
                 " FLEETLOOP_RUNTIME to a shorter folder"
             )
     sockets: dict[str, socket.socket] = {}
