@@ -148,6 +148,35 @@ class NodeSeen(NamedTuple):
     errors: str = ""
 
 
+class SignalFormat(NamedTuple):
+    """One field of a message, little endian; the raw number times `scale` is in `unit`."""
+
+    name: str
+    first_bit: int  # its least significant one
+    bits: int
+    is_float: bool = False  # IEEE-754 single
+    signed: bool = False
+    scale: float = 1.0
+    unit: str = ""
+    values: Mapping[int, str] = {}  # words for numbers
+    selects: bool = False
+    """Its number tells which of the fields with `selected_by` is there."""
+    selected_by: int | None = None
+    comment: str = ""
+
+
+class MessageFormat(NamedTuple):
+    """One message of a node."""
+
+    can_id: int
+    name: str
+    length: int  # bytes; frames may be longer
+    from_drive: bool
+    from_host: bool
+    signals: Sequence[SignalFormat]
+    comment: str = ""
+
+
 class Versions(NamedTuple):
     """Versions that a drive has."""
 
@@ -202,3 +231,5 @@ class DriveProtocol(NamedTuple):
     """Keys of [drive]; both ends find theirs in `DriveLink.section` and `DriveModel.section`."""
     endpoints: EndpointFile | None = None
     """None: the drives have no such file."""
+    formats: Callable[[int], Sequence[MessageFormat]] | None = None
+    """All messages of a node, for databases of other tools; None: the protocol doesn't say."""

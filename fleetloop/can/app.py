@@ -209,3 +209,30 @@ def endpoints(
     from fleetloop.can.endpoints import write_endpoints
 
     raise typer.Exit(write_endpoints(bus, firmware, out, protocol))
+
+
+@app.command()
+def dbc(
+    source: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[SCENARIO|RUN]",
+            help="A scenario or a run, for the addresses of its drives. Default: two drives, 0, 1.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FILE", help="Output file. Default: standard output."),
+    ] = None,
+    bus: Annotated[
+        str | None, typer.Option("--bus", metavar="BUS", help="Only the drives on this bus.")
+    ] = None,
+    protocol: Annotated[
+        str | None,
+        typer.Option("--protocol", metavar="NAME", help="Drive protocol, without SCENARIO or RUN."),
+    ] = None,
+) -> None:
+    """Print the frames of the drives as a CAN database (DBC), for cantools, SavvyCAN and others."""
+    from fleetloop.can.dbc import write_dbc
+
+    raise typer.Exit(write_dbc(source, out, bus=bus, protocol_name=protocol))

@@ -15,6 +15,7 @@ from fleetloop.record.can_log import CanLogWriter
 from fleetloop.record.inputs_file import InputsFile
 from fleetloop.record.writer import RecordWriter, Source
 
+RECORD = "record.mcap"
 CAN_FOLDER = "can"
 
 

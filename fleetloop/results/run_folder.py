@@ -7,12 +7,11 @@ from typing import NamedTuple
 
 from bridge.process.clock import local_date
 from configs.errors import ExitStatus, FleetloopError, InfrastructureError, ScenarioError
-from fleetloop.record import inputs_file
+from fleetloop.record import inputs_file, run_record
 from fleetloop.record.reader import Record
-from fleetloop.record.run_record import CAN_FOLDER
 from fleetloop.terminal import note
 
-RECORD = "record.mcap"
+RECORD = run_record.RECORD
 SCENARIO = "scenario.toml"
 SUMMARY = "summary.json"
 
@@ -88,7 +87,7 @@ def make_parents(path: Path) -> None:
 
 def discard(created: Created) -> None:
     """Remove the folder of a run that never began, and what was made for it."""
-    can, inputs = created.path / CAN_FOLDER, created.path / inputs_file.FOLDER
+    can, inputs = created.path / run_record.CAN_FOLDER, created.path / inputs_file.FOLDER
     logs = (*can.glob("*.[bl][lo][fg]"), *inputs.glob("*.inputs"))
     with contextlib.suppress(OSError):
         for file in (created.path / SCENARIO, created.path / RECORD, *logs):

@@ -4,7 +4,7 @@
     client, remote_axis, cadence         the controller's end, and its picture of each axis
     node, local_axis and those beside    the emulated axis on its bus
     section, model                       keys of [drive], and what an emulated axis makes of them
-    decoder, load, endpoint_file         what tools know of the protocol
+    decoder, formats, load, endpoint_file    what tools know of the protocol
 
 Torques, speeds and positions in this folder are the shaft's, as the protocol has them, but where a
 name says wheel.
@@ -14,6 +14,7 @@ from bridge.drives.interface import DriveProtocol
 from bridge.drives.odrive.client import OdriveClient
 from bridge.drives.odrive.decoder import node_seen, words
 from bridge.drives.odrive.endpoint_file import FlatEndpoints
+from bridge.drives.odrive.formats import formats
 from bridge.drives.odrive.load import cyclic_messages
 from bridge.drives.odrive.model import AxisModel
 from bridge.drives.odrive.node import OdriveNode
@@ -34,4 +35,5 @@ ODRIVE = DriveProtocol(
     node_seen=node_seen,
     section=OdriveSection,
     endpoints=FlatEndpoints(),
+    formats=formats,
 )

@@ -67,7 +67,7 @@ def _numbers(form: str, *signals: Signal | str) -> Layout:
     return Layout(struct.Struct(form), named)
 
 
-_ERRORS = "Axis_Error", "Active_Errors", "Disarm_Reason"
+ERRORS = "Axis_Error", "Active_Errors", "Disarm_Reason"
 _SDO_VALUE = "Endpoint_ID", "Value"
 LAYOUTS: Mapping[Command, Layout] = {
     Command.GET_VERSION: _numbers(
@@ -116,7 +116,7 @@ LAYOUTS: Mapping[Command, Layout] = {
     Command.SET_TRAJ_INERTIA: _floats(("Traj_Inertia", "N·m/(rev/s²)")),
     Command.GET_IQ: _floats(("Iq_Setpoint", "A"), ("Iq_Measured", "A")),
     Command.GET_TEMPERATURE: _floats(("FET_Temperature", "°C"), ("Motor_Temperature", "°C")),
-    Command.REBOOT: _numbers("<B", "Action"),
+    Command.REBOOT: _numbers("<B", Signal("Action", meaning=f.RebootAction)),
     Command.GET_BUS_VOLTAGE_CURRENT: _floats(("Bus_Voltage", "V"), ("Bus_Current", "A")),
     Command.CLEAR_ERRORS: _numbers("<B", "Identify"),
     Command.SET_ABSOLUTE_POSITION: _floats(("Position", "rev")),
@@ -140,8 +140,8 @@ def decode(frame: Frame) -> Message | None:
     except (ValueError, KeyError):
         return None
     node = number >> f.BITS
-    name = _NAMES.get(command, command.name.title())
-    if can_id & RTR or (not data and _is_answered(command)):
+    name = name_of(command)
+    if can_id & RTR or (not data and is_answered(command)):
         return Message(node, name, (), request=True)
     raw = layout.packed.unpack(f.padded(data, layout.packed.size))
     if command is Command.ADDRESS:
@@ -164,12 +164,18 @@ def words(frame: Frame) -> str:
     return "  ".join(parts)
 
 
-def _is_answered(command: Command) -> bool:
+def name_of(command: Command) -> str:
+    """The vendor's name of a message."""
+    return _NAMES.get(command, command.name.title())
+
+
+def is_answered(command: Command) -> bool:
+    """Whether drives say it: cyclically, or asked by an empty frame."""
     return command in _ANSWERED or command.name.startswith("GET_")
 
 
 def _value(signal: Signal, raw: float) -> Value:
-    if signal.name in _ERRORS:
+    if signal.name in ERRORS:
         return Value(signal.name, f.error_names(f.AxisError(int(raw))), "")
     if signal.meaning is not None:
         return Value(signal.name, f.name_of(signal.meaning, int(raw)), "")
