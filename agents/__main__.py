@@ -23,11 +23,11 @@ from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.client import StoppedError, open_polled
 from bridge.network.clock_exchange import answer_pings
-from bridge.network.fault_orders import OrderInbox
 from bridge.network.inputs import InputBuffer
 from bridge.network.launcher import LauncherWatch
 from bridge.network.link import Arrival, Link, Publisher
 from bridge.network.messages import Notice, Rows
+from bridge.network.orders import OrderInbox
 from bridge.network.reports import AgentReport
 from bridge.network.telemetry import RowBuffer, put_rows, row_of
 from bridge.network.zenoh_link import POLLED_DEPTH, ZenohLink

@@ -47,7 +47,8 @@ class Admission:
         """Scenario time [ns] by the wall clock; set by the loop in real time."""
         self._schedule = schedule
         self._period_ns = schedule.period_ns
-        self._reach = brief.reach
+        self.reach = brief.reach
+        """Of the scenario, and of what was ordered since."""
         self._delay_ticks = schedule.pose_delay_ticks
         self._ahead_ns = round(brief.coordination.ahead_limit_s * 1e9) + 2 * schedule.period_ns
         self._old_ns = round(brief.coordination.silence_limit_s * 1e9)
@@ -59,7 +60,7 @@ class Admission:
         if state.tick < 0 <= self.tick:
             return self._late(robot)
         wrong = self._path_date(robot, state)
-        if wrong is None and (far := self._reach.beyond(state.t_ns * 1e-9, state.s, state.v_hat)):
+        if wrong is None and (far := self.reach.beyond(state.t_ns * 1e-9, state.s, state.v_hat)):
             wrong = "reach", far
         if wrong is not None:
             self.refusals.note("path state", robot, *wrong)
@@ -97,7 +98,7 @@ class Admission:
     def admits_leader_speed(self, speed: LeaderSpeed) -> bool:
         """Whether the leader's speed is plausible; one that isn't is counted."""
         for change in speed.changes:
-            if far := self._reach.too_fast(change.speed_m_s, "v_r"):
+            if far := self.reach.too_fast(change.speed_m_s, "v_r"):
                 self.refusals.note("speed", LEADER, "reach", far)
                 return False
         return True

@@ -49,6 +49,7 @@ from bridge.frame import Frame
 from bridge.netem.channel import Channel
 from bridge.network.fault_orders import FaultOrder
 from bridge.network.messages import PathState, PoseFix
+from bridge.network.run_orders import LeaderOrder, order_tick
 from bridge.network.telemetry import RowBuffer
 from configs.brief import AgentBrief
 from configs.netem import LOCALISATION, MOST_DELAY_NS
@@ -209,6 +210,17 @@ class Agent:
     def take_order(self, order: FaultOrder, tick: int) -> int | str:
         """Take an order before a tick; return the tick at which it acts, or why it can't."""
         return self.faults.take(order, order.tick(tick, self.last_tick))
+
+    def take_leader_order(self, order: LeaderOrder, tick: int) -> int | str:
+        """Take an order of v_r before a tick; the tick from which on it acts, or why it can't."""
+        acts = order_tick(order.from_tick, tick, self.last_tick, exact=order.exact)
+        if isinstance(acts, str):
+            return acts
+        change = order.change(acts, self._schedule.period_ns)
+        problem = self._reception.change_leader_speed(change, order.reach)
+        if problem is None:
+            self._reach = order.reach
+        return problem or acts
 
     # --- one period --------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ from bridge.frame import Frame
 from bridge.network.fault_orders import FaultOrder
 from bridge.network.inputs import Input, InputBuffer, Kind
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
+from bridge.network.run_orders import LeaderOrder
 from bridge.network.telemetry import RowBuffer
 from configs.brief import AgentBrief
 
@@ -84,6 +85,13 @@ class LoggedAgent(Agent):
             self._log.named(Kind.ORDER, "", order._replace(from_tick=at, exact=True).encode())
         return at
 
+    def take_leader_order(self, order: LeaderOrder, tick: int) -> int | str:
+        """As `Agent.take_leader_order`."""
+        at = super().take_leader_order(order, tick)
+        if isinstance(at, int):
+            self._log.named(Kind.LEADER_ORDER, "", order._replace(from_tick=at).encode())
+        return at
+
     def _take_path_state(self, robot: str, state: PathState) -> None:
         self._log_message(Kind.PATH, robot, state.encode(), start=state.tick < 0)
         self._receive_path_state(robot, state)
@@ -132,10 +140,10 @@ def feed(agent: Agent, entry: Input) -> Sequence[Frame]:
         case Kind.TROUBLE:
             source, text = entry.named()
             agent.note_trouble(Trouble(source), text.decode() or None)
-        case Kind.PATH | Kind.POSE | Kind.PLACE | Kind.LEADER | Kind.ORDER:
-            _deliver(agent, entry)
         case Kind.BEGIN:
             pass
+        case _:
+            _deliver(agent, entry)
     return ()
 
 
@@ -152,5 +160,7 @@ def _deliver(agent: Agent, entry: Input) -> None:
             agent.receive_leader_speed(speed)
         case Kind.ORDER if (order := FaultOrder.decode(content)) is not None:
             agent.take_order(order, order.from_tick)
+        case Kind.LEADER_ORDER if (change := LeaderOrder.decode(content)) is not None:
+            agent.take_leader_order(change, change.from_tick)
         case _:
             raise ValueError(f"a {entry.kind.name} of {source or 'no robot'} doesn't decode")

@@ -23,14 +23,17 @@ from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import can_id_of, to_message
 from bridge.frame import Frame
 from bridge.network.barrier import Hellos
-from bridge.network.fault_orders import OrderInbox
+from bridge.network.fault_orders import FaultOrder
 from bridge.network.link import Arrival, Link, Publisher
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix, Silence
+from bridge.network.orders import OrderInbox
+from bridge.network.run_orders import LeaderOrder
 from bridge.process.awake import LOOK_S, AwakeClock
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, launcher_stopped
 from configs.brief import Schedule
 from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
+from configs.faults.base import Fault
 from configs.roles import PLANT
 
 LISTEN_SHARE = 0.75
@@ -96,6 +99,8 @@ class LockstepLoop:
         self._within_s, self._frames_within_s = _patience_s(self._schedule)
         self._rows = agent.rows
         self._rows_within_s = self._schedule.rows_within_ns * 1e-9
+        self._narrator = Narrator(agent)
+        self._told_tick: int | None = None
         self.faults = ProcessFaults(agent.brief, agent.guard.note, clock=clock)
         """Faults of this process."""
         self.counters = LockstepCounters()
@@ -133,10 +138,11 @@ class LockstepLoop:
         first_tick = agent.brief.resumes_tick if resumes else -schedule.countdown_ticks
         clock = BusClock(schedule, agent.feedback_since, first_tick)
         faults.skip_to(first_tick)
+        next_tick = first_tick
         subscriptions, orders, bus = self._subscriptions, self._orders, self._bus
         look_at_rows = self._rows.look
         timeout_s = self._frames_within_s
-        narrator, told_ns = Narrator(agent), asked_ns
+        told_ns = asked_ns
         tell_every_ns = int(schedule.status_every_s * 1e9)
         while True:
             tick: int | None = None
@@ -170,10 +176,11 @@ class LockstepLoop:
                 counters.ticks += 1
                 if asked_ns >= told_ns:
                     told_ns = asked_ns + tell_every_ns
-                    self._progress.put(narrator.progress(tick).encode())
+                    self._tell(tick)
                 if agent.phase is Phase.DONE:
                     return
-            message = self._await_frame(timeout_s)
+                next_tick = tick + 1
+            message = self._await_frame(timeout_s, next_tick)
 
     def _send(self, frames: Sequence[Frame]) -> None:
         send = self._bus.send
@@ -207,21 +214,44 @@ class LockstepLoop:
                 said = "; ".join((f"no {', no '.join(missing)}", *agent.refusals()))
                 raise PeerSilentError(f"{self._robot}: tick {tick}: within {within_s:g} s {said}")
 
-    def _await_frame(self, within_s: float) -> can.Message | None:
-        """The next frame of the bus; None at a question without a frame."""
+    def _await_frame(self, within_s: float, tick: int) -> can.Message | None:
+        """The next frame of the bus; None at a question without a frame.
+
+        While none comes rows are handed on, progress is told, and orders are taken before the next
+        tick.
+        """
         message = self._receive(self._rows_within_s)
         if message is not None or self._bus.asked:
             return message
         self._rows.hand_on()
+        self._tell(tick - 1)
         clock = AwakeClock(held=launcher_stopped, clock=self._clock)
         deadline = clock.now() + within_s - self._rows_within_s
         while (message := self._receive(LOOK_S)) is None and not self._bus.asked:
+            if self._time_stands(tick):
+                deadline = clock.now() + within_s
             if clock.now() > deadline:
                 raise InfrastructureError(
                     f"{self._robot}: no encoder frames within {within_s:g} s after"
                     f" {self.counters.ticks} ticks"
                 )
         return message
+
+    def _tell(self, tick: int) -> None:
+        """Tell how far this controller is, of a tick once."""
+        if tick != self._told_tick:
+            self._told_tick = tick
+            self._progress.put(self._narrator.progress(tick).encode())
+
+    def _time_stands(self, tick: int) -> bool:
+        """Take the orders that have come; whether the plant has said that time stands still."""
+        orders = self._orders
+        if orders is None:
+            return False
+        if orders.waiting:
+            take_orders(self._agent, self.faults, orders, tick)
+        stands, orders.stands = orders.stands, False
+        return stands
 
     def _receive(self, timeout_s: float) -> can.Message | None:
         try:
@@ -253,8 +283,15 @@ def did_not_start(agent: Agent) -> InfrastructureError:
 def take_orders(agent: Agent, faults: ProcessFaults, orders: OrderInbox, tick: int) -> None:
     """Have the agent, or its process, carry out what has come, at this tick or later; answer it."""
     for order in orders.take():
-        takes = faults.take if order.fault.PLACE == "process" else agent.take_order
-        orders.answer(order, takes(order, tick))
+        match order:
+            case FaultOrder(fault=Fault(PLACE="process")):
+                orders.answer(order, faults.take(order, tick))
+            case FaultOrder():
+                orders.answer(order, agent.take_order(order, tick))
+            case LeaderOrder():
+                orders.answer(order, agent.take_leader_order(order, tick))
+            case _:
+                orders.answer(order, "a controller keeps no pace of its own")
 
 
 def deliver(agent: Agent, arrival: Arrival) -> None:

@@ -29,10 +29,10 @@ from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import can_id_of, to_frame, to_message
 from bridge.frame import ERR, Frame
 from bridge.network.barrier import Hellos
-from bridge.network.fault_orders import OrderInbox
 from bridge.network.launcher import CUT_OFF, LauncherWatch
 from bridge.network.link import Link, Publisher, waiting
 from bridge.network.messages import Go
+from bridge.network.orders import OrderInbox
 from bridge.network.reports import Deadlines
 from bridge.network.telemetry import LOOKS
 from bridge.process.awake import STALL_S, Lateness

@@ -20,7 +20,8 @@ from agents.neighbours import Neighbours
 from bridge.netem.channel import Channel
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from configs.brief import LEAD_TICKS, AgentBrief
-from configs.leader_speed import speed_at
+from configs.leader_speed import SpeedChange, speed_at, with_change
+from configs.reach import Reach
 
 
 class Reception:
@@ -101,6 +102,21 @@ class Reception:
         """Store the virtual leader's speed profile."""
         if self.admission.admits_leader_speed(speed):
             self.leader = speed
+
+    def change_leader_speed(self, change: SpeedChange, reach: Reach) -> str | None:
+        """Take an ordered change of v_r; why it can't be, None if it is taken.
+
+        Args:
+            change: from a tick on that hasn't come.
+            reach: of a scenario with this change, in which neighbours' messages are believed.
+        """
+        if self.leader is not None:
+            changes = with_change(self.leader.changes, change)
+            if isinstance(changes, str):
+                return changes
+            self.leader = LeaderSpeed(tuple(changes))
+        self.admission.reach = reach
+        return None
 
     def channel_of(self, source: str, tick: int) -> Channel[Any]:
         """The emulated edge from a source; one without effects is made if there is none.

@@ -49,6 +49,7 @@ KINDS: dict[str, EventKind] = {
     "law": EventKind("a law recorded a number that isn't finite"),
     "fault_applied": EventKind("a fault of the scenario, or an ordered one, begins to act"),
     "fault_cleared": EventKind("a fault acts no more"),
+    "leader_speed": EventKind("a speed of the virtual leader was ordered", exact=False),
     "bus_trouble": EventKind("a bus failed, or drives ignored frames", exact=False),
     "stalled": EventKind("a process, or its machine, stood still", exact=False),
     "silent": EventKind("a process shows no sign of life", exact=False),

@@ -39,6 +39,26 @@ def speed_at(changes: Sequence[SpeedChange], t_ns: float) -> float:
     return before + (speed - before) * ((t_ns - from_ns) / ramp_ns)
 
 
+def with_change(changes: Sequence[SpeedChange], change: SpeedChange) -> Sequence[SpeedChange] | str:
+    """The changes with one more, in place of one at its time but the first; why not, if it can't.
+
+    Args:
+        changes: at least one, in order.
+        change: that begins at any time.
+    """
+    first, *later = changes
+    kept = [one for one in later if one.from_ns != change.from_ns]
+    found = sorted((first, *kept, change), key=lambda one: one.from_ns)
+    for one, other in pairwise(found):
+        if one.to_ns > other.from_ns:
+            since_s, until_s = one.from_ns * 1e-9, one.to_ns * 1e-9
+            return (
+                f"v_r changes at {other.from_ns * 1e-9:g} s, within its ramp from {since_s:g} s to"
+                f" {until_s:g} s"
+            )
+    return found
+
+
 def in_order(changes: Sequence[SpeedChange]) -> bool:
     """Whether each change begins when the one before it is over."""
     return all(one.to_ns <= other.from_ns for one, other in pairwise(changes))

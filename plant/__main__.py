@@ -15,10 +15,10 @@ from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.client import StoppedError, open_client
 from bridge.network.clock_exchange import answer_pings
-from bridge.network.fault_orders import OrderInbox
 from bridge.network.launcher import LauncherWatch
 from bridge.network.link import Arrival, Link, Publisher, waiting
 from bridge.network.messages import Go, Notice, PoseFix, Progress, Rows, Silence
+from bridge.network.orders import OrderInbox
 from bridge.network.refused_messages import Refusals
 from bridge.network.reports import PlantReport
 from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer, put_rows
@@ -44,6 +44,7 @@ from plant.faults import fault_events
 from plant.herald import Herald
 from plant.lockstep import LockstepLoop
 from plant.orders import PlantOrders
+from plant.pacing import Pacing
 from plant.real_robot import RealRobot
 from plant.realtime import RealtimeLoop
 from plant.robot import emulated_robot
@@ -201,7 +202,8 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         _await_go(brief, link, hellos, stop)
         settle_memory()
         absent = AbsentControllers(brief, hub, silences, herald.note)
-        orders = PlantOrders(brief.schedule, inbox, relays, absent)
+        pacing = Pacing(brief.schedule, brief.speed)
+        orders = PlantOrders(brief.schedule, inbox, relays, absent, pacing)
         loop = LockstepLoop(brief, emulated, hub, poses, rows, say, taps, absent, orders)
         counters, progress_of, body = loop.counters, loop.progress, loop.run
     narrator.meter = PlantMeter(loop.buses, emulated)

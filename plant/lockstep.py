@@ -7,7 +7,9 @@
 Robots of different buses meet only in their controllers' messages, for which each controller waits
 by tick; `plant.absent` has the controllers that a run goes on without. So a bus need not wait for
 all others at every tick: it may be up to `LEAD_TICKS` ahead of the slowest, which keeps all cores
-at work and changes no value. Held to a speed, all go tick by tick together.
+at work and changes no value. `plant.pacing` says which ticks may begin, and when: held to a speed,
+all go tick by tick together; paused, all stop at the same tick. While nobody may begin a tick time
+stands still: clients of the buses are served, orders taken, and controllers told.
 
 Bus time runs from power-up; scenario time is 0 when control starts, after the countdown in which
 the controllers arm their drives and the bodies are held as the scenario puts them. The run ends
@@ -25,7 +27,7 @@ from bridge.network.telemetry import RowBuffer, RowLooks, Tap
 from bridge.process.awake import LOOK_S, STALL_S
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, launcher_stopped
-from configs.brief import LEAD_TICKS, PlantBrief
+from configs.brief import PlantBrief
 from configs.errors import InfrastructureError, PeerLostError
 from plant.absent import AbsentControllers
 from plant.bus.build import build_buses
@@ -33,6 +35,7 @@ from plant.bus.sockets import SocketPort
 from plant.counters import PlantCounters
 from plant.lane import Lane
 from plant.orders import PlantOrders
+from plant.pacing import Pacing
 from plant.robot import EmulatedRobot
 
 REPORT_EVERY_NS = 100_000_000
@@ -42,6 +45,9 @@ _STALL_NS = int((LOOK_S + STALL_S) * 1e9)
 ANSWER_SHARE = 0.9
 """Part of the tick deadline that the plant waits for answers: before that, controllers name a
 silent peer; after it, the launcher names the plant."""
+
+STANDSTILL_SHARE = 0.25
+"""Part of the tick deadline after which controllers are told again that time stands still."""
 
 
 class _Ends(NamedTuple):
@@ -72,8 +78,8 @@ class LockstepLoop:
         self._orders = orders
         self._schedule = schedule = brief.schedule
         self._period_ns, self._ticks = schedule.period_ns, schedule.ticks
-        self._tick_wall_ns = int(schedule.period_ns / brief.speed) if brief.speed > 0.0 else 0
-        self._window = 0 if self._tick_wall_ns else LEAD_TICKS
+        pacing = orders.pacing if orders is not None else None
+        self._pacing = pacing or Pacing(schedule, brief.speed)
         self._limit_s = ANSWER_SHARE * schedule.tick_deadline_s
         self._hub = hub
         self._rows = RowLooks(rows, schedule.rows_within_ns)
@@ -101,7 +107,12 @@ class LockstepLoop:
         self._slowest = first
         self._slowest_ns = 0  # since when it is that tick
         self._at_slowest = len(self._lanes)
-        self._held: list[Lane] = []
+        self._held: list[Lane] = []  # whose tick may not begin yet
+        self._latest = first + self._pacing.window
+        """The latest tick that may begin now."""
+        self._standstill_ns = int(STANDSTILL_SHARE * schedule.tick_deadline_s * 1e9)
+        self._told_ns = 0  # when controllers were told last that time stands still
+        self._next_report_ns = 0
         self._start_ns = 0
         self.counters = PlantCounters()
 
@@ -113,7 +124,7 @@ class LockstepLoop:
                 was to come again did not.
             PeerLostError: a controller left its bus.
         """
-        self._start_ns = now_ns = next_report_ns = self._clock.monotonic_ns()
+        self._start_ns = now_ns = self._next_report_ns = self._clock.monotonic_ns()
         hub, absent = self._hub, self._absent
         for lane in self._lanes.values():
             self._start_tick(lane, now_ns)
@@ -122,6 +133,9 @@ class LockstepLoop:
         while self._at_slowest and not stop.requested:
             if orders:
                 self._take_orders()
+            if self._latest < self._slowest and self._stand_still():
+                now_ns = self._clock.monotonic_ns()
+                continue
             answered = hub.collect(0.0 if self._unasked else wait_s)
             after_ns = self._clock.monotonic_ns()
             self.counters.waited_ns += after_ns - now_ns
@@ -132,24 +146,22 @@ class LockstepLoop:
             if absent.allowed:
                 self._go_on_without(after_ns, answered)
             now_ns = self._clock.monotonic_ns()
-            if now_ns >= rows.next_ns:
-                rows.look(now_ns)
+            rows.look(now_ns)
             if now_ns - after_ns > _STALL_NS:
                 self._forgive(now_ns - after_ns)
             if not (answered or absent.allowed):
                 self._look_for_the_late(now_ns)
-            elif now_ns >= next_report_ns:
-                next_report_ns = now_ns + REPORT_EVERY_NS
-                self._report(self.progress())
+            elif now_ns >= self._next_report_ns:
+                self._tell(now_ns)
         self.counters.wall_ns = self._clock.monotonic_ns() - self._start_ns
         for bus, lane in self._lanes.items():
             self.counters.frames[bus] = lane.bus.crossed
             self.counters.add_nodes(bus, lane.bus.node_counts())
 
     def progress(self) -> Progress:
-        """The progress of the slowest robot."""
-        tick = self._slowest
-        self.counters.ticks = max(tick, 0)
+        """The progress of the slowest robot; of a run that stands, the tick at which it does."""
+        self.counters.ticks = max(self._slowest, 0)
+        tick = min(self._slowest, self._pacing.last_tick)
         return Progress(
             tick, tick * self._schedule.period_ns, self._clock.monotonic_ns() - self._start_ns
         )
@@ -158,10 +170,12 @@ class LockstepLoop:
         """Carry out orders from a tick on that no bus has begun."""
         lanes = [lane for lane in self._lanes.values() if not lane.done]
         if self._orders is not None and lanes:
-            latest = max(lane.tick for lane in lanes)
-            self._orders.take(self.buses.values(), latest + 1)
+            now_ns = self._clock.monotonic_ns()
+            begun = max(lane.tick - (lane in self._held) for lane in lanes)
+            self._orders.take(self.buses.values(), begun + 1, now_ns)
             for lane in lanes:
                 self._look_at(lane)
+            self._open(now_ns)
 
     # --- one bus -------------------------------------------------------------------------------
 
@@ -212,50 +226,74 @@ class LockstepLoop:
             self._at_slowest -= 1
             if not self._at_slowest:
                 self._slowest_ns = now_ns
-                self._next_tick()
-                self._release(now_ns)
+                self._next_tick(now_ns)
+                self._open(now_ns)
         if lane.done:
             return
-        if lane.tick <= self._slowest + self._window:
+        if lane.tick <= self._latest:
             self._start_tick(lane, now_ns)
         else:
             self._held.append(lane)
 
     # --- all of them ---------------------------------------------------------------------------
 
-    def _next_tick(self) -> None:
+    def _next_tick(self, now_ns: int) -> None:
         """The slowest have gone on; without any bus left, the run is over."""
         ticks = [lane.tick for lane in self._lanes.values() if not lane.done]
         if not ticks:
             self._slowest = self._schedule.ticks
             return
-        self._slowest = min(ticks)
-        self._at_slowest = ticks.count(self._slowest)
-        if self._slowest <= 0:
-            self._start_ns = self._clock.monotonic_ns()
-        elif self._tick_wall_ns:
-            self._pace()
+        self._slowest = slowest = min(ticks)
+        self._at_slowest = ticks.count(slowest)
+        pacing = self._pacing
+        if slowest <= 0:
+            self._start_ns = now_ns
+            pacing.anchor(slowest, now_ns)
+        elif pacing.tick_ns and now_ns > pacing.due_ns(slowest) + pacing.tick_ns:
+            self.counters.overruns += 1
 
-    def _release(self, now_ns: int) -> None:
-        """Ask the controllers of all buses that the window lets go on."""
-        latest = self._slowest + self._window
+    def _open(self, now_ns: int) -> None:
+        """Ask the controllers of all buses whose next tick may begin now."""
+        pacing, slowest = self._pacing, self._slowest
+        self._latest = latest = min(slowest + pacing.window, pacing.last_tick)
+        if latest >= slowest and now_ns < pacing.due_ns(slowest):
+            self._latest = latest = slowest - 1
         going = [lane for lane in self._held if lane.tick <= latest]
         if going:
             self._held = [lane for lane in self._held if lane.tick > latest]
             for lane in going:
                 self._start_tick(lane, now_ns)
 
-    def _pace(self) -> None:
-        """Wait for the wall time of the slowest's tick; the buses are served meanwhile."""
-        due_ns = self._start_ns + self._slowest * self._tick_wall_ns
-        left_ns = due_ns - self._clock.monotonic_ns()
-        if left_ns < -self._tick_wall_ns:
-            self.counters.overruns += 1
-        while left_ns > 0:
-            self._hub.serve(min(left_ns * 1e-9, self._rows.every_s))
-            now_ns = self._clock.monotonic_ns()
-            self._rows.look(now_ns)
-            left_ns = due_ns - now_ns
+    def _stand_still(self) -> bool:
+        """Serve the buses while no tick may begin, for a while; False: one hasn't ended yet."""
+        if any(lane.asked_ns for lane in self._lanes.values()):
+            return False
+        now_ns, pacing = self._clock.monotonic_ns(), self._pacing
+        wait_s = self._rows.every_s
+        if self._slowest <= pacing.last_tick:
+            wait_s = min(wait_s, (pacing.due_ns(self._slowest) - now_ns) * 1e-9)
+        elif self._orders is not None and self._orders.stands(pacing.last_tick):
+            self._tell(now_ns)
+        self._hub.serve(wait_s)
+        now_ns = self._clock.monotonic_ns()
+        self._rows.look(now_ns)
+        if now_ns >= self._next_report_ns:
+            self._tell(now_ns)
+        since_ns = max(self._told_ns, self._slowest_ns)
+        if self._orders is not None and now_ns - since_ns >= self._standstill_ns:
+            self._told_ns = now_ns
+            self._orders.tell_of_standstill(self._slowest)
+        if self._absent.allowed:
+            self._go_on_without(now_ns, ())
+        else:
+            self._look_for_the_late(now_ns)
+        self._open(now_ns)
+        return True
+
+    def _tell(self, now_ns: int) -> None:
+        """Report how far the run is."""
+        self._next_report_ns = now_ns + REPORT_EVERY_NS
+        self._report(self.progress())
 
     def _forgive(self, stood_still_ns: int) -> None:
         """Time in which this process, or the router, stood still doesn't count as a delay."""

@@ -15,10 +15,13 @@ from typing import Any, Protocol
 from bridge.fault_schedule import FaultSchedule
 from bridge.network.fault_orders import FaultOrder, targets_to
 from bridge.network.link import Publisher
+from bridge.network.orders import Order
+from bridge.network.run_orders import LeaderOrder, Pace, PaceOrder, Standstill, order_tick
 from configs.brief import Schedule
 from configs.faults.absences import absences
 from plant.absent import AbsentControllers
 from plant.bus.port import Bus
+from plant.pacing import Pacing
 
 
 class Inbox(Protocol):
@@ -26,10 +29,10 @@ class Inbox(Protocol):
 
     waiting: deque[Any]
 
-    def take(self) -> list[FaultOrder]:
+    def take(self) -> list[Order]:
         """The orders that have come."""
 
-    def answer(self, order: FaultOrder, tick: int | str) -> None:
+    def answer(self, order: Order, tick: int | str) -> None:
         """Say the tick at which an order acts, or why it doesn't."""
 
 
@@ -41,6 +44,7 @@ class PlantOrders:
         inbox: where they arrive.
         relays: to the controller of each robot; none in real time.
         absent: the controllers that lockstep goes on without; None in real time.
+        pacing: of lockstep; None in real time.
     """
 
     def __init__(
@@ -49,7 +53,10 @@ class PlantOrders:
         inbox: Inbox,
         relays: Mapping[str, Publisher],
         absent: AbsentControllers | None = None,
+        pacing: Pacing | None = None,
     ) -> None:
+        self.pacing = pacing
+        self._awaited: list[PaceOrder] = []  # answered when the run stands
         self._schedule = schedule
         self._inbox = inbox
         self._relays = relays
@@ -57,12 +64,24 @@ class PlantOrders:
         self.waiting = inbox.waiting
         """Orders that have come; loops look whether there are any."""
 
-    def take(self, buses: Iterable[Bus], earliest: int) -> None:
-        """Carry out what has come; `earliest` is the first tick that no bus has begun."""
+    def take(self, buses: Iterable[Bus], earliest: int, now_ns: int = 0) -> None:
+        """Carry out what has come.
+
+        Args:
+            buses: with the robots.
+            earliest: the first tick that no bus has begun.
+            now_ns: by the loop's clock, in lockstep.
+        """
         schedules = {
             robot.brief.robot: bus.faults.schedule for bus in buses for robot in bus.robots
         }
         for order in self._inbox.take():
+            if isinstance(order, PaceOrder):
+                self._keep_pace(order, earliest, now_ns)
+                continue
+            if isinstance(order, LeaderOrder):
+                self._change_speed(order, earliest)
+                continue
             first = earliest
             if order.fault.PLACE != "plant":
                 first = self._first_heard(earliest) + (order.fault.PLACE == "process")
@@ -70,6 +89,53 @@ class PlantOrders:
             if isinstance(tick, int):
                 tick = self._refusal(order, tick, schedules) or tick
             self._inbox.answer(order, tick)
+
+    def _keep_pace(self, order: PaceOrder, earliest: int, now_ns: int) -> None:
+        """Pause, let go on, step or hold to a speed; a run that is to stand is waited for."""
+        pacing = self.pacing
+        if pacing is None:
+            self._inbox.answer(order, "in real time the pace is that of the wall clock")
+            return
+        tick: int | str = earliest
+        match order.what:
+            case Pace.PAUSE:
+                tick = pacing.pause(earliest - 1)
+            case Pace.STEP:
+                tick = pacing.step(int(order.value))
+                pacing.anchor(earliest, now_ns)
+            case Pace.RESUME:
+                pacing.resume()
+                pacing.anchor(earliest, now_ns)
+            case Pace.SPEED:
+                pacing.set_speed(order.value, earliest, now_ns)
+        if isinstance(tick, int) and order.what in (Pace.PAUSE, Pace.STEP):
+            self._awaited.append(order)
+        else:
+            self._inbox.answer(order, tick)
+
+    def stands(self, tick: int) -> bool:
+        """Answer those who wait until no bus goes on beyond a tick; whether there are any."""
+        awaited, self._awaited = self._awaited, []
+        for order in awaited:
+            self._inbox.answer(order, tick)
+        return bool(awaited)
+
+    def tell_of_standstill(self, tick: int) -> None:
+        """Tell all controllers that time stands still before a tick."""
+        told = Standstill(tick).encode()
+        for relay in self._relays.values():
+            relay.put(told)
+
+    def _change_speed(self, order: LeaderOrder, earliest: int) -> None:
+        """Hand an order of v_r on to all controllers, which answer it."""
+        first, ticks = self._first_heard(earliest), self._schedule.ticks
+        tick = order_tick(order.from_tick, first, ticks, exact=order.exact)
+        if isinstance(tick, str):
+            self._inbox.answer(order, tick)
+            return
+        told = order._replace(from_tick=tick, exact=True).encode()
+        for relay in self._relays.values():
+            relay.put(told)
 
     def _refusal(
         self, order: FaultOrder, tick: int, schedules: Mapping[str, FaultSchedule]

@@ -88,8 +88,7 @@ class RealtimeLoop:
         while self._tick <= schedule.ticks and not stop.requested:
             due_ns = power_up_ns + schedule.bus_time_ns(self._tick)
             now_ns = self._clock.monotonic_ns()
-            if now_ns >= self._looks.next_ns:
-                self._looks.look(now_ns)
+            self._looks.look(now_ns)
             if now_ns < due_ns:
                 left_s = (due_ns - now_ns) * 1e-9
                 self._serve(min(left_s, self._looks.every_s), power_up_ns)

@@ -35,7 +35,11 @@ class Hellos:
         self._began_s = clock.monotonic_s()
 
     def add(self, publisher: Publisher, payload: bytes) -> None:
-        """Say `payload` on `publisher` at every round, the first of which is at once."""
+        """Say `payload` on `publisher` at every round, the first of which is at once.
+
+        It takes the place of what was said on it before.
+        """
+        self._hellos = [one for one in self._hellos if one[0] is not publisher]
         self._hellos.append((publisher, payload))
         self._next_s = 0.0
 

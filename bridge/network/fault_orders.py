@@ -1,4 +1,4 @@
-"""Orders of faults during a run, and the answers to them.
+"""Orders of faults during a run, and the answers to orders.
 
 The launcher has validated an order by the scenario; the plant and the controllers carry it out at a
 tick, and answer with that tick or with a reason why not.
@@ -12,28 +12,22 @@ time: the plant hands on what concerns controllers, ahead of a pose that each of
 that all of them have it before the tick at which it is due.
 """
 
-from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any, NamedTuple, get_type_hints
 
 from bridge.fault_schedule import FaultSchedule
-from bridge.network import keys
 from bridge.network.packing import ints, pack, printable, unpack
-from bridge.network.refused_messages import Refusals
-from bridge.network.zenoh_link import ZenohLink
+from bridge.network.run_orders import order_tick
 from configs.conformity import conforms
 from configs.edges import hearer
 from configs.faults.base import Fault, PlannedFault
 from configs.faults.kinds import KINDS
 from configs.parameters import as_tuples
-from configs.roles import LAUNCHER
 
 MOST_TARGETS = 1 << 12
 MOST_TEXT = 500
 """Characters of a name, a target or a refusal."""
-MOST_WAITING = 1 << 10
-"""Orders that one process keeps until its next tick; older ones are dropped unanswered."""
 _GIVEN = frozenset(("name", "at_s", "for_s", "robots"))
 """Keys of a fault that other fields of an order give."""
 
@@ -94,10 +88,7 @@ class FaultOrder(NamedTuple):
 
     def tick(self, earliest: int, ticks: int) -> int | str:
         """The tick at which it acts in a run of so many, or why it can't."""
-        if self.exact and self.from_tick < earliest:
-            return f"tick {self.from_tick} has gone: tick {earliest} is the next that it can act at"
-        tick = max(self.from_tick, earliest, 0)
-        return tick if tick < ticks else f"the run ends before: it has {ticks} ticks"
+        return order_tick(self.from_tick, earliest, ticks, exact=self.exact)
 
 
 class FaultAnswer(NamedTuple):
@@ -118,44 +109,6 @@ class FaultAnswer(NamedTuple):
         if read is None or not ints(read[1:3]) or not _is_text(read[3]):
             return None
         return cls(read[1], read[2], printable(read[3]))
-
-
-class OrderInbox:
-    """Orders to one process: they come on the network's thread, its loop takes them.
-
-    `waiting` is looked at once per tick; nothing else costs while there are none.
-
-    Args:
-        link: of the process.
-        run: of the orders.
-        process: that carries them out.
-        refusals: count what is no order.
-    """
-
-    def __init__(self, link: ZenohLink, run: str, process: str, refusals: Refusals) -> None:
-        self.waiting: deque[bytes] = deque(maxlen=MOST_WAITING)
-        self._refusals = refusals
-        self._answers = link.publisher(keys.answer(run, process))
-        link.each(keys.order(run, process), self.waiting.append)
-
-    def take(self) -> list[FaultOrder]:
-        """The orders that have come; what is none is counted and dropped."""
-        orders = []
-        while self.waiting:
-            order = FaultOrder.decode(self.waiting.popleft())
-            if order is None:
-                self._refusals.note("order", LAUNCHER.name, "not well formed")
-            else:
-                orders.append(order)
-        return orders
-
-    def answer(self, order: FaultOrder, tick: int | str) -> None:
-        """Say the tick at which an order acts, or why it doesn't."""
-        if isinstance(tick, str):
-            said = FaultAnswer(order.number, 0, tick)
-        else:
-            said = FaultAnswer(order.number, tick)
-        self._answers.put(said.encode())
 
 
 def _table(fault: Fault) -> dict[str, Any]:

@@ -21,6 +21,7 @@ of all others that of the newest tick.
               identifier u32, length u8, data
     STOP      as after the tick of a TICK             told to stop before the closing tick
     ORDER     NUL, `FaultOrder`                       with the tick at which it acts
+    LEADER_ORDER  NUL, `LeaderOrder`                  likewise
 
 A replay feeds a controller what is left of its answers, and compares the answers. Whatever else may
 reach a controller is a kind more: here, where the controller takes it
@@ -65,6 +66,7 @@ class Kind(IntEnum):
     TICK = 10
     STOP = 11
     ORDER = 12
+    LEADER_ORDER = 13
 
 
 class Input(NamedTuple):

@@ -129,10 +129,12 @@ class RowLooks:
         self.every_s = self._every_ns * 1e-9
         """Longest wait between two looks [s]."""
         self.next_ns = 0
-        """Loops compare their clock with it."""
+        """When to look next."""
 
     def look(self, now_ns: int) -> None:
-        """Look at all, and say when to look next."""
+        """Look at all, if it is time."""
+        if now_ns < self.next_ns:
+            return
         self.next_ns = now_ns + self._every_ns
         for buffer in self._buffers:
             buffer.look(now_ns)

@@ -7,11 +7,14 @@ of the same client:
     {"id": 7, "cleared": [...]}                              or {"id": 7, "error": "why not"}
 
 `id` is the client's own and comes back as it was. A table of the requests is made by what serves
-them: a request more is an entry there.
+them: a request more is an entry there. Those that change the run are refused while another client
+holds the controls (`fleetloop.door.controls`).
 """
 
 import json
 from collections.abc import Callable, Mapping
+from math import isfinite
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from configs.errors import FleetloopError
@@ -31,10 +34,22 @@ class Request(NamedTuple):
     """By name; each must be given and be of this type."""
     act: Callable[..., None]
     """Called with `respond` and the arguments by name; raises FleetloopError to refuse."""
+    changes: bool = False
+    """It changes the run."""
+    optional: Mapping[str, type] = MappingProxyType({})
+    """Arguments that may be left out."""
 
 
-def serve(line: bytes, requests: Mapping[str, Request], respond: Respond) -> None:
-    """Carry out the request in a line; whatever is in it, there is one answer."""
+def serve(
+    line: bytes,
+    requests: Mapping[str, Request],
+    respond: Respond,
+    refuse: Callable[[], str] = lambda: "",
+) -> None:
+    """Carry out the request in a line; whatever is in it, there is one answer.
+
+    `refuse`: why the client may not change the run now, "" if it may.
+    """
     asked = _parsed(line)
     if isinstance(asked, str):
         respond({"error": asked})
@@ -48,7 +63,7 @@ def serve(line: bytes, requests: Mapping[str, Request], respond: Respond) -> Non
     request = requests.get(name) if isinstance(name, str) else None
     if request is None:
         answer({"error": f"{str(name)[:40]!r}: no such request; known: {', '.join(requests)}"})
-    elif wrong := _wrong(asked, request):
+    elif wrong := _wrong(asked, request) or (refuse() if request.changes else ""):
         answer({"error": f"{name}: {wrong}"})
     else:
         try:
@@ -65,12 +80,17 @@ def _parsed(line: bytes) -> Answer | str:
     return asked if isinstance(asked, dict) else "must be an object with a key 'request'"
 
 
-def _wrong(asked: Mapping[str, Any], request: Request) -> str:
+def _wrong(asked: Answer, request: Request) -> str:
     """Why these arguments aren't the request's, "" if they are."""
-    wanted = request.arguments
-    if asked.keys() != wanted.keys():
+    wanted: dict[str, type] = {**request.arguments, **request.optional}
+    if not request.arguments.keys() <= asked.keys() <= wanted.keys():
         return f"takes {', '.join(wanted) or 'no arguments'}, not {', '.join(asked) or 'none'}"
-    for key, kind in wanted.items():
-        if type(asked[key]) is not kind:
+    for key, value in asked.items():
+        kind = wanted[key]
+        if kind is float and type(value) is int and abs(value) <= 1 << 53:
+            asked[key] = float(value)  # JSON has one kind of number
+        elif type(value) is not kind:
             return f"{key} must be of type {kind.__name__}"
+        elif isinstance(value, float) and not isfinite(value):
+            return f"{key} must be a finite number"
     return ""

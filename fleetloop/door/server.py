@@ -15,6 +15,7 @@ from typing import Self
 
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from configs.errors import InfrastructureError
+from fleetloop.door.controls import Controls
 from fleetloop.door.requests import MOST_LINE_BYTES, Answer, Request, serve
 
 NAME = "door"
@@ -33,6 +34,7 @@ class _Client:
     """One connection."""
 
     def __init__(self, connection: socket.socket, now_s: float) -> None:
+        self.requests: Mapping[str, Request] = {}
         self.connection = connection
         self.since_s = now_s
         self.asked = bytearray()
@@ -75,6 +77,7 @@ class Door:
     Args:
         folder: of the run's sockets.
         requests: what may be asked.
+        controls: who holds those of the run.
         clock: of idle clients.
 
     Raises:
@@ -82,10 +85,16 @@ class Door:
     """
 
     def __init__(
-        self, folder: Path, requests: Mapping[str, Request], *, clock: Clock = SYSTEM_CLOCK
+        self,
+        folder: Path,
+        requests: Mapping[str, Request],
+        controls: Controls | None = None,
+        *,
+        clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         self._path = folder / NAME
         self._requests = requests
+        self._controls = controls or Controls()
         self._clock = clock
         self._clients: list[_Client] = []
         self._selector = selectors.DefaultSelector()
@@ -130,6 +139,7 @@ class Door:
                 client.write()
                 connection.close()
                 continue
+            client.requests = {**self._requests, **self._controls.requests_of(client)}
             self._clients.append(client)
             self._selector.register(connection, selectors.EVENT_READ, client)
 
@@ -141,7 +151,8 @@ class Door:
                 break
             client.asked = rest
             client.awaited += 1
-            serve(bytes(line), self._requests, partial(_Client.respond, client))
+            refuse = partial(self._controls.refusal, client)
+            serve(bytes(line), client.requests, partial(_Client.respond, client), refuse)
         else:
             return
         if len(client.asked) >= MOST_LINE_BYTES:
@@ -151,6 +162,7 @@ class Door:
 
     def _drop(self, client: _Client) -> None:
         client.gone = True
+        self._controls.drop(client)
         with contextlib.suppress(KeyError):
             self._selector.unregister(client.connection)
         client.connection.close()

@@ -27,6 +27,7 @@ def stats_of(outcome: Outcome, *, realtime: bool, period_s: float) -> RunStats:
         machine=outcome.machine,
         refused=outcome.refused,
         faults=outcome.faults,
+        steered=outcome.steered,
         clocks=outcome.clocks,
     )
     stats.cpu_s["launcher"] = round(outcome.cpu_ns * 1e-9, 3)

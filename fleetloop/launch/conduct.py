@@ -320,6 +320,8 @@ class Concluded(NamedTuple):
 def conclude(scenario: Scenario, carried: Carried) -> Concluded:
     """Make the summary of a run that began, and write it into its folder, events into its record.
 
+    A scenario whose leader's speed was ordered is written again, with the steps that repeat it.
+
     Raises:
         RecordError: the record can't be read.
         InfrastructureError: the record is gone.
@@ -330,10 +332,14 @@ def conclude(scenario: Scenario, carried: Carried) -> Concluded:
         gone = stats.reason or f"{path} is not there: the run's folder was removed or moved"
         raise InfrastructureError(gone)
     record = Record.open(path)
+    if stats.steered is not None:
+        scenario = stats.steered
     summary = summarise(record, scenario, stats)
     unsaved: InfrastructureError | None = None
     try:
         run_folder.write(folder / run_folder.SUMMARY, to_json(summary))
+        if stats.steered is not None:
+            run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
         add_events(record, _recorded(scenario, stats.events), schedule(scenario).period_ns)
     except InfrastructureError as error:
         unsaved = error

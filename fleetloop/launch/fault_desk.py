@@ -12,7 +12,7 @@ all controllers. In real time each does, but for those that are absent: they hav
 they are awake, or are told when they are started again, to which the launcher sees by itself.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import ceil
 from typing import Any
@@ -70,6 +70,8 @@ class FaultDesk:
         is_absent: whether a process is killed, frozen or dropped.
         tick: how far the run is.
         now_s: seconds on the launcher's clock of awake time.
+        numbers: of orders, which no other desk of the run uses.
+        is_paused: whether the run stands still: no tick is waited for.
     """
 
     def __init__(
@@ -80,6 +82,8 @@ class FaultDesk:
         is_absent: Callable[[str], bool],
         tick: Callable[[], int],
         now_s: Callable[[], float],
+        numbers: Iterator[int],
+        is_paused: Callable[[], bool],
     ) -> None:
         self.ledger = FaultLedger(scenario)
         self._scenario = scenario
@@ -91,13 +95,14 @@ class FaultDesk:
         self._publishers: dict[str, Publisher] = {}
         self._pending: dict[int, _Pending] = {}
         self._reached: list[tuple[int, float, Callable[[], None]]] = []
-        self._number = 0
+        self._numbers = numbers
+        self._is_paused = is_paused
         self.on_absences: Callable[[Iterable[Absence]], None] = lambda _: None
         """Called with the absences of controllers by all faults when these change."""
         self.requests: Mapping[str, Request] = {
             "fault.list": Request({}, self._list),
-            "fault.inject": Request({"fault": dict}, self._inject),
-            "fault.clear": Request({"names": list}, self._clear),
+            "fault.inject": Request({"fault": dict}, self._inject, changes=True),
+            "fault.clear": Request({"names": list}, self._clear, changes=True),
         }
 
     def now(self) -> tuple[int, float]:
@@ -154,7 +159,8 @@ class FaultDesk:
                 within = f"no answer in {ANSWER_S:g} s; whether it acts there is not known"
                 pending.refusals |= dict.fromkeys(sorted(pending.awaited), within)
                 self._complete(number)
-        due = [one for one in self._reached if one[0] <= tick or now_s > one[1]]
+        waits = not self._is_paused()
+        due = [one for one in self._reached if one[0] <= tick or now_s > one[1] or not waits]
         self._reached = [one for one in self._reached if one not in due]
         for _, _, respond in due:
             respond()
@@ -225,14 +231,12 @@ class FaultDesk:
         self, entry: Entry, done: Callable[[_Pending], None], *, ends: bool, exact: bool
     ) -> None:
         """Order a fault, or its end, of the processes that it concerns."""
-        self._number += 1
+        number = next(self._numbers)
         fault, lasts = entry.fault, None
         if not ends and entry.to_tick is not None:
             lasts = entry.to_tick - entry.from_tick
         from_tick = entry.from_tick if exact else self._soonest()
-        order = FaultOrder(
-            self._number, ends, entry.name, entry.targets, fault, from_tick, lasts, exact
-        )
+        order = FaultOrder(number, ends, entry.name, entry.targets, fault, from_tick, lasts, exact)
         told = self._receivers(fault, entry.targets)
         awaited = {process for process in told if not self._is_absent(process)}
         ticks: dict[str, int] = {}
@@ -241,13 +245,13 @@ class FaultDesk:
         if not awaited:
             ticks[LAUNCHER.name] = from_tick
         limit_s = ANSWER_S + self._schedule.tick_deadline_s
-        self._pending[self._number] = _Pending(
+        self._pending[number] = _Pending(
             entry, ends, awaited, self._clock_s() + limit_s, done, not exact, ticks
         )
         for process, targets in told.items():
             self._publishers[process].put(order._replace(targets=targets).encode())
         if not awaited:
-            self._complete(self._number)
+            self._complete(number)
 
     def _receivers(self, fault: Fault, targets: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
         """The processes that are told of a fault, with its targets at each."""

@@ -5,6 +5,7 @@ from typing import Any
 
 from bridge.network.reports import Report
 from configs.events import Event
+from configs.scenario import Scenario
 
 
 @dataclass(slots=True)
@@ -22,6 +23,8 @@ class Outcome:
     reports: dict[str, Report] = field(default_factory=dict)
     said: dict[str, list[Event]] = field(default_factory=dict)  # by a process, as they came
     faults: list[dict[str, Any]] = field(default_factory=list)  # of `fleetloop.launch.fault_ledger`
+    steered: Scenario | None = None
+    """The scenario with the steps of v_r that were ordered; None: none was."""
     former: dict[str, list[Event]] = field(default_factory=dict)
     """By controllers whose process was replaced, as they came."""
     events: dict[str, list[Event]] = field(default_factory=dict)  # of a process, as observed here

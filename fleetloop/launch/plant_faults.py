@@ -7,6 +7,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from bridge.network.fault_orders import FaultOrder
+from bridge.network.orders import Order
 from configs.brief import Schedule
 from configs.errors import ScenarioError
 from configs.faults.base import RobotFault
@@ -28,11 +29,11 @@ class LocalInbox:
         self.waiting: deque[FaultOrder] = deque()
         self._answers: SimpleQueue[int | str] = SimpleQueue()
 
-    def take(self) -> list[FaultOrder]:
+    def take(self) -> list[Order]:
         """The orders that have come."""
         return [self.waiting.popleft() for _ in range(len(self.waiting))]
 
-    def answer(self, _: FaultOrder, tick: int | str) -> None:
+    def answer(self, _: Order, tick: int | str) -> None:
         """Say the tick at which an order acts, or why it doesn't."""
         self._answers.put(tick)
 

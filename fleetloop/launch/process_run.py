@@ -14,6 +14,7 @@ failures, `fleetloop.launch.ending` ends the processes.
 
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -29,7 +30,7 @@ from configs.connections import LEASE_S, LOCAL_LEASE_S, NetworkLink
 from configs.deployment import Deployment
 from configs.errors import InfrastructureError
 from configs.events import Event
-from configs.resolve import leader_brief, schedule
+from configs.resolve import schedule
 from configs.roles import LAUNCHER, PLANT, identity_of, processes_of
 from configs.scenario import Scenario
 from fleetloop.door.server import Door
@@ -40,14 +41,13 @@ from fleetloop.launch.clock_gate import ClockGate
 from fleetloop.launch.clock_offsets import EVERY_S, START_EVERY_S
 from fleetloop.launch.control_plane import ControlPlane
 from fleetloop.launch.ending import DRAIN_S, Ending
-from fleetloop.launch.fault_desk import FaultDesk
 from fleetloop.launch.fork_server import ForkServer
 from fleetloop.launch.machine import WATCH_EVERY_S, MachineWatch
 from fleetloop.launch.outcome import Outcome
 from fleetloop.launch.process_faults import ProcessFaults
 from fleetloop.launch.remote_roles import RemoteRoles
 from fleetloop.launch.restarts import Restarts
-from fleetloop.launch.run_requests import run_requests
+from fleetloop.launch.run_requests import RunRequests
 from fleetloop.launch.spawn import Orders, respawn, spawn, viewer_brief
 from fleetloop.launch.supervision import CONSEQUENCES_S, Supervision
 from fleetloop.launch.viewer import Viewer
@@ -102,8 +102,8 @@ class ProcessRun:
             self._remote,
             RobotBoard(buses_of(scenario)),
             self._now,
-            on_progress,
-            on_event,
+            self._note_progress,
+            self._note_event,
             on_notice,
         )
         self.robots = self._plane.robots
@@ -113,15 +113,6 @@ class ProcessRun:
         self._supervision = Supervision(self._plane, self._schedule, patience_s)
         limit_s = self._schedule.tick_deadline_s
         self._ending = Ending(self._plane, self._run, self._machine, record, limit_s)
-        self._desk = FaultDesk(
-            scenario,
-            self._schedule,
-            self._deployment.fault_problem,
-            lambda process: process in self._plane.absent,
-            lambda: self.outcome.ticks,
-            self._now,
-        )
-        self._plane.on_answer, self._plane.on_alive = self._desk.take, self._desk.repeat
         self._hellos = Hellos(self._schedule.hello_every_s, clock=clock)
         self._next_look_s = 0.0
         self._clocks = ClockGate(scenario, self._deployment, self._plane.clocks, self._now)
@@ -132,6 +123,8 @@ class ProcessRun:
             partial(on_notice, "live"),
             self._now,
         )
+        self._asked = RunRequests(self._orders, self._schedule, self._plane, self._viewer)
+        self._on_event, self._on_progress = on_event, on_progress
 
     @property
     def name(self) -> str:
@@ -142,6 +135,14 @@ class ProcessRun:
     def processes(self) -> tuple[str, ...]:
         """All processes besides this one."""
         return self._processes
+
+    def _note_event(self, event: Event) -> None:
+        self._asked.status.events.add(event)
+        self._on_event(event)
+
+    def _note_progress(self, progress: Progress) -> None:
+        self._asked.status.note_progress(progress)
+        self._on_progress(progress)
 
     @property
     def outcome(self) -> Outcome:
@@ -174,7 +175,8 @@ class ProcessRun:
                 self._ending.end(link, stop, failure)
                 self.outcome.teardown_s = self._clock.monotonic_s() - ending
             self.outcome.machine = self._machine.report()
-            self.outcome.faults = self._desk.ledger.rows(self.outcome.ticks)
+            self.outcome.faults = self._asked.faults.ledger.rows(self.outcome.ticks)
+            self.outcome.steered = self._asked.steering.steered
             complete(self._plane, link)
         finally:
             end(self._plane.children, grace_s=0.0)
@@ -194,7 +196,7 @@ class ProcessRun:
                 link = open_.enter_context(self._router(folder, stop))
                 link.declare_live(keys.live(run, LAUNCHER.name))
                 self._plane.subscribe(link, run, self._processes)
-                self._desk.open(link, run, self._processes)
+                self._asked.open(link, run, self._processes)
                 spawn(self._orders, self._links, folder, fork_server, self._plane.children)
             if granted := placement.bus_guests(self._deployment):
                 open_.enter_context(Relay(link, folder, scenario.buses, granted))
@@ -231,8 +233,9 @@ class ProcessRun:
         """Publish the leader's speed until all tokens are there, then go until the plant ticks."""
         run, ticks = self._run, self._schedule
         go, hellos = link.publisher(keys.go(run)), self._hellos
-        speed = LeaderSpeed(leader_brief(self._scenario).speed_changes)
-        hellos.add(link.publisher(keys.leader_speed(run)), speed.encode())
+        leader, steering = link.publisher(keys.leader_speed(run)), self._asked.steering
+        steering.on_leader = lambda: hellos.add(leader, LeaderSpeed(steering.changes).encode())
+        steering.on_leader()
         deadline = self._now() + ticks.start_deadline_s
         countdown_ns = ticks.countdown_ticks * ticks.period_ns + GO_AHEAD_NS
         gone, clocks = False, self._plane.clocks
@@ -267,7 +270,7 @@ class ProcessRun:
     def _watch(self, link: LauncherLink, stop: Stop) -> Failure | None:
         """Follow the run until the plant and all controllers have ended."""
         most, folder = self._scenario.host.restarts, sockets.folder_of(self._run)
-        requests = run_requests(self._run, self._orders, self._desk, self._viewer)
+        requests, desk = self._asked.of_run(self._run, stop.request), self._asked.faults
         with (
             Restarts(
                 self._plane,
@@ -277,13 +280,15 @@ class ProcessRun:
                 batch=not self._schedule.realtime,
                 resume=self._machine.clock.resume,
             ) as restarts,
-            Door(folder, requests) as door,
+            Door(folder, requests, self._asked.controls) as door,
         ):
             if self._live:
                 self._viewer.open()
             faults = ProcessFaults(self._plane, self._schedule, restarts)
-            self._desk.on_absences = faults.follow
-            faults.follow(self._desk.ledger.absences(self._schedule.ticks))
+            desk.on_absences = faults.follow
+            faults.follow(desk.ledger.absences(self._schedule.ticks))
+            status = self._asked.status
+            status.is_restarting, status.is_ending = restarts.awaits, lambda: stop.requested
             return self._follow(link, stop, restarts, faults, door)
 
     def _follow(
@@ -298,8 +303,7 @@ class ProcessRun:
         while not stop.requested:
             plane.receive(link, WATCH_EVERY_S)
             door.look()
-            self._desk.look()
-            self._viewer.look()
+            self._asked.look()
             self._report_refusals(link)
             plane.clocks.ask(EVERY_S)
             supervision.name_the_frozen()
@@ -331,8 +335,9 @@ class ProcessRun:
     def _respawned(self, robot: str, fork_server: ForkServer, tick: int) -> Child:
         """The process of a controller that was started again."""
         folder = sockets.folder_of(self._run)
-        faults = self._desk.ledger.planned()
-        return respawn(self._orders, self._links, folder, robot, fork_server, faults, tick)
+        faults = self._asked.faults.ledger.planned()
+        orders = replace(self._orders, scenario=self._asked.steering.scenario)
+        return respawn(orders, self._links, folder, robot, fork_server, faults, tick)
 
     def _report_refusals(self, link: LauncherLink) -> None:
         """Look for floods now and then; announce what the router refused or cut off."""

@@ -116,6 +116,10 @@ class Restarts:
             plane.process(arrival)
         self._since_s[process] = plane.now()
 
+    def awaits(self, process: str) -> bool:
+        """Whether a process was started again and hasn't re-joined yet."""
+        return process in self._since_s
+
     def welcome(self, hellos: Hellos) -> None:
         """Say what a controller needs to know as long as one hasn't re-joined."""
         if not self._since_s:

@@ -1,27 +1,105 @@
 """What may be asked of a run through its door.
 
-request    arguments    answer
-about      -            run, folder, scenario, tick, t_s: which run it is, and how far
-fault...                see `fleetloop.launch.fault_desk`
-live...                 see `fleetloop.launch.viewer`
+request      arguments    answer
+about        -            run, folder, scenario, tick, t_s: which run it is, and how far
+run...                    see `fleetloop.launch.steering` and `fleetloop.launch.run_status`
+fault...                  see `fleetloop.launch.fault_desk`
+live...                   see `fleetloop.launch.viewer`
+controls...               see `fleetloop.door.controls`
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from itertools import count
 
+from bridge.network.link import Link
+from configs.brief import Schedule
+from configs.roles import LAUNCHER
+from fleetloop.door.controls import Controls
 from fleetloop.door.requests import Request, Respond
+from fleetloop.launch.control_plane import ControlPlane
 from fleetloop.launch.fault_desk import FaultDesk
+from fleetloop.launch.run_status import RunStatus
 from fleetloop.launch.spawn import Orders
+from fleetloop.launch.steering import Steering
 from fleetloop.launch.viewer import Viewer
 
 
-def run_requests(
-    run: str, orders: Orders, desk: FaultDesk, viewer: Viewer
-) -> Mapping[str, Request]:
-    """The table of requests of one run."""
+class RunRequests:
+    """The desks of one run, which carry out what is asked of it.
 
-    def about(respond: Respond) -> None:
-        tick, t_s = desk.now()
-        folder, name = str(orders.record.parent.absolute()), orders.scenario.name
-        respond({"run": run, "folder": folder, "scenario": name, "tick": tick, "t_s": t_s})
+    Args:
+        orders: of the run.
+        schedule: of the run.
+        plane: of the run.
+        viewer: of the run.
+    """
 
-    return {"about": Request({}, about), **desk.requests, **viewer.requests}
+    def __init__(
+        self, orders: Orders, schedule: Schedule, plane: ControlPlane, viewer: Viewer
+    ) -> None:
+        self._orders = orders
+        self._viewer = viewer
+        self.controls = Controls()
+        numbers = count(1)
+
+        def tick() -> int:
+            return plane.outcome.ticks
+
+        def is_absent(process: str) -> bool:
+            return process in plane.absent
+
+        self.steering = Steering(
+            orders.scenario,
+            schedule,
+            orders.speed,
+            numbers,
+            is_absent,
+            tick,
+            plane.now,
+            lambda kind, text, at: plane.note(LAUNCHER.name, kind, text, at),
+        )
+        self.faults = FaultDesk(
+            orders.scenario,
+            schedule,
+            orders.deployment.fault_problem,
+            is_absent,
+            tick,
+            plane.now,
+            numbers,
+            lambda: self.steering.paused,
+        )
+        self.status = RunStatus(plane, schedule, orders.scenario.ends_at_s, self.steering)
+        self.status.controller = lambda: self.controls.controller
+        plane.on_answer, plane.on_alive = self.take, self.faults.repeat
+
+    def open(self, link: Link, run: str, processes: Iterable[str]) -> None:
+        """Declare what orders and answers need."""
+        self.faults.open(link, run, processes)
+        self.steering.open(link, run, processes)
+
+    def take(self, process: str, payload: bytes) -> bool:
+        """Take the answer of a process to an order; whether it is well formed."""
+        return self.steering.take(process, payload) or self.faults.take(process, payload)
+
+    def look(self) -> None:
+        """Answer what is due."""
+        self.faults.look()
+        self.steering.look()
+        self._viewer.look()
+
+    def of_run(self, run: str, stop: Callable[[str], None]) -> Mapping[str, Request]:
+        """The table of requests of one run; `stop` ends it, for a reason."""
+        self.steering.on_stop = stop
+
+        def about(respond: Respond) -> None:
+            tick, t_s = self.faults.now()
+            folder, name = str(self._orders.record.parent.absolute()), self._orders.scenario.name
+            respond({"run": run, "folder": folder, "scenario": name, "tick": tick, "t_s": t_s})
+
+        return {
+            "about": Request({}, about),
+            **self.status.requests,
+            **self.steering.requests,
+            **self.faults.requests,
+            **self._viewer.requests,
+        }

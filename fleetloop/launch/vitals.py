@@ -42,6 +42,11 @@ class Vitals:
             return None
         return Silence(process, before.tick, now_s - before.at_s)
 
+    def tick(self, process: str) -> int | None:
+        """The tick of the last beat of a process; None before its first."""
+        vital = self._vitals.get(process)
+        return None if vital is None else vital.tick
+
     def end(self, process: str) -> None:
         """A process said its last word: it doesn't freeze any more."""
         if (vital := self._vitals.get(process)) is not None:

@@ -48,6 +48,7 @@ class RunStats:
     events: list[Event] = field(default_factory=list)  # of a source in their order
     events_known: bool = True
     faults: list[dict[str, Any]] = field(default_factory=list)  # of `fleetloop.launch.fault_ledger`
+    steered: Scenario | None = None  # with the steps of v_r that were ordered; None: none was
     remarks: dict[str, list[str]] = field(default_factory=dict)  # on the whole run, by process
     clocks: dict[str, dict[str, float]] = field(default_factory=dict)  # offsets, by process
     refused: dict[str, dict[str, int]] = field(default_factory=dict)  # by kind, by identity

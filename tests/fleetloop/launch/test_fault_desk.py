@@ -1,6 +1,7 @@
 """Orders of faults and what becomes of them, as the launcher keeps account."""
 
 from collections.abc import Iterable
+from itertools import count
 from types import SimpleNamespace
 from typing import Any
 
@@ -27,6 +28,7 @@ class Bench:
         self.scenario = load("two_robots", ("duration_s=20.0", *overrides))
         self.tick, self.now_s = 1000, 0.0
         self.absent: set[str] = set()
+        self.paused = False
         self.sent: list[tuple[str, FaultOrder]] = []
         self.answers: list[dict[str, Any]] = []
         self.desk = FaultDesk(
@@ -38,6 +40,8 @@ class Bench:
             lambda process: process in self.absent,
             lambda: self.tick,
             lambda: self.now_s,
+            count(1),
+            lambda: self.paused,
         )
         self.absences: list[tuple[str, str, int, int | None]] = []
         self.desk.on_absences = self._absences
