@@ -27,6 +27,7 @@ from fleetloop.live.app import live
 from fleetloop.options import VersionOption
 from fleetloop.replay.app import replay
 from fleetloop.results.app import diff, export, report
+from fleetloop.steer.app import app as steer_app
 from fleetloop.suite.app import test
 
 app = typer.Typer(
@@ -43,6 +44,7 @@ app = typer.Typer(
 app.add_typer(can_app, name="can")
 app.add_typer(certs_app, name="certs")
 app.add_typer(fault_app, name="fault")
+app.add_typer(steer_app, name="steer")
 
 
 def init(

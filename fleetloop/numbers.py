@@ -30,6 +30,16 @@ class OurWords(TyperGroup):
             raise
 
 
+class RunFirst(OurWords):
+    """Verbs before which a run may be named."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Without a run before its verb, it is the only one that goes on."""
+        if args and args[0] in self.commands:
+            args = ["", *args]
+        return super().parse_args(ctx, args)
+
+
 def between(least: float, most: float) -> Callable[[float | None], float | None]:
     """A check of an option's value: at least and at most this."""
 

@@ -272,8 +272,9 @@ class LockstepLoop:
         wait_s = self._rows.every_s
         if self._slowest <= pacing.last_tick:
             wait_s = min(wait_s, (pacing.due_ns(self._slowest) - now_ns) * 1e-9)
-        elif self._orders is not None and self._orders.stands(pacing.last_tick):
-            self._tell(now_ns)
+        elif self._orders is not None and self._orders.awaited:
+            self._tell(now_ns)  # first: who has the answer knows how far the run is
+            self._orders.stands(pacing.last_tick)
         self._hub.serve(wait_s)
         now_ns = self._clock.monotonic_ns()
         self._rows.look(now_ns)

@@ -56,7 +56,8 @@ class PlantOrders:
         pacing: Pacing | None = None,
     ) -> None:
         self.pacing = pacing
-        self._awaited: list[PaceOrder] = []  # answered when the run stands
+        self.awaited: list[PaceOrder] = []
+        """Orders that are answered when the run stands."""
         self._schedule = schedule
         self._inbox = inbox
         self._relays = relays
@@ -106,19 +107,21 @@ class PlantOrders:
             case Pace.RESUME:
                 pacing.resume()
                 pacing.anchor(earliest, now_ns)
+                for awaited in self.awaited:
+                    self._inbox.answer(awaited, "the run was told to go on before it stood")
+                self.awaited.clear()
             case Pace.SPEED:
                 pacing.set_speed(order.value, earliest, now_ns)
         if isinstance(tick, int) and order.what in (Pace.PAUSE, Pace.STEP):
-            self._awaited.append(order)
+            self.awaited.append(order)
         else:
             self._inbox.answer(order, tick)
 
-    def stands(self, tick: int) -> bool:
-        """Answer those who wait until no bus goes on beyond a tick; whether there are any."""
-        awaited, self._awaited = self._awaited, []
+    def stands(self, tick: int) -> None:
+        """Answer those who wait until no bus goes on beyond a tick."""
+        awaited, self.awaited = self.awaited, []
         for order in awaited:
             self._inbox.answer(order, tick)
-        return bool(awaited)
 
     def tell_of_standstill(self, tick: int) -> None:
         """Tell all controllers that time stands still before a tick."""

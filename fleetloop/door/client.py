@@ -1,5 +1,6 @@
 """A client's end of a door: the runs that go on on this machine, and requests to one of them."""
 
+import contextlib
 import json
 import socket
 from collections.abc import Iterator
@@ -82,6 +83,22 @@ class RunClient:
         """
         said = self.ask("about", within_s=CONNECT_S)
         return About(*(said[key] for key in About._fields))
+
+    @contextlib.contextmanager
+    def controlled(self, who: str, *, force: bool = False) -> Iterator[None]:
+        """Hold the controls of the run for a while.
+
+        Args:
+            who: the name under which others are refused meanwhile.
+            force: take them from who has them; they are given back afterwards.
+
+        Raises:
+            RefusedError: another client has them.
+            InfrastructureError: no answer.
+        """
+        self.ask("controls.take", who=who, force=force)
+        yield
+        self.ask("controls.release")
 
     def close(self) -> None:
         """End the connection."""

@@ -4,19 +4,8 @@ from typing import Annotated, Any
 
 import typer
 
-from fleetloop.numbers import LONGEST_S, OurWords, between
+from fleetloop.numbers import LONGEST_S, RunFirst, between
 from fleetloop.options import listed
-
-
-class RunFirst(OurWords):
-    """Verbs before which a run may be named."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Without a run before its verb, it is the only one that goes on."""
-        if args and args[0] in self.commands:
-            args = ["", *args]
-        return super().parse_args(ctx, args)
-
 
 app = typer.Typer(
     cls=RunFirst,
@@ -25,6 +14,9 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+ForceOption = Annotated[
+    bool, typer.Option("--force", help="Also while another client, as a page, has the controls.")
+]
 
 
 @app.callback()
@@ -104,6 +96,7 @@ def inject(
     name: Annotated[
         str | None, typer.Option(metavar="NAME", help="To clear it by. Default: KIND, KIND_2, ...")
     ] = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Apply a fault; say from which tick on it acts."""
@@ -119,7 +112,7 @@ def inject(
         "name": name,
     }
     table = {key: value for key, value in given.items() if value is not None}
-    inject_fault(ctx.obj, table, parameters or [], as_json=as_json)
+    inject_fault(ctx.obj, table, parameters or [], as_json=as_json, force=force)
 
 
 @app.command()
@@ -129,6 +122,7 @@ def clear(
         list[str] | None, typer.Argument(metavar="NAME...", help="Names of faults.")
     ] = None,
     all_: Annotated[bool, typer.Option("--all", help="All that act, or are planned.")] = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """End faults before their time; say at which tick they do."""
@@ -136,7 +130,7 @@ def clear(
 
     if bool(names) is all_:
         raise typer.BadParameter("name faults, or --all.")
-    clear_faults(ctx.obj, names or [], as_json=as_json)
+    clear_faults(ctx.obj, names or [], as_json=as_json, force=force)
 
 
 @app.command()

@@ -34,7 +34,7 @@ def list_faults(run: str, *, as_json: bool, as_toml: bool) -> None:
 
 
 def inject_fault(
-    run: str, table: dict[str, Any], parameters: Sequence[str], *, as_json: bool
+    run: str, table: dict[str, Any], parameters: Sequence[str], *, as_json: bool, force: bool
 ) -> None:
     """Order a fault and print from which tick on it acts.
 
@@ -47,7 +47,7 @@ def inject_fault(
         if not isinstance(one, Override):
             raise ScenarioError(f"--set {text}: {one.remedy}")
         table[one.key] = one.value
-    with open_run(run) as client:
+    with open_run(run) as client, client.controlled("fleetloop fault", force=force):
         fault = client.ask("fault.inject", fault=table)["fault"]
     if as_json:
         say_json(fault)
@@ -56,14 +56,14 @@ def inject_fault(
         say(f"{_named(fault)}: {applied} {_when(fault, 'from')}{_late(fault)}")
 
 
-def clear_faults(run: str, names: Sequence[str], *, as_json: bool) -> None:
+def clear_faults(run: str, names: Sequence[str], *, as_json: bool, force: bool) -> None:
     """Order the end of faults, of all if none is named, and print at which tick they end.
 
     Raises:
         ScenarioError: there is no such run, or no such fault.
         InfrastructureError: it doesn't answer.
     """
-    with open_run(run) as client:
+    with open_run(run) as client, client.controlled("fleetloop fault", force=force):
         cleared = client.ask("fault.clear", names=list(names))["cleared"]
     if as_json:
         say_json(cleared)
