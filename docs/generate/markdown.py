@@ -1,6 +1,7 @@
 """Markdown tables of the keys of a JSON Schema, as pydantic makes it of our dataclasses."""
 
 import html
+import inspect
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -108,6 +109,11 @@ def prose(doc: str | None) -> str:
     """A docstring, its paragraphs in a line each."""
     paragraphs = re.split(r"\n\s*\n", (doc or "").strip())
     return "\n\n".join(cell(paragraph).replace(r"\|", "|") for paragraph in paragraphs)
+
+
+def doc_block(of: object) -> str:
+    """A docstring with its tables and equations, as it stands."""
+    return f"```text\n{inspect.getdoc(of)}\n```"
 
 
 def code(value: object) -> str:

@@ -17,7 +17,7 @@ from docs.generate.scenario import (
     laws_page,
     scenario_page,
 )
-from docs.generate.vocabulary import events_page, network_page, signals_page
+from docs.generate.vocabulary import door_page, events_page, network_page, signals_page
 
 FOLDER = Path(__file__).resolve().parents[1] / "reference"
 _NOTE = "<!-- Made by `uv run python -m docs.generate` of the types in the code: change those. -->"
@@ -89,6 +89,13 @@ _PAGES = {
         "Keys and messages",
         """The words of the processes of a run to each other over Zenoh, and their rights.""",
         network_page,
+    ),
+    "door.md": _Page(
+        "Requests to a run",
+        """The requests that a run that goes on answers at its door, a Unix socket `door` in its
+        folder of sockets, for this user only. `fleetloop fault`, `fleetloop steer` and the live
+        page are clients of it.""",
+        door_page,
     ),
 }
 

@@ -11,7 +11,7 @@ from configs.faults.kinds import CLASSES, KINDS
 from configs.loading import json_schema
 from configs.plugins import LAWS, Kind, find, load
 from configs.tables import adapter_of
-from docs.generate.markdown import Schema, Tables, code, prose, table
+from docs.generate.markdown import Schema, Tables, code, doc_block, prose, table
 from fleetloop.fault.kinds import describe
 
 _ELSEWHERE = {
@@ -152,15 +152,14 @@ def laws_page() -> str:
     parts = []
     for name in LAWS:
         law = load(find(Kind.LAW, name, "", LAWS))
-        module = inspect.getmodule(law)
-        about = inspect.cleandoc(getattr(module, "__doc__", None) or "")
+        about = doc_block(inspect.getmodule(law))
         gains = Tables({}).keys(adapter_of(law.Gains).json_schema())
         signals = table(
             ("signal", "unit", ""), [(f"`{s.name}`", s.unit, s.meaning) for s in law.SIGNALS]
         )
         where = f"Class `{law.__name__}` of `{law.__module__}`."
         recorded = f"It records\n\n{signals}" if law.SIGNALS else "It records the errors (8) only."
-        parts.append(f"## `{name}`\n\n{where}\n\n```text\n{about}\n```\n\n{gains}\n{recorded}")
+        parts.append(f"## `{name}`\n\n{where}\n\n{about}\n\n{gains}\n{recorded}")
     return "\n".join(parts)
 
 

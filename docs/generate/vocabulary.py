@@ -8,7 +8,9 @@ from bridge.network import keys, messages
 from configs import signals
 from configs.events import KINDS
 from configs.roles import ROLES, Role
-from docs.generate.markdown import prose, table
+from docs.generate.markdown import doc_block, prose, table
+from fleetloop.door import controls, requests
+from fleetloop.launch import fault_desk, run_status, steering, viewer
 
 _KEY = re.compile(r"    (fleetloop/\S+) +(.*)")
 
@@ -42,6 +44,19 @@ def events_page() -> str:
         for name, kind in KINDS.items()
     ]
     return table(("kind", "", "exact", "said during the run"), rows)
+
+
+def door_page() -> str:
+    """Every request to a run that goes on."""
+    parts = {
+        "Lines": requests,
+        "Status and events": run_status,
+        "Time and speed": steering,
+        "Faults": fault_desk,
+        "Who holds the controls": controls,
+        "The live page": viewer,
+    }
+    return "\n\n".join(f"## {title}\n\n{doc_block(of)}" for title, of in parts.items())
 
 
 def network_page() -> str:

@@ -44,3 +44,10 @@ def test_pages_that_code_names_exist() -> None:
         for name in re.findall(r"docs/[\w/-]+\.md", file.read_text("utf-8"))
     }
     assert [name for name in sorted(named) if not (HOME / name).is_file()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(HOME)))
+def test_files_that_a_page_names_exist(page: Path) -> None:
+    rooms = "|".join((*ROOMS, "docs", "packaging"))
+    named = re.findall(rf"`((?:{rooms})/[\w/.-]+\.\w+)`", page.read_text("utf-8"))
+    assert [name for name in named if not (HOME / name).exists()] == []
