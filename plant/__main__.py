@@ -182,6 +182,7 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
 
     missing_privileges: list[str] = []
     body: Callable[[Stop], None]
+    waits_for: Callable[[], Sequence[str]]
     if brief.schedule.realtime:
         link.declare_live(keys.live(name, PLANT.name))
         epoch_ns = _serve_until_go(brief, end, link, hellos, stop)
@@ -195,6 +196,7 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
             brief, emulated, end, hub, poses, own, say, taps, record, of_others, orders
         )
         counters, progress_of, stalls = wall.counters, wall.progress, wall.lateness.stalls
+        waits_for = tuple  # nobody
         body = partial(wall.run, epoch_ns)
     else:
         _await_controllers(brief, hub, hellos, stop)
@@ -204,9 +206,10 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         absent = AbsentControllers(brief, hub, silences, herald.note)
         pacing = Pacing(brief.schedule, brief.speed)
         orders = PlantOrders(brief.schedule, inbox, relays, absent, pacing)
-        loop = LockstepLoop(brief, emulated, hub, poses, rows, say, taps, absent, orders)
-        counters, progress_of, body = loop.counters, loop.progress, loop.run
-    narrator.meter = PlantMeter(loop.buses, emulated)
+        loop = lockstep = LockstepLoop(brief, emulated, hub, poses, rows, say, taps, absent, orders)
+        counters, progress_of, body = lockstep.counters, lockstep.progress, lockstep.run
+        waits_for = lockstep.waits_for
+    narrator.meter = PlantMeter(loop.buses, emulated, waits_for)
     sampler = Sampler()
     began_ns, waited_ns = process_cpu_ns(), processor_wait_ns()
     try:

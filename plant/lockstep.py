@@ -14,6 +14,8 @@ stands still: clients of the buses are served, orders taken, and controllers tol
 Bus time runs from power-up; scenario time is 0 when control starts, after the countdown in which
 the controllers arm their drives and the bodies are held as the scenario puts them. The run ends
 with one closing tick at which the controllers disarm.
+
+One class, as lookahead, pace and absent controllers decide together which bus goes on.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -46,6 +48,8 @@ ANSWER_SHARE = 0.9
 """Part of the tick deadline that the plant waits for answers: before that, controllers name a
 silent peer; after it, the launcher names the plant."""
 
+_WAITS_NS = 100_000_000
+"""A controller that answers later than this is said to be waited for."""
 STANDSTILL_SHARE = 0.25
 """Part of the tick deadline after which controllers are told again that time stands still."""
 
@@ -151,7 +155,7 @@ class LockstepLoop:
                 self._forgive(now_ns - after_ns)
             if not (answered or absent.allowed):
                 self._look_for_the_late(now_ns)
-            elif now_ns >= self._next_report_ns:
+            if now_ns >= self._next_report_ns:
                 self._tell(now_ns)
         self.counters.wall_ns = self._clock.monotonic_ns() - self._start_ns
         for bus, lane in self._lanes.items():
@@ -165,6 +169,16 @@ class LockstepLoop:
         return Progress(
             tick, tick * self._schedule.period_ns, self._clock.monotonic_ns() - self._start_ns
         )
+
+    def waits_for(self) -> list[str]:
+        """Robots without whose controllers' answers time has stood still for a while."""
+        asked_before_ns = self._clock.monotonic_ns() - _WAITS_NS
+        waiting = (
+            lane
+            for lane in self._lanes.values()
+            if lane.tick == self._slowest and 0 < lane.asked_ns < asked_before_ns
+        )
+        return [robot for lane in waiting for robot in lane.awaits or self._hub.owing(lane.name)]
 
     def _take_orders(self) -> None:
         """Carry out orders from a tick on that no bus has begun."""

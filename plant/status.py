@@ -1,6 +1,6 @@
 """What a plant says of its buses and drives for people: rates and loads since it last said so."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from bridge.network.link import Publisher
@@ -27,9 +27,21 @@ class _Reading(NamedTuple):
 
 
 class PlantMeter:
-    """Reads buses and drives from one status to the next."""
+    """Reads buses and drives from one status to the next.
 
-    def __init__(self, buses: Mapping[str, Bus], robots: Sequence[EmulatedRobot]) -> None:
+    Args:
+        buses: by name.
+        robots: with the drives.
+        waits_for: the robots for whose controllers time stands still.
+    """
+
+    def __init__(
+        self,
+        buses: Mapping[str, Bus],
+        robots: Sequence[EmulatedRobot],
+        waits_for: Callable[[], Sequence[str]] = tuple,
+    ) -> None:
+        self._waits_for = waits_for
         self._buses = buses
         self._robots = robots
         self._before = {name: _Reading.of(bus) for name, bus in buses.items()}
@@ -43,6 +55,7 @@ class PlantMeter:
                 DriveStatus(robot.brief.robot, *(drive.state_in_words for drive in robot.drives))
                 for robot in self._robots
             ),
+            tuple(self._waits_for()),
         )
 
     def _bus(self, name: str, bus: Bus) -> BusStatus:

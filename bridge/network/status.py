@@ -6,7 +6,7 @@ wall time, nothing that a run depends on. As fields of a message:
     ControllerStatus   ["controller", phase, x_e_m, y_e_m, theta_e_rad, right_wheel_N_m,
                         left_wheel_N_m, [[neighbour, age_s], ...]]
     PlantStatus        ["plant", [[bus, frames, frames_per_s, load], ...],
-                        [[robot, right_state, left_state], ...]]
+                        [[robot, right_state, left_state], ...], [robot, ...]]
 
 nil is a value that isn't known. Decoding is bounded like that of messages.
 """
@@ -84,16 +84,19 @@ class PlantStatus(NamedTuple):
 
     buses: tuple[BusStatus, ...]
     drives: tuple[DriveStatus, ...]
+    waits_for: tuple[str, ...] = ()  # robots for whose controllers lockstep has waited for a while
 
     def fields(self) -> list[Any]:
         """For the message."""
         drives = [[robot, *(it[:MAX_WORDS] for it in states)] for robot, *states in self.drives]
-        return ["plant", list(self.buses), drives]
+        return ["plant", list(self.buses), drives, list(self.waits_for)]
 
     @classmethod
     def of(cls, fields: list[Any]) -> "PlantStatus | None":
         """The status in fields of a message, None if there is none."""
-        if len(fields) != 3 or not (_table(fields[1], 4) and _table(fields[2], 3)):
+        if len(fields) != 4 or not (_table(fields[1], 4) and _table(fields[2], 3)):
+            return None
+        if not isinstance(fields[3], list) or len(fields[3]) > MAX_PARTS or not _names(fields[3]):
             return None
         if not all(
             _names(row[:1]) and _count(row[1]) and _values(row[2:], least=0.0) for row in fields[1]
@@ -104,6 +107,7 @@ class PlantStatus(NamedTuple):
         return cls(
             tuple(BusStatus(printable(bus), *rest) for bus, *rest in fields[1]),
             tuple(DriveStatus(*map(printable, row)) for row in fields[2]),
+            tuple(map(printable, fields[3])),
         )
 
 

@@ -19,9 +19,11 @@ from pathlib import Path
 from typing import Any
 
 from bridge.network.messages import Progress
+from bridge.network.status import PlantStatus
 from configs.brief import Schedule
 from configs.events import Event
 from configs.leader_speed import speed_at
+from configs.roles import AGENT
 from fleetloop.door.requests import Request, Respond
 from fleetloop.launch.control_plane import ControlPlane
 from fleetloop.launch.steering import Steering
@@ -102,6 +104,7 @@ class RunStatus:
         """Whether the run is to end."""
         self._pace = _Rate(_FACTOR_OVER_S)
         self._cpu: dict[int, _Rate] = {}
+        self._waits_for: tuple[str, ...] = ()
         self.requests: Mapping[str, Request] = {
             "run.status": Request({}, self._status),
             "run.events": Request({"since": int}, self._since),
@@ -109,6 +112,8 @@ class RunStatus:
 
     def note_progress(self, progress: Progress) -> None:
         """Take the plant's progress."""
+        if isinstance(progress.status, PlantStatus):
+            self._waits_for = progress.status.waits_for
         self._pace.note(self._plane.now(), progress.t_ns * 1e-9)
 
     def _status(self, respond: Respond) -> None:
@@ -138,7 +143,7 @@ class RunStatus:
         return "starting" if tick < 0 else "running"
 
     def _processes(self) -> list[dict[str, Any]]:
-        plane, waits = self._plane, self._waited_for()
+        plane, waits = self._plane, {AGENT.process(robot) for robot in self._waits_for}
         names = [child.name for child in plane.children]
         names += [it for it in (*plane.let_go, *plane.remote.processes) if it not in names]
         return [
@@ -166,9 +171,6 @@ class RunStatus:
         child = plane.child(process)
         ended = child.ended() if child is not None else process not in plane.alive
         return "ended" if ended else "up"
-
-    def _waited_for(self) -> frozenset[str]:
-        return frozenset()
 
     def _cpu_of(self, process: str) -> float | None:
         """Processors that a process of this machine has used of late."""

@@ -12,8 +12,10 @@ from support.scripted_hub import Controller, ScriptedHub
 
 from bridge.network.fault_orders import FaultOrder
 from bridge.network.messages import Silence
+from bridge.network.run_orders import Pace, PaceOrder, Standstill
 from bridge.network.telemetry import PLANT_ROW, RowBuffer
 from bridge.process.lifecycle import Stop
+from configs.brief import LEAD_TICKS
 from configs.errors import InfrastructureError, PeerLostError
 from configs.events import Event
 from configs.faults.kinds import KINDS
@@ -22,6 +24,7 @@ from configs.resolve import plant_brief
 from plant.absent import AbsentControllers
 from plant.lockstep import ANSWER_SHARE, LockstepLoop
 from plant.orders import PlantOrders
+from plant.pacing import Pacing
 from plant.robot import emulated_robot
 
 TICKS = 100
@@ -32,7 +35,7 @@ COUNTDOWN = 125
 class Bench:
     """A plant of two robots by the test's clock, and their controllers."""
 
-    def __init__(self, on_late: str, *faults: str) -> None:
+    def __init__(self, on_late: str, *faults: str, speed: float = 0.0) -> None:
         overrides = (f"fault=[{', '.join(faults)}]", f"clock.on_late={on_late!r}")
         scenario = load("two_robots", (*BARE, "duration_s=0.2", *overrides))
         brief = plant_brief(scenario, network=NOWHERE)
@@ -43,13 +46,15 @@ class Bench:
         self.ticks: list[int] = []
         silences = {robot: SimpleNamespace(put=self._hear(robot)) for robot in self.silent}
         absent = AbsentControllers(brief, self.hub, silences, self.events.append)
-        self.orders: deque[FaultOrder] = deque()
+        self.orders: deque[FaultOrder | PaceOrder] = deque()
+        self.paced: list[tuple[Pace, int | str]] = []
+        self.standstills: list[int] = []
         self.answers: list[int | str] = []
         self.relayed: list[tuple[str, FaultOrder | None]] = []
         inbox = SimpleNamespace(
             waiting=self.orders,
             take=lambda: [self.orders.popleft() for _ in range(len(self.orders))],
-            answer=lambda _, tick: self.answers.append(tick),
+            answer=self._take_answer,
         )
         relays = {robot: SimpleNamespace(put=self._relay(robot)) for robot in self.silent}
         nowhere = SimpleNamespace(put=lambda _: None)
@@ -64,7 +69,7 @@ class Bench:
             lambda state: self.ticks.append(state.tick),
             {},
             absent,
-            PlantOrders(brief.schedule, inbox, relays, absent),
+            PlantOrders(brief.schedule, inbox, relays, absent, Pacing(brief.schedule, speed)),
             clock=self.clock,
         )
 
@@ -77,7 +82,20 @@ class Bench:
         return put
 
     def _relay(self, robot: str) -> Callable[[bytes], None]:
-        return lambda payload: self.relayed.append((robot, FaultOrder.decode(payload)))
+        def put(payload: bytes) -> None:
+            standstill = Standstill.decode(payload)
+            if standstill is None:
+                self.relayed.append((robot, FaultOrder.decode(payload)))
+            else:
+                self.standstills.append(standstill.tick)
+
+        return put
+
+    def _take_answer(self, order: FaultOrder | PaceOrder, tick: int | str) -> None:
+        if isinstance(order, PaceOrder):
+            self.paced.append((order.what, tick))
+        else:
+            self.answers.append(tick)
 
     def order(self, tick: int, kind: str, **order: Any) -> None:
         """Order a fault of r2's process, or its end, while the buses are at a tick."""
@@ -116,8 +134,8 @@ class Bench:
 def benches(runtime_folder) -> Iterator[Callable[..., Bench]]:
     made: list[Bench] = []
 
-    def make(on_late: str, *faults: str) -> Bench:
-        made.append(Bench(on_late, *faults))
+    def make(on_late: str, *faults: str, speed: float = 0.0) -> Bench:
+        made.append(Bench(on_late, *faults, speed=speed))
         return made[-1]
 
     yield make
@@ -321,3 +339,70 @@ def test_an_ordered_freeze_is_held_until_it_is_ended(benches) -> None:
     frozen_tick, end = bench.answers
     assert bench.told() == [(frozen_tick, "r2", "held"), (end, "r2", "back")]
     assert bench.clock.monotonic_s() - began_s < 0.5
+
+
+def test_a_run_is_paused_stepped_and_sped_and_computes_the_same_ticks(benches) -> None:
+    bench = benches("abort")
+    bench.at("r1", 40, lambda: bench.orders.append(PaceOrder(1, Pace.PAUSE)))
+    asked: list[Pace] = []
+    reached_ns = {}
+
+    def ask(what: Pace, value: float = 0.0) -> None:
+        if what not in asked:
+            asked.append(what)
+            bench.orders.append(PaceOrder(1, what, value))
+
+    before = bench.hub.script
+
+    def script() -> None:
+        before()
+        now_ns = bench.clock.now_ns
+        for what, tick in bench.paced:
+            reached_ns.setdefault(what, (now_ns, tick))
+        if Pace.PAUSE in reached_ns and now_ns - reached_ns[Pace.PAUSE][0] > 3 * 10**9:
+            stamps = {bench.controller(robot).stamps_ns[-1] for robot in ("r1", "r2")}
+            assert Pace.STEP in asked or stamps == {
+                bench.schedule.bus_time_ns(reached_ns[Pace.PAUSE][1])
+            }
+            ask(Pace.STEP, 10.0)
+        if Pace.STEP in reached_ns:
+            ask(Pace.SPEED, 0.5)
+            ask(Pace.RESUME)
+
+    bench.hub.script = script
+    began_ns = bench.clock.now_ns
+    bench.run()
+    stamps = [bench.schedule.bus_time_ns(tick) for tick in range(-COUNTDOWN, TICKS + 1)]
+    assert bench.controller("r1").stamps_ns == bench.controller("r2").stamps_ns == stamps
+    paused = reached_ns[Pace.PAUSE][1]
+    assert 40 <= paused <= 40 + LEAD_TICKS
+    assert reached_ns[Pace.STEP][1] == paused + 10
+    assert bench.ticks.count(paused) > 20
+    assert set(bench.standstills) >= {paused + 1}
+    slow_s = (TICKS - paused - 10) * bench.schedule.period_s / 0.5
+    assert bench.clock.now_ns - began_ns > (3.0 + 0.9 * slow_s) * 1e9
+
+
+def test_at_a_speed_tick_by_tick_in_its_time(benches) -> None:
+    bench = benches("abort", speed=2.0)
+    began_ns = bench.clock.now_ns
+    bench.run()
+    passed_s = (bench.clock.now_ns - began_ns) * 1e-9
+    assert passed_s == pytest.approx(TICKS * bench.schedule.period_s / 2.0, rel=0.1)
+    assert bench.loop.counters.overruns == 0
+
+
+def test_what_a_run_waits_for_is_told_while_it_does(benches) -> None:
+    bench = benches("abort")
+    bench.stops("r2", 40)
+    waited: set[tuple[str, ...]] = set()
+    before = bench.hub.script
+
+    def script() -> None:
+        before()
+        waited.add(tuple(bench.loop.waits_for()))
+
+    bench.hub.script = script
+    with pytest.raises(InfrastructureError):
+        bench.run()
+    assert waited == {(), ("r2",)}

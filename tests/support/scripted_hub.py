@@ -85,6 +85,11 @@ class ScriptedHub(Hub):
             self._passes(timeout_s)
         return answered
 
+    def serve(self, timeout_s: float) -> None:
+        self.script()
+        super().serve(0.0)
+        self._passes(timeout_s)
+
     def again(self, robot: str) -> None:
         """A new process is the controller of a robot."""
         self.controllers[robot] = Controller(robot)

@@ -33,6 +33,7 @@ plants = st.builds(
     PlantStatus,
     st.lists(st.builds(BusStatus, names, counts, shares, shares), max_size=5).map(tuple),
     st.lists(st.builds(DriveStatus, names, words, words), max_size=5).map(tuple),
+    st.lists(names, max_size=5).map(tuple),
 )
 
 
