@@ -103,7 +103,7 @@ class _Page:
         """Whether a type's table stands in this section: the first that names it."""
         for other, about in self._schema["properties"].items():
             if other not in _ELSEWHERE and name in self._inside(about):
-                return other == key
+                return bool(other == key)
         return False
 
     def _type(self, name: str, level: str) -> str:
