@@ -27,6 +27,7 @@ from fleetloop.live.app import live
 from fleetloop.options import VersionOption
 from fleetloop.replay.app import replay
 from fleetloop.results.app import diff, export, report
+from fleetloop.runs.app import ps, stop
 from fleetloop.steer.app import app as steer_app
 from fleetloop.suite.app import test
 
@@ -65,6 +66,8 @@ for verb in (
     plant,
     check,
     doctor,
+    ps,
+    stop,
     compare,
     campaign,
     graph,

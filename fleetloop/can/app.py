@@ -37,13 +37,42 @@ def list_(
     ] = 1_000_000,
     protocol: ProtocolOption = "odrive",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    watch: Annotated[
+        bool,
+        typer.Option(
+            "--watch",
+            help="Again and again, in place on a terminal, until Ctrl-C; with --json a line each.",
+        ),
+    ] = False,
+    lasting: Annotated[
+        float | None,
+        typer.Option(
+            "--for",
+            callback=between(0.01, LONGEST_S),
+            metavar="S",
+            help="With --watch: end after this time.",
+        ),
+    ] = None,
 ) -> None:
     """List the live buses, by run: clients, nodes, frame rate, load."""
     from fleetloop.can.listing import list_buses
+    from fleetloop.can.watching import watch_buses
 
-    raise typer.Exit(
-        list_buses(seconds=seconds, bit_rate=bit_rate, as_json=as_json, protocol_name=protocol)
-    )
+    if lasting is not None and not watch:
+        raise typer.BadParameter("--for: with --watch; the time of a listing is --seconds")
+    if watch:
+        status = watch_buses(
+            seconds=seconds,
+            bit_rate=bit_rate,
+            as_json=as_json,
+            protocol_name=protocol,
+            lasting_s=lasting,
+        )
+    else:
+        status = list_buses(
+            seconds=seconds, bit_rate=bit_rate, as_json=as_json, protocol_name=protocol
+        )
+    raise typer.Exit(status)
 
 
 @app.command()

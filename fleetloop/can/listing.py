@@ -59,7 +59,7 @@ def list_buses(
     if as_json:
         say(json.dumps([asdict(report) for report in reports], indent=2))
     elif reports:
-        say(_table(reports, bit_rate))
+        say(table(reports, bit_rate))
         for report in reports:
             if report.problem:
                 note(f"fleetloop: {report.run}/{report.bus}: {report.problem}")
@@ -136,7 +136,8 @@ def _report(
     )
 
 
-def _table(reports: list[BusReport], bit_rate: int) -> str:
+def table(reports: list[BusReport], bit_rate: int) -> str:
+    """The reports as lines."""
     rows = [
         ("BUS", "CLIENTS", "BUS TIME", "SPEED", "FRAMES/S", "LOAD", "NODES"),
         *map(_row, reports),

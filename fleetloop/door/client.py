@@ -3,6 +3,7 @@
 import contextlib
 import json
 import socket
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -16,6 +17,8 @@ CONNECT_S = 2.0
 ANSWER_S = 60.0
 """For a request: the launcher answers within a bound of its own."""
 _READ_BYTES = 1 << 16
+_PEER = struct.Struct("3i")
+"""struct ucred: process, user, group."""
 
 
 class About(NamedTuple):
@@ -30,6 +33,10 @@ class About(NamedTuple):
 
 class RefusedError(ScenarioError):
     """The run refused a request; the text says why."""
+
+
+class RunEndedError(InfrastructureError):
+    """The run ended before it answered."""
 
 
 class RunClient:
@@ -50,6 +57,13 @@ class RunClient:
             self._socket.close()
             raise InfrastructureError(f"{self.run}: no answer: {error}") from error
 
+    @property
+    def pid(self) -> int:
+        """The process of its launcher, as the kernel says; 0: one of another container."""
+        peer = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size)
+        pid: int = _PEER.unpack(peer)[0]
+        return pid
+
     def ask(self, request: str, *, within_s: float = ANSWER_S, **arguments: Any) -> dict[str, Any]:
         """The answer to a request.
 
@@ -63,7 +77,7 @@ class RunClient:
             self._socket.sendall(line)
             while b"\n" not in self._unread:
                 if not (more := self._socket.recv(_READ_BYTES)):
-                    raise InfrastructureError(f"{self.run}: the run ended before it answered")
+                    raise RunEndedError(f"{self.run}: the run ended before it answered")
                 self._unread += more
         except TimeoutError as error:
             raise InfrastructureError(f"{self.run}: no answer in {within_s:g} s") from error
@@ -118,7 +132,7 @@ def open_run(name: str) -> RunClient:
         ScenarioError: there is no such run, or there are several; the text lists those there are.
     """
     found: list[tuple[RunClient, About]] = []
-    for client in _live():
+    for client in doors():
         try:
             found.append((client, client.about()))
         except (InfrastructureError, RefusedError):
@@ -139,7 +153,8 @@ def open_run(name: str) -> RunClient:
     raise ScenarioError(f"{name}: no run goes on on this machine".removeprefix(": "))
 
 
-def _live() -> Iterator[RunClient]:
+def doors() -> Iterator[RunClient]:
+    """A connection to each door that can be opened, in the order of the runs' names."""
     for path in sockets.trusted(f"*/{NAME}"):
         try:
             yield RunClient(path)

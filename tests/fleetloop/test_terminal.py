@@ -5,24 +5,16 @@ from contextlib import redirect_stderr
 
 import pytest
 from support.robot_states import robot
+from support.terminals import Screen, as_terminal
 
 from fleetloop.terminal import Bars, RunProgress, note, say
 
 
-class Screen(io.StringIO):
-    """A terminal."""
-
-    def isatty(self) -> bool:
-        return True
-
-
 @pytest.fixture
-def screen(monkeypatch) -> Screen:
-    for name, value in (("TERM", "xterm"), ("COLUMNS", "80"), ("LINES", "24")):
-        monkeypatch.setenv(name, value)
-    for name in ("NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"):
-        monkeypatch.delenv(name, raising=False)
-    return Screen()
+def screen(monkeypatch):
+    """A terminal, and the environment of one."""
+    with as_terminal(monkeypatch):
+        yield Screen()
 
 
 def go(stream: io.StringIO, *, quiet: bool = False) -> str:

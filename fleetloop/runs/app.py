@@ -1,0 +1,42 @@
+"""The verbs `ps` and `stop`: arguments only."""
+
+from typing import Annotated
+
+import typer
+
+from fleetloop.numbers import between
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+
+def ps(as_json: JsonOption = False) -> None:
+    """List the runs that go on on this machine: name, scenario, state, time, process, folder."""
+    from fleetloop.runs.listing import list_runs
+
+    list_runs(as_json=as_json)
+
+
+def stop(
+    run: Annotated[
+        str,
+        typer.Argument(
+            metavar="[RUN]",
+            help="Name or folder of a run that goes on on this machine; none: the only one.",
+            show_default=False,
+        ),
+    ] = "",
+    within: Annotated[
+        float,
+        typer.Option(
+            callback=between(0.1, 3600.0), metavar="S", help="Longest time to wait for its end."
+        ),
+    ] = 60.0,
+    force: Annotated[
+        bool, typer.Option("--force", help="Also if its controls are held by somebody else.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """End a run as Ctrl-C does, wait for its end and say how it ended: its record is kept."""
+    from fleetloop.runs.stopping import stop_run
+
+    raise typer.Exit(stop_run(run, within_s=within, force=force, as_json=as_json))

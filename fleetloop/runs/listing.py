@@ -1,0 +1,86 @@
+"""`fleetloop ps`: the runs of this user that go on on this machine, from their doors."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from rich.table import Table
+
+from bridge.can_bus import sockets
+from configs.errors import InfrastructureError
+from fleetloop.door.client import CONNECT_S, RefusedError, RunClient, doors
+from fleetloop.terminal import ResultConsole, note, say_json
+
+NO_ANSWER = "no answer"
+
+
+class GoingOn(NamedTuple):
+    """One run; None: it doesn't say."""
+
+    run: str
+    scenario: str | None
+    state: str
+    """What `run.status` says; suspended by Ctrl-Z; or no answer."""
+    t_s: float | None
+    pid: int  # of its launcher; 0: in another container
+    folder: str | None
+
+
+def going_on() -> list[GoingOn]:
+    """All of them, in the order of their names."""
+    found = []
+    for client in doors():
+        with client:
+            found.append(_look_at(client))
+    return found
+
+
+def _look_at(client: RunClient) -> GoingOn:
+    try:
+        about = client.about()
+    except (InfrastructureError, RefusedError):
+        state = "suspended" if _suspended(client.pid) else NO_ANSWER
+        return GoingOn(client.run, None, state, None, client.pid, None)
+    return GoingOn(
+        client.run, about.scenario, _state(client), about.t_s, client.pid, about.folder or None
+    )
+
+
+def _state(client: RunClient) -> str:
+    try:
+        return str(client.ask("run.status", within_s=CONNECT_S).get("state", "running"))
+    except RefusedError:
+        return "running"
+    except InfrastructureError:
+        return NO_ANSWER
+
+
+def _suspended(pid: int) -> bool:
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text("ascii", "replace")
+    except OSError:
+        return False
+    return stat.rpartition(")")[2].split()[:1] == ["T"]
+
+
+def list_runs(*, as_json: bool) -> None:
+    """Print them."""
+    found = going_on()
+    if as_json:
+        say_json([one._asdict() for one in found])
+    elif found:
+        ResultConsole().print_whole(_table(found))
+    else:
+        note(f"no run goes on in {sockets.base_folder()}")
+
+
+def _table(found: list[GoingOn]) -> Table:
+    table = Table(box=None, header_style="dim", padding=(0, 1))
+    for title in ("run", "scenario", "state", r"t \[s]", "pid", "folder"):
+        table.add_column(
+            title,
+            justify="right" if title not in ("run", "scenario", "state", "folder") else "left",
+        )
+    for run, scenario, state, t_s, pid, folder in found:
+        t = "-" if t_s is None else f"{t_s:.2f}"
+        table.add_row(run, scenario or "-", state, t, str(pid or "-"), folder or "-")
+    return table
