@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from docs.generate.commands import commands_page
 from docs.generate.markdown import prose
+from docs.generate.python_api import python_page
 from docs.generate.scenario import (
     deployment_page,
     drives_page,
@@ -89,6 +90,11 @@ _PAGES = {
         "Keys and messages",
         """The words of the processes of a run to each other over Zenoh, and their rights.""",
         network_page,
+    ),
+    "python.md": _Page(
+        "Python",
+        """The names of `import fleetloop`. How to: [from Python](../python.md).""",
+        python_page,
     ),
     "door.md": _Page(
         "Requests to a run",

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from bridge.drives.interface import EndpointFile
 from configs.deployment import Deployment
 from configs.drives import DRIVES
 from configs.faults.kinds import CLASSES, KINDS
@@ -164,7 +165,7 @@ def laws_page() -> str:
 
 
 def drives_page() -> str:
-    """Every shipped drive protocol with its keys and errors."""
+    """Every shipped drive protocol with its keys, errors and parameters on the bus."""
     parts = []
     for name in DRIVES:
         row = load(find(Kind.DRIVE, name, "", DRIVES))
@@ -174,7 +175,22 @@ def drives_page() -> str:
             f'## `protocol = "{name}"`\n\n{prose(row.section.__doc__)}\n\n{keys}\n'
             f"Errors with which an emulated drive can disarm (fault `drive_error`): {errors}.\n"
         )
+        if row.endpoints is not None:
+            parts.append(_endpoints(row.endpoints))
     return "\n".join(parts)
+
+
+def _endpoints(of: EndpointFile) -> str:
+    """Parameters of an emulated drive that a host reads and writes over the bus."""
+    known: Any = of.contents(of.versions_of(None))["endpoints"]
+    rows = [
+        (f"`{path}`", str(about["id"]), about["type"], about.get("access", ""))
+        for path, about in known.items()
+    ]
+    return (
+        "### Endpoints\n\nNumbers are the emulation's own: see `fleetloop can endpoints`.\n\n"
+        + table(("path", "number", "type", "access"), rows)
+    )
 
 
 def faults_page() -> str:
