@@ -13,12 +13,18 @@ from docs.generate.markdown import doc_block
 def python_page() -> str:
     """Every public name of the package."""
     parts = []
-    for name in fleetloop.__all__:
+    for name in sorted(fleetloop.__all__, key=_rank):
         found: Any = getattr(fleetloop, name)
         parts.append(f"## `fleetloop.{name}`\n\n{_about(found)}")
         if inspect.isclass(found):
             parts += [f"### `{name}.{member}`\n\n{_about(of)}" for member, of in _members(found)]
     return "\n\n".join(parts)
+
+
+def _rank(name: str) -> int:
+    """Functions come first, errors last."""
+    found = getattr(fleetloop, name)
+    return 0 if not inspect.isclass(found) else 1 + issubclass(found, Exception)
 
 
 def _members(of: type) -> Iterator[tuple[str, Any]]:
