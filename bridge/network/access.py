@@ -153,6 +153,8 @@ def plan(
     rights: dict[str, Rights] = {}
     for role in ROLES:
         for robot in robots if role.per_robot else ("",):
+            if external and role.on_request:
+                continue  # it isn't started: a router of its own outlives who it was made for
             if role.module or graph.keys(role.puts, robot):
                 rights[role.identity(robot)] = _rights(role, robot, graph)
     for user in bus_guests:

@@ -16,6 +16,7 @@ from configs.scenario import Scenario
 RESOLVED = {
     "AgentBrief": {"offset", "s_0", "bus", "seed"},
     "ChannelModel": {"source", "seed"},
+    "Drawing": {"edges", "robots"},
     "DriveLink": {"right_node", "left_node"},
     "HostLimits": {
         *("torque_limit_wheel_N_m", "torque_slew_limit_wheel_N_m_s"),
@@ -28,6 +29,7 @@ RESOLVED = {
     "PowertrainModel": {"seed"},
     "RecorderBrief": {"robots", "start_deadline_s"},
     "RobotBrief": {"bus", "right_node", "left_node", "v_m_s", "omega_rad_s"},
+    "ViewerBrief": {"start_deadline_s"},
     "Wheels": {"radius_m", "half_track_m"},
     "Schedule": {"tick_deadline_s", "start_deadline_s", "on_late"},
     "SplinePath": {"closed"},
@@ -53,7 +55,7 @@ BRIEFS = [
     kind
     for module in (brief, connections, curves)
     for _, kind in inspect.getmembers(module, dataclasses.is_dataclass)
-    if kind.__module__ == module.__name__
+    if isinstance(kind, type) and kind.__module__ == module.__name__
 ]
 
 
