@@ -10,6 +10,10 @@ ruff check .
 mypy
 lint-imports
 docs/site/build.sh
+# The browser of the live page's tests, where it may be installed; they are skipped without.
+if ! command -v chromium >/dev/null && [[ $EUID -eq 0 ]] && command -v apt-get >/dev/null; then
+    timeout 180 apt-get install -qq -y --no-install-recommends chromium >/dev/null 2>&1 || true
+fi
 # A hang ends red long before CI's patience does.
 if [[ $# -gt 0 ]]; then
     tests/support/within.sh 60m pytest "$@"

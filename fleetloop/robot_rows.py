@@ -150,7 +150,7 @@ _COLUMNS = (
     _Column("phase", lambda state: state.phase or "starting", 8, 1, right=False),
     _Column("|x_e| m", lambda state: _metres(state.x_e_m), 7, 2),
     _Column("|y_e| m", lambda state: _metres(state.y_e_m), 7, 6),
-    _Column("τ N·m", _torque, 6, 3),
+    _Column("τ N·m", _torque, 7, 3),
     _Column("bus", _bus, 6, 4),
     _Column("heard", _heard, 6, 5),
     _DRIVES,

@@ -16,7 +16,7 @@ from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn
 from rich.table import Table
 from rich.text import Text
 
-from bridge.process.clock import SYSTEM_CLOCK, Clock
+from bridge.process.clock import SYSTEM_CLOCK
 from fleetloop.robot_rows import rows
 from fleetloop.robot_states import RobotState
 from fleetloop.streams import forget_output, spelled_for
@@ -25,9 +25,7 @@ PLAIN_EVERY_S = 5.0
 LOOK_EVERY_S = 0.2
 """Shortest time between two pictures of a run."""
 LINES_ABOVE = 6
-"""Of a terminal of 24 lines, that the rows of robots leave for the bar and for what happens."""
-STILL_S = 1.0
-"""Time after which a run is said to stand still: paused, or it waits for a process."""
+"""Of a terminal, that the rows of robots leave for the bar and for what happens."""
 
 
 def say(text: str) -> None:
@@ -88,8 +86,7 @@ class Bars:
     What is said on standard error meanwhile comes above the bars.
     """
 
-    def __init__(self, *columns: ProgressColumn, quiet: bool, clock: Clock = SYSTEM_CLOCK) -> None:
-        self._clock = clock
+    def __init__(self, *columns: str | ProgressColumn, quiet: bool, bar_width: int = 24) -> None:
         self._console = console = Console(stderr=True)
         # A terminal that can't move its cursor is told lines, as a log is.
         self._moving = not quiet and console.is_terminal and not console.is_dumb_terminal
@@ -98,7 +95,7 @@ class Bars:
         # output are no part of it.
         self._bars = _Region(
             TextColumn("{task.description}", markup=False),
-            BarColumn(bar_width=24),
+            BarColumn(bar_width=bar_width),
             *columns,
             console=console,
             transient=True,
@@ -126,7 +123,7 @@ class Bars:
     def _refresh(self, line: Callable[[], str]) -> None:
         """Show the bars, or the line if one is due."""
         self._bars.refresh()
-        if self._plain and (now_s := self._clock.monotonic_s()) >= self._next_line_s:
+        if self._plain and (now_s := SYSTEM_CLOCK.monotonic_s()) >= self._next_line_s:
             self._next_line_s = now_s + PLAIN_EVERY_S
             note(line())
 
@@ -140,39 +137,26 @@ class RunProgress(Bars):
         quiet: show nothing but notices.
     """
 
-    def __init__(
-        self,
-        name: str,
-        duration_s: float,
-        *,
-        quiet: bool = False,
-        clock: Clock = SYSTEM_CLOCK,
-    ) -> None:
+    def __init__(self, name: str, duration_s: float, *, quiet: bool = False) -> None:
         super().__init__(
             TextColumn("{task.completed:6.2f} / {task.total:g} s"),
             TextColumn("{task.fields[factor]}"),
             quiet=quiet,
-            clock=clock,
         )
         self._name = name
         self._duration_s = duration_s
         self._task = self._bars.add_task(f"{name}: starting", total=duration_s, factor="")
         self._next_look_s = 0.0
-        self._reached_s = self._since_s = 0.0
         self.robots: Callable[[], Sequence[RobotState]] = lambda: ()
         """Asked for what is to be seen of the robots."""
         self._bars.below = self._rows
 
     def show(self, t_s: float, wall_s: float) -> None:
         """Say that scenario time `t_s` was reached after `wall_s` of running."""
-        if (now_s := self._clock.monotonic_s()) < self._next_look_s:
+        if (now_s := SYSTEM_CLOCK.monotonic_s()) < self._next_look_s:
             return
         self._next_look_s = now_s + LOOK_EVERY_S
-        if t_s != self._reached_s:
-            self._reached_s, self._since_s = t_s, now_s
         factor = f"{t_s / wall_s:5.1f} {self._spelled('×')} real time" if t_s > 0 < wall_s else ""
-        if now_s - self._since_s > STILL_S:
-            factor = "stands still"
         self._bars.update(
             self._task, completed=max(t_s, 0.0), description=self._name, factor=factor
         )
@@ -185,8 +169,7 @@ class RunProgress(Bars):
 
     def _rows(self) -> RenderableType | None:
         width, height = self._console.size
-        above = max(min(LINES_ABOVE, height // 4), 2)
-        lines = rows(self.robots(), width, height - above, self._spelled)
+        lines = rows(self.robots(), width, height - LINES_ABOVE, self._spelled)
         if not lines:
             return None
         whole = Text(no_wrap=True)

@@ -118,8 +118,7 @@ class Door:
             else:
                 key.data.since_s = now_s
                 key.data.read()
-        # Who is gone first: others needn't wait a look for the controls that it had.
-        for client in sorted(self._clients, key=lambda one: not one.gone):
+        for client in self._clients:
             self._serve(client)
             client.write()
             idle = not client.awaited and now_s - client.since_s > IDLE_S

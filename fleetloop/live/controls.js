@@ -22,7 +22,7 @@ function say(text, wrong) {
   if (text) quiet = setTimeout(() => { message.hidden = true; }, wrong ? 12000 : 5000);
 }
 
-const yours = () => board !== null && board.controls.yours && !board.ended;
+const yours = () => board !== null && board.controls.yours && !board.controls.outside && !board.ended;
 const paused = () => board !== null && board.run.state === "paused";
 
 function showControls() {
@@ -33,7 +33,7 @@ function showControls() {
   at("pause").textContent = paused() ? "Go on" : "Pause";
   at("step").disabled = at("ticks").disabled = !(mine && paused());
   at("speed_group").hidden = facts.realtime;
-  at("holder").textContent = board.ended ? "The run has ended." : mine ? "You have the controls." : outside ? `Read only. ${outside}` : holder ? `Read only: ${holder} has the controls.` : "Read only.";
+  at("holder").textContent = board.ended ? "The run has ended." : mine ? "You have the controls." : outside || holder ? `Read only: ${outside || holder} has the controls.` : "Read only.";
   at("holder").title = you;
   at("take").hidden = mine || board.ended !== "";
   at("take").disabled = Boolean(outside);
@@ -144,14 +144,11 @@ function toggleTheme() {
   const root = document.documentElement;
   const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
   root.dataset.theme = dark ? "light" : "dark";
-  repaint();
-}
-
-function repaint() { // plots take their colours from the page's variables when they paint
-  for (const view of Bokeh.index.roots) if (view.model.type === "Figure") view.resize_layout ? view.resize_layout() : view.request_paint?.("everything");
   redraw();
 }
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => setTimeout(repaint));
+
+// Plots take their colours from the page's variables whenever they paint.
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => setTimeout(redraw));
 
 function begin() {
   at("scenario").textContent = facts.scenario; at("run").textContent = facts.run;

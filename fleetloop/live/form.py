@@ -6,6 +6,7 @@ from typing import Any
 from configs.edges import edge_text
 from configs.faults.base import Fault
 from configs.faults.kinds import KINDS
+from configs.parameters import MOST_S
 from configs.scenario import Scenario
 from configs.tables import adapter_of
 from fleetloop.fault.kinds import describe
@@ -51,7 +52,7 @@ def _parameter(
     return {
         "key": key,
         "about": described["about"],
-        "values": "" if many else described["values"],
+        "values": "" if many or _unbounded(option) else described["values"],
         "default": None if many else default,
         "required": required,
         "number": option.get("type") in ("number", "integer"),
@@ -61,3 +62,10 @@ def _parameter(
         "choices": targets.get(key) if many else option.get("enum"),
         "many": many,
     }
+
+
+def _unbounded(option: dict[str, Any]) -> bool:
+    """Whether the bounds of a number are only those of all numbers of a file."""
+    bounds = ("minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum")
+    given = [option[key] for key in bounds if key in option]
+    return all(abs(bound) >= MOST_S for bound in given)

@@ -25,6 +25,8 @@ MOST_ORDERS = 4
 """Of one viewer that are on their way."""
 _JUDGE_EVERY_S = 1.0
 _IDLE_SETTLE_S = 2.0
+_WHO = "the live page"
+"""In the controls of the run."""
 _JUDGE_SHARE = 0.02
 """The most of the time that goes into judging expectations."""
 
@@ -74,8 +76,6 @@ class Hub:
         self._tasks: set[asyncio.Task[None]] = set()  # orders on their way
         self._settled_s = self._judged_s = 0.0
         self._judging_s = _JUDGE_EVERY_S
-        self._outside: str | None = None
-        """What holds the run's controls beside this page, as the last refusal said."""
 
     # --- viewers ----------------------------------------------------------------------------------
 
@@ -112,6 +112,9 @@ class Hub:
     def _push(self, viewer: Viewer) -> None:
         if not viewer.there:
             return
+        if self.state.ended:
+            viewer.page.push_last(partial(self.board, viewer))
+            return
         self.advance()
         viewer.page.push(partial(self.board, viewer))
 
@@ -123,18 +126,16 @@ class Hub:
             self.state.settle()
 
     def end(self, how: str) -> None:
-        """The run has ended: the last of everything, and the verdict."""
+        """The run has ended: each viewer gets the last of everything, and the verdict."""
         self.state.settle()
         self.state.judge()
         self.state.ended, self.state.final = how, self.state.verdict()
-        for viewer in self.viewers.values():
-            viewer.page.last(partial(self.board, viewer))
 
     async def shown(self, within_s: float) -> None:
         """Wait until all browsers that are there have drawn the last frame, at most so long."""
         deadline_s = self._clock.monotonic_s() + within_s
         while self._clock.monotonic_s() < deadline_s and any(
-            viewer.there and viewer.page.behind for viewer in self.viewers.values()
+            viewer.there and not viewer.page.has_last for viewer in self.viewers.values()
         ):
             await asyncio.sleep(0.02)
 
@@ -176,7 +177,7 @@ class Hub:
                 "you": viewer.name,
                 "yours": self.controls.holder == viewer.name,
                 "holder": self.controls.holder,
-                "outside": self._outside,
+                "outside": self._outside(),
             },
             "viewers": len(self.viewers),
             "expectations": state.expectations.judged,
@@ -228,16 +229,15 @@ class Hub:
         return {"said": _in_words(order, said)}
 
     async def _take_controls(self, viewer: str) -> dict[str, Any]:
-        """The run's controls for this page, unless it has them; then the page's for a viewer."""
-        if self.controls.holder is None:
-            try:
-                await self._desk.ask(TAKE, who=f"the live page ({viewer})")
-            except FleetloopError as error:
-                self._outside = str(error)
-                raise
-        self._outside = None
+        """The run's controls for this page, and the page's for a viewer."""
+        await self._desk.ask(TAKE, who=f"{_WHO} ({viewer})")
         self.controls.take(viewer)
         return {"said": ""}
+
+    def _outside(self) -> str | None:
+        """Who has the run's controls beside this page."""
+        holder = self.state.status.get("controller")
+        return None if holder is None or str(holder).startswith(_WHO) else str(holder)
 
     async def _ask(self, order: Order) -> Mapping[str, Any]:
         ask: Callable[..., Awaitable[Mapping[str, Any]]] = self._desk.ask

@@ -47,6 +47,7 @@ class Page:
         self._cursor = Cursor()
         self._events = 0
         self._drawn: int | None = None
+        self._last: int | None = None  # number of the last frame, once it is sent
         self._board = ""
         self.skipped = 0
         """Frames that were not sent since the browser had too many before it."""
@@ -78,15 +79,16 @@ class Page:
             self.push_board(board(self._events))
 
     @property
-    def behind(self) -> bool:
-        """Whether the browser has not drawn the newest frame yet."""
-        return self._drawn is not None and self._drawn < self._cursor.frames
+    def has_last(self) -> bool:
+        """Whether the browser has drawn the last frame."""
+        return self._last is not None and (self._drawn or 0) >= self._last
 
-    def last(self, board: Callable[[int], dict[str, Any]]) -> None:
-        """Send the last frame and board, however far behind the browser is."""
-        if self._drawn is not None:
+    def push_last(self, board: Callable[[int], dict[str, Any]]) -> None:
+        """Send the last frame and board once, however far behind the browser is."""
+        if self._drawn is not None and self._last is None:
             self.push_board(board(self._events))
             self._feed.data = {"frame": self._cursor.frame(self._state)}
+            self._last = self._cursor.frames
 
     def push_board(self, board: dict[str, Any]) -> None:
         """Send a board, unless the browser has it."""

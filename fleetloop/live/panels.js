@@ -64,14 +64,14 @@ function showExpectations() {
 const share = (value) => (finite(value) ? `${(100 * value).toFixed(0)} %` : "–");
 function showRobots() {
   const table = at("robots"), now = view.last && view.last.now;
-  if (!table.tHead) table.append(el("thead", {}, el("tr", {}, ...["robot", "phase · drives", "error", "torque", "bus", "age"].map((text, n) => el("th", {class: n > 1 ? "num" : ""}, text)))), el("tbody"));
+  if (!table.tHead) table.append(el("thead", {}, el("tr", {}, ...[["robot"], ["phase", "of the controller; states of the drives"], ["error", "distance from the reference"], ["torque", "the larger wheel's; of its limit, if there is one"], ["bus", "load, or frames per second of an ideal bus"], ["age", "of the oldest neighbour's path variable"]].map(([text, title], n) => el("th", {class: n > 1 ? "num" : "", title}, text)))), el("tbody"));
   const rows = legend.robots.map((name, r) => {
     const said = (board.run.robots || {})[name] || {}, limit = facts.torque_limits[name];
     const pick = (column) => (now ? now[r * N + NOW[column]] : NaN);
     const error = Math.hypot(pick("x_e"), pick("y_e")), torque = Math.max(Math.abs(pick("tau_right")), Math.abs(pick("tau_left")));
-    const drives = [...new Set([said.right_drive, said.left_drive].filter(Boolean))].join(" | ");
-    const cells = [error < 0.1 ? `${number(1000 * error, 1)} mm` : `${number(error, 2)} m`, limit ? share(torque / limit) : `${number(torque, 2)} N·m`,
-      share(said.bus_load), finite(said.neighbour_age_s) ? `${number(1000 * said.neighbour_age_s, 0)} ms` : "–"];
+    const drives = [...new Set([said.right_drive, said.left_drive].filter(Boolean))].join(" | ").toLowerCase().replaceAll("_", " ");
+    const cells = [error < 0.1 ? `${number(1000 * error, 1)} mm` : `${number(error, 2)} m`, limit ? share(torque / limit) : `${number(torque, 2)} Nm`,
+      finite(said.bus_load) ? share(said.bus_load) : finite(said.bus_frames_per_s) ? `${number(said.bus_frames_per_s / 1000, 1)} k/s` : "–", finite(said.neighbour_age_s) ? `${number(1000 * said.neighbour_age_s, 0)} ms` : "–"];
     const alarm = /stopped|diverged|absent/.test(said.phase || "");
     return {key: [name, said.phase, drives, cells], make: () => el("tr", {class: alarm ? "failed" : ""}, el("th", {scope: "row"}, chip(r), name),
       el("td", {class: "phase"}, said.phase || "–", drives ? el("small", {class: "muted"}, drives) : null), ...cells.map((text) => el("td", {class: "num"}, text)))};
@@ -96,9 +96,9 @@ function showFaults() {
 
 function showProcesses() {
   const table = at("processes");
-  if (!table.tHead) table.append(el("thead", {}, el("tr", {}, el("th", {}, "process"), el("th", {}, "state"), el("th", {class: "num"}, "tick"), el("th", {class: "num"}, "per tick"), el("th", {class: "num"}, "CPU"))), el("tbody"));
+  if (!table.tHead) table.append(el("thead", {}, el("tr", {}, el("th", {}, "process"), el("th", {}, "state"), el("th", {class: "num"}, "tick"), el("th", {class: "num", title: "Processor time of a tick"}, "CPU per tick"), el("th", {class: "num"}, "CPU"))), el("tbody"));
   const rows = (board.run.processes || []).map((one) => ({key: one, make: () => el("tr", {class: one.state === "up" || one.state === "ended" ? "" : "open"}, el("th", {scope: "row"}, one.name), el("td", {}, one.waited_for ? el("b", {class: "waited"}, "waited for") : one.state),
-    el("td", {class: "num"}, one.tick ?? "–"), el("td", {class: "num"}, finite(one.tick_us) ? `${number(one.tick_us, 0)} µs` : "–"), el("td", {class: "num"}, finite(one.cpu) ? share(one.cpu) : "–"))}));
+    el("td", {class: "num"}, one.tick ?? "–"), el("td", {class: "num"}, finite(one.cpu) && board.run.real_time_factor > 0 ? `${number(1e6 * one.cpu * facts.period_s / board.run.real_time_factor, 0)} µs` : "–"), el("td", {class: "num"}, finite(one.cpu) ? share(one.cpu) : "–"))}));
   fill(table.tBodies[0], rows);
 }
 

@@ -4,7 +4,6 @@ import io
 from contextlib import redirect_stderr
 
 import pytest
-from support.clocks import ManualClock
 from support.robot_states import robot
 from support.terminals import Screen, as_terminal
 
@@ -73,19 +72,3 @@ def test_a_name_is_no_markup(screen: Screen) -> None:
         pass
     assert "[bold]x[/bold]: starting" in screen.getvalue()
     assert issubclass(RunProgress, Bars)
-
-
-def test_a_run_that_stands_still_is_said_to(screen: Screen) -> None:
-    clock = ManualClock(10**9)
-    with redirect_stderr(screen), RunProgress("paper", 10.0, clock=clock) as progress:
-        progress.show(1.0, 0.5)
-        clock.passes(0.9)
-        progress.show(1.0, 1.4)
-        before = len(screen.getvalue())
-        assert "stands still" not in screen.getvalue()
-        clock.passes(0.9)
-        progress.show(1.0, 2.3)
-        assert "stands still" in screen.getvalue()[before:]
-        clock.passes(0.9)
-        progress.show(1.1, 3.2)
-    assert screen.getvalue().rindex("0.3 × real time") > screen.getvalue().rindex("stands still")

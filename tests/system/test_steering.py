@@ -1,12 +1,10 @@
 """A run that goes on is paused, stepped, held to a speed and given another speed of the leader."""
 
 import json
-import re
 import tomllib
 from pathlib import Path
 
 import pytest
-from support.command_line import fleetloop
 from support.processes import completed, running
 
 from fleetloop.door.client import RefusedError, open_run
@@ -55,37 +53,6 @@ def test_however_it_was_paused_and_sped_it_leaves_the_record_of_its_scenario(
     v_r_hat = read_record(a, partial=False).controller["r1"]["v_r_hat"]
     assert v_r_hat[tick + 1] == pytest.approx(0.6, abs=1e-9)  # the ramp begins with 0.6
     assert v_r_hat[tick + 2] < 0.6 - 1e-6
-
-
-def test_a_shell_steers_unless_another_has_the_controls(tmp_path: Path) -> None:
-    args = ("two_robots", "--set", "expect=[]", "--duration", "60", "--speed", "1")
-    with running(tmp_path / "run", *args) as run, open_run("") as client:
-        said = fleetloop(tmp_path, "steer", "pause")
-        paused = re.fullmatch(
-            rf"{client.run}: paused at tick (\d+) \(t = [\d.]+ s\)\n", said.stdout
-        )
-        assert paused, said.stderr
-        assert client.ask("run.status")["controller"] is None  # it let go
-        client.ask("controls.take", who="the page")
-        said = fleetloop(tmp_path, "steer", client.run, "step", "10")
-        assert (said.returncode, said.stdout) == (2, "")
-        assert "the page has the controls of this run" in said.stderr
-        said = fleetloop(tmp_path, "fault", "inject", "push")
-        assert "the page has the controls of this run" in said.stderr
-        said = fleetloop(tmp_path, "steer", "step", "10", "--force", "--json")
-        assert json.loads(said.stdout)["tick"] == int(paused[1]) + 10
-        assert client.ask("run.status")["controller"] == "the page"  # it has them back
-        said = fleetloop(tmp_path, "steer", str(run.folder), "status")
-        assert said.stdout.startswith(f"{client.run}: paused at tick {int(paused[1]) + 10} (t = ")
-        assert "the page has the controls" in said.stdout
-        assert re.search(r"^agent/r2 +up +\d+ ", said.stdout, re.MULTILINE)
-        said = fleetloop(tmp_path, "steer", "estop", "--force")
-        estop = f"e-stop of the drives of r1, r2 at tick {int(paused[1]) + 11} "
-        assert estop in said.stdout, said.stderr
-        said = fleetloop(tmp_path, "steer", "stop", "--force")
-        assert "ends at about tick" in said.stdout, said.stderr
-        status, out = run.end()
-    assert status == 130, out
 
 
 @pytest.mark.wall_clock

@@ -32,12 +32,9 @@ class Client:
             self._door.look()
         return json.loads(self._lines.readline())
 
-    def hang_up(self) -> None:
+    def close(self) -> None:
         self._lines.close()
         self._socket.close()
-
-    def close(self) -> None:
-        self.hang_up()
         for _ in range(3):
             self._door.look()
 
@@ -105,13 +102,6 @@ def test_by_force_they_are_lent_and_come_back(bench: Bench) -> None:
     assert page.ask("run.speed", factor=2.0)["error"].startswith("run.speed: a shell has")
     shell.close()  # without a word
     assert page.ask("run.speed", factor=2.0) == {}
-
-
-def test_who_asks_as_the_holder_goes_is_not_refused_for_it(bench: Bench) -> None:
-    early, page = bench.client(), bench.client()
-    page.ask("controls.take", who="the page")
-    page.hang_up()  # and the door looks at both at once
-    assert early.ask("run.speed", factor=2.0) == {}
 
 
 def test_a_holder_that_is_gone_holds_nothing(bench: Bench) -> None:
