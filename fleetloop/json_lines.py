@@ -39,14 +39,14 @@ class JsonLines:
         self._gone = False
         self._failure: OSError | None = None
 
-    def say(self, kind: str, /, **fields: Any) -> None:
+    def say(self, kind: str, **fields: Any) -> None:
         """Write a line."""
         line = json.dumps({"kind": kind, **fields}, ensure_ascii=not self._unicode, allow_nan=False)
         if not self._gone:
             self._unread += line.encode("utf-8", "backslashreplace") + b"\n"
             self._write(wait=False)
 
-    def picture(self, kind: str, /, **fields: Any) -> None:
+    def picture(self, kind: str, **fields: Any) -> None:
         """Write a line of what another one will replace; a slow reader misses it."""
         self._write(wait=False)
         if len(self._unread) < MOST_UNREAD_BYTES:

@@ -230,9 +230,9 @@ class _Work:
             case _ if self.lines is None:
                 return
             case Baseline():
-                self.lines.say("baseline", **finite(asdict(said)))
+                self.lines.say("baseline", baseline=finite(asdict(said)))
             case Result():
-                self.lines.say("cell", **finite(said.as_table()))
+                self.lines.say("cell", cell=finite(said.as_table()))
 
 
 def _finish(

@@ -34,6 +34,19 @@ def documented() -> tuple[dict[str, set[str]], set[str]]:
     return kinds, robot
 
 
+def documented_of(command: str) -> dict[str, set[str]]:
+    """The fields of each kind of line of another command, as the page has them."""
+    kinds: dict[str, set[str]] = {}
+    of = ""
+    for line in DOCS.read_text("utf-8").partition("## Tests, campaigns")[2].splitlines():
+        if line.startswith("| ") and "`" in line:
+            first, kind, fields, *_ = (cell.strip(" `") for cell in line.split("|")[1:])
+            of = first or of
+            if of == command:
+                kinds[kind] = {"kind", *re.split(r"`, `", fields)}
+    return kinds
+
+
 def lines_of(text: str) -> list[dict]:
     return [json.loads(line) for line in text.splitlines()]
 
@@ -62,6 +75,43 @@ def test_a_run_says_what_the_page_promises_and_its_outcome_last(tmp_path) -> Non
     assert outcome["folder"] == folder
     armed = [line["source"] for line in lines if line.get("event") == "armed"]
     assert sorted(armed) == ["r1", "r2"]
+
+
+SHORT = ("--set", "duration_s=1.0", "--set", "expect.0.from_s=0.6", "--set", "expect.1.from_s=0.6")
+
+
+CELL = (
+    "--faults",
+    "push",
+    "--at",
+    "0.3",
+    "--for",
+    "0.1",
+    "--recover-within",
+    "0.2",
+    "--hold",
+    "0.1",
+)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("test", "two_robots", *SHORT),
+        ("campaign", "two_robots", *CELL, "--out", "out", *SHORT),
+        ("plant", "two_robots", "--duration", "0.05"),
+    ],
+)
+def test_other_commands_say_what_the_page_promises(tmp_path, words: tuple[str, ...]) -> None:
+    done = fleetloop(tmp_path, *words, "--json-lines")
+    lines = lines_of(done.stdout)
+    kinds = documented_of(words[0])
+    assert done.returncode == 0, done
+    assert kinds.keys() - {"note"} == {line["kind"] for line in lines}
+    for line in lines:
+        assert line.keys() == kinds[line["kind"]]
+    assert (lines[0]["kind"], lines[0]["command"]) == ("started", words[0])
+    assert (lines[-1]["kind"], lines[-1]["exit_status"]) == ("ended", 0)
 
 
 def test_a_refused_scenario_has_an_outcome_too(tmp_path) -> None:

@@ -12,7 +12,7 @@ from fleetloop.results.run_folder import SUMMARY
 
 pytestmark = pytest.mark.system
 
-TWO = ("two_robots", "--set", "expect=[]", "--duration", "60", "--speed", "1")
+TWO = ("two_robots", "--set", "expect=[]", "--duration", "60", "--speed", "1", "--json-lines")
 
 
 def test_a_run_in_the_background_is_listed_and_stopped(tmp_path: Path) -> None:
@@ -27,8 +27,10 @@ def test_a_run_in_the_background_is_listed_and_stopped(tmp_path: Path) -> None:
         assert robots["r1"]["bus_frames_per_s"] > 0.0
         assert robots["r1"]["right_drive"] == "CLOSED_LOOP_CONTROL"
         done = fleetloop(tmp_path, "stop", str(folder), "--json")
-        status, _ = run.end()
+        status, out = run.end()
     assert (done.returncode, status) == (0, 130)
     told = json.loads(done.stdout)
     assert (told["run"], told["folder"]) == (one["run"], str(folder))
     assert told["verdict"] == json.loads((folder / SUMMARY).read_text())["verdict"] == "interrupted"
+    last = json.loads([line for line in out.splitlines() if line.startswith('{"kind"')][-1])
+    assert (last["kind"], last["outcome"]["exit_status"]) == ("outcome", 130)
