@@ -1,6 +1,7 @@
 """A controller's input log, fed to another one, gives the same rows and frames bit for bit."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import nan
 
 import pytest
@@ -13,6 +14,7 @@ from bridge.frame import Frame
 from bridge.network.fault_orders import FaultOrder
 from bridge.network.inputs import Input, InputBuffer, Kind, entries
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
+from bridge.network.run_orders import LeaderOrder
 from configs.faults.messages import LinkPartition
 from configs.leader_speed import SpeedChange
 
@@ -175,3 +177,39 @@ def test_a_fault_that_was_ordered_is_repeated_at_its_tick_and_one_that_was_refus
     assert [(it.tick - began, it.acts) for it in log] == [(0, True), (100, False)]
     assert [it.kind for it in logged.entries()].count(Kind.ORDER) == 1
     logged.assert_repeated()
+
+
+def test_an_ordered_speed_of_the_leader_is_repeated_and_what_was_refused_is_not() -> None:
+    logged = Logged("graph.leader=['r1','r2']")
+    agent = logged.bench.agent
+    agent.receive_leader_speed(LeaderSpeed((SpeedChange(0, 0.5),)))
+    logged.drive(1)
+    reach = agent.brief.reach
+    for n in range(200):
+        if n % 20 == 0:
+            logged.hear(0.3 + 0.01 * n)
+        if n == 50:
+            order = LeaderOrder(1, 0, False, 0.1, 0, reach)
+            began = agent.take_leader_order(order, logged.bench.tick_now)
+            assert began == logged.bench.tick_now
+        if n == 60:
+            gone = LeaderOrder(2, 5, True, 0.9, 0, reach)
+            assert "tick 5 has gone" in agent.take_leader_order(gone, logged.bench.tick_now)
+        logged.tick()
+    assert [it.kind for it in logged.entries()].count(Kind.LEADER_ORDER) == 1
+    logged.assert_repeated()
+
+
+def test_with_an_ordered_speed_neighbours_are_believed_what_they_say_then() -> None:
+    bench = Bench("r2")
+    every, period_ns = bench.schedule.share_every, bench.schedule.period_ns
+    bench.drive(every // 2)
+
+    def believed(tick: int) -> bool:
+        said = PathState(tick, tick * period_ns, 0.5, 5.0)
+        return bench.agent.admission.admits_path_state("r1", said)
+
+    assert not believed(every)
+    fast = replace(bench.agent.brief.reach, v_max_m_s=3.0, v_margin_m_s=3.0)
+    bench.agent.take_leader_order(LeaderOrder(1, 0, False, 2.5, 0, fast), bench.tick_now)
+    assert believed(every)

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from configs.errors import ScenarioError
-from configs.leader_speed import SpeedChange, in_order, speed_at
+from configs.leader_speed import SpeedChange, in_order, speed_at, with_change
 from configs.loading import load
 
 PROFILE = (
@@ -36,6 +36,28 @@ def test_a_ramp_stays_between_its_speeds(before, after, ramp_ns, t_ns) -> None:
 def test_a_change_may_begin_when_the_ramp_before_it_is_over_and_not_earlier() -> None:
     assert in_order(PROFILE)
     assert not in_order((SpeedChange(0, 0.6), SpeedChange(20, 0.0, 8), SpeedChange(27, 0.5)))
+
+
+@given(st.integers(0, 60), st.integers(0, 40))
+def test_one_more_change_is_in_order_or_refused_and_changes_nothing_before(
+    from_ns, ramp_ns
+) -> None:
+    found = with_change(PROFILE, SpeedChange(from_ns, 0.3, ramp_ns))
+    if isinstance(found, str):
+        assert "within its ramp from" in found
+        return
+    assert in_order(found)
+    assert found[0] == PROFILE[0]
+    assert [one for one in found if one.from_ns == from_ns][-1] == (from_ns, 0.3, ramp_ns)
+    for t_ns in range(from_ns):
+        assert speed_at(found, t_ns) == speed_at(PROFILE, t_ns)
+
+
+def test_a_change_takes_the_place_of_one_at_its_time_but_not_within_a_ramp() -> None:
+    assert with_change(PROFILE, SpeedChange(10, 0.1))[1] == SpeedChange(10, 0.1)
+    assert len(with_change(PROFILE, SpeedChange(0, 0.1))) == len(PROFILE) + 1
+    assert isinstance(with_change(PROFILE, SpeedChange(22, 0.1)), str)
+    assert isinstance(with_change(PROFILE, SpeedChange(12, 0.1, 9)), str)
 
 
 @pytest.mark.parametrize(

@@ -123,7 +123,7 @@ def test_nonsense_in_a_roles_report_and_progress_ends_nothing(tmp_path, monkeypa
                     [1, {"misses": float("inf")}],
                 ):
                     report.put(msgpack.packb(wrong))
-                progress.put(msgpack.packb([1, 2**62, 2**62, -1]))
+                progress.put(msgpack.packb([1, 2**62, 2**62, -1, None]))
                 report.put(b"\xc1")
         status, out = attack.run.end()
     assert status == 0, out
