@@ -46,6 +46,7 @@ BACKLOG_S = 1.0
 """Longest time for dropping the backlog of the bus; no interface queues more."""
 
 
+_STALL_NS = round(STALL_S * 1e9)
 PROGRESS_PERIOD_S = 0.2
 """Longest period of a controller's progress messages: they are its signs of life."""
 
@@ -223,7 +224,7 @@ class RealtimeLoop:
             self._agent.guard.note(tick, "stalled", text)
 
     def _drop_backlog(self) -> None:
-        """Drop queued frames: processed late, they would look like those of a second drive.
+        """Drop queued frames: processed late, as after a stall, they look like a second drive's.
 
         Errors are ignored here: a bus that fails does so again at its next use.
         """
@@ -280,6 +281,9 @@ class RealtimeLoop:
             if message is None:
                 self._rows.look(came_ns)
                 continue
+            if came_ns - due_ns > _STALL_NS:
+                self._drop_backlog()
+                return
             bus_ns = came_ns - self._power_up_ns
             can_id = can_id_of(message)
             if can_id & ERR:

@@ -320,3 +320,18 @@ def test_a_robot_that_is_cut_off_from_the_launcher_stops_and_comes_back_with_it(
     assert stopped.tick == cut_off.tick
     away = [frame for at_ns, frame in rig.wire.log if away_ns + S // 100 < at_ns < back_ns]
     assert set(set_points(away)) <= {ZERO}
+
+
+def test_after_a_stall_what_the_bus_gathered_is_no_second_drive_either() -> None:
+    rig = Rig(*REARM, duration_s=4.0)
+    receive, stalled = rig.link.receive, []
+
+    def stall(timeout_s: float) -> None:
+        if rig.link.tick >= 250 and not stalled:
+            stalled.append(rig.link.tick)
+            rig.clock.now_ns += 16 * S // 10
+        receive(timeout_s)
+
+    rig.link.receive = stall
+    rig.run()
+    assert rig.events == ["stalled", "stopped", "rearming", "rearmed"]
