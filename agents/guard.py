@@ -16,7 +16,7 @@ from bridge.drives.interface import DriveClient
 from bridge.frame import Frame
 from configs.brief import AgentBrief
 from configs.errors import InfrastructureError
-from configs.events import MAX_EVENTS, Event
+from configs.events import Event, EventLog
 
 
 class Phase(Enum):
@@ -59,7 +59,8 @@ class Guard:
         self.stop_tick = 0
         self.stop_reason = ""
         """The reason for the present stop, "" while the robot is not stopped."""
-        self.events: list[Event] = []
+        self._log = EventLog()
+        self.events = self._log.kept
         """Events of the robot as its controller saw them; the first `MAX_EVENTS`."""
         self.announce: Callable[[Event], None] = lambda _: None
         """Callback for each event; set by the controller process."""
@@ -96,9 +97,8 @@ class Guard:
 
     def note(self, tick: int, kind: str, text: str = "") -> None:
         """Record and announce an event."""
-        if len(self.events) < MAX_EVENTS:
-            event = Event(tick, self._brief.robot, kind, text)
-            self.events.append(event)
+        event = Event(tick, self._brief.robot, kind, text)
+        if self._log.take(event):
             self.announce(event)
 
     def note_unsent(self, tick: int) -> None:
@@ -206,7 +206,7 @@ class Guard:
     def remarks(self) -> list[str]:
         """Remarks on the whole run for the report, in words."""
         dry = ["dry run: nothing was sent to the drives"] if self._brief.host.dry_run else []
-        return [*dry, *self.drives.notices]
+        return [*dry, *self.drives.notices, *self._log.remarks()]
 
     def _own_fault(self, tick: int) -> str | None:
         """The first fault beside those of the drives, None if there is none."""

@@ -34,13 +34,11 @@ class Change(NamedTuple):
 class FaultSchedule:
     """Says at each tick which faults begin and end."""
 
-    __slots__ = ("_acting", "_waiting", "log", "next_tick")
+    __slots__ = ("_acting", "_waiting", "next_tick")
 
     def __init__(self, planned: Iterable[PlannedFault]) -> None:
         self._waiting = list(planned)
         self._acting: list[PlannedFault] = []
-        self.log: list[Change] = []
-        """All changes so far."""
         self.next_tick = FOREVER
         """Nothing changes before; loops compare it with their tick."""
         self._look()
@@ -97,7 +95,6 @@ class FaultSchedule:
         self._acting += [one for one in begun if not one.fault.INSTANT]
         changes = [Change(tick, one, False) for one in ended]
         changes += [Change(tick, one, True) for one in begun]
-        self.log += changes
         self._look()
         return changes
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 MAX_EVENTS = 512
-"""Of one process; later ones are dropped."""
+"""Of one process; later ones are counted."""
 MAX_EVENT_TEXT = 500
 """Characters."""
 
@@ -32,6 +32,8 @@ class EventKind(NamedTuple):
     exact: bool = True
     told: bool = True
     """It is a notice: said while the run goes on, and listed with the results."""
+    acted_on: bool = False
+    """The launcher acts on it."""
 
 
 KINDS: dict[str, EventKind] = {
@@ -54,15 +56,47 @@ KINDS: dict[str, EventKind] = {
     "stalled": EventKind("a process, or its machine, stood still", exact=False),
     "silent": EventKind("a process shows no sign of life", exact=False),
     "cut_off": EventKind("the network to a process, or its machine, went", exact=False),
-    "killed": EventKind("a fault kills the process of a controller"),
-    "frozen": EventKind("a fault freezes the process of a controller"),
-    "held": EventKind("lockstep doesn't wait for a controller until it answers", exact=False),
-    "dropped": EventKind("lockstep doesn't wait for a controller any more", exact=False),
-    "awaited": EventKind("lockstep stands still until a controller is started again", exact=False),
-    "back": EventKind("a process that was silent, cut off, held or dropped is there", exact=False),
+    "killed": EventKind("a fault kills the process of a controller", acted_on=True),
+    "frozen": EventKind("a fault freezes the process of a controller", acted_on=True),
+    "held": EventKind(
+        "lockstep doesn't wait for a controller until it answers", exact=False, acted_on=True
+    ),
+    "dropped": EventKind(
+        "lockstep doesn't wait for a controller any more", exact=False, acted_on=True
+    ),
+    "awaited": EventKind(
+        "lockstep stands still until a controller is started again", exact=False, acted_on=True
+    ),
+    "back": EventKind(
+        "a process that was silent, cut off, held or dropped is there", exact=False, acted_on=True
+    ),
     "restarted": EventKind("a controller's process ended and is started again", exact=False),
 }
 """The vocabulary, by name."""
+
+
+class EventLog:
+    """The first `MAX_EVENTS` events of one process, and how many came later."""
+
+    __slots__ = ("kept", "unlisted")
+
+    def __init__(self) -> None:
+        self.kept: list[Event] = []
+        self.unlisted = 0
+
+    def take(self, event: Event) -> bool:
+        """Keep an event if there is room for it; whether it is to be announced."""
+        if len(self.kept) < MAX_EVENTS:
+            self.kept.append(event)
+            return True
+        self.unlisted += 1
+        return KINDS[event.kind].acted_on
+
+    def remarks(self) -> list[str]:
+        """How many events aren't listed, in words."""
+        if not self.unlisted:
+            return []
+        return [f"{self.unlisted} events after the first {MAX_EVENTS} are not listed"]
 
 
 def when(tick: int, period_ns: int) -> str:

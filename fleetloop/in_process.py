@@ -27,7 +27,6 @@ from configs.roles import AGENT, PLANT
 from fleetloop.record.writer import Source
 from fleetloop.robot_states import RobotBoard, RobotState
 from plant.bus.build import build_buses
-from plant.faults import fault_events
 from plant.herald import Herald
 from plant.robot import EmulatedRobot, emulated_robot
 from plant.status import PlantMeter
@@ -178,13 +177,7 @@ class InProcessRun:
         for agent in self._agents:
             agent.guard.announce = on_event
         period_ns = plant.schedule.period_ns
-        self._herald = Herald(
-            lambda _: (
-                divergences(self._robots, period_ns)
-                | fault_events(bus.faults for bus in self._buses.values())
-            ),
-            on_event,
-        )
+        self._herald = Herald(lambda _: divergences(self._robots, period_ns), on_event)
         self._on_progress = on_progress
         ends = dict(zip(self._robots, zip(self._agents, self._truths, strict=True), strict=True))
 
@@ -200,6 +193,8 @@ class InProcessRun:
         self._logs = {bus: FrameBuffer(partial(_write_traffic, writer, bus)) for bus in names}
         taps = {bus: log.add for bus, log in self._logs.items()}
         self._buses = build_buses(plant, self._robots, port, begin, taps)
+        for bus in self._buses.values():
+            bus.faults.note = self._herald.note
         self._meter = PlantMeter(self._buses, self._robots)
         self._narrators = {agent.brief.robot: Narrator(agent) for agent in self._agents}
         self._steps = [bus.steps() for bus in self._buses.values()]
@@ -252,6 +247,7 @@ class InProcessRun:
     def remarks(self) -> dict[str, list[str]]:
         """Remarks of the controllers on the whole run, in words."""
         remarks = {agent.brief.robot: agent.remarks() for agent in self._agents}
+        remarks[PLANT.name] = self._herald.remarks()
         return {robot: said for robot, said in remarks.items() if said}
 
     @property

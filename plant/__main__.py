@@ -5,7 +5,7 @@ inherited file descriptors.
 """
 
 import socket
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
 
@@ -38,9 +38,9 @@ from configs.connections import Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError
 from configs.events import Event
 from configs.roles import AGENT, PLANT
+from configs.sections import Pose
 from plant.absent import AbsentControllers
 from plant.counters import PlantCounters
-from plant.faults import fault_events
 from plant.herald import Herald
 from plant.lockstep import LockstepLoop
 from plant.orders import PlantOrders
@@ -49,7 +49,7 @@ from plant.real_robot import RealRobot
 from plant.realtime import RealtimeLoop
 from plant.robot import emulated_robot
 from plant.status import Narrator, PlantMeter
-from plant.troubles import bus_troubles, diverged_robots, divergences
+from plant.troubles import bus_troubles, diverged_robots, divergences, stall_events, trouble_events
 
 PLANT_PRIORITY = 45
 """SCHED_FIFO, above the controllers'."""
@@ -139,37 +139,14 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
     for other in others:
         link.subscribe(keys.pose(name, other.robot), other.robot)
 
-    hellos = Hellos(brief.schedule.hello_every_s)
-    for robot, pose in zip(emulated, poses, strict=True):
-        start = robot.brief.pose
-        hellos.add(pose, PoseFix(EARLY, 0, start.x_m, start.y_m, start.theta_rad).encode())
-    early = Silence(EARLY).encode()
-    for publisher, payload in (
-        *((silence, early) for silence in silences.values()),
-        *((truth, Rows(0, 0, b"", False).encode()) for truth in truths),
-    ):
-        hellos.add(publisher, payload)
-
+    starts = zip(poses, [robot.brief.pose for robot in emulated], strict=True)
+    hellos = _hellos(brief.schedule.hello_every_s, starts, silences.values(), truths)
     stalls: list[Stall] = []
-    loop: LockstepLoop | RealtimeLoop | None = None
+    loop: LockstepLoop | RealtimeLoop
 
     def news(tick: int) -> dict[str, Event]:
-        troubles = bus_troubles(end.troubles(), emulated)
-        buses = {
-            f"bus {bus}": Event(tick, f"bus/{bus}", "bus_trouble", text)
-            for bus, text in troubles.items()
-        }
-        late = {
-            f"stall {stall.tick}": Event(
-                stall.tick,
-                PLANT.name,
-                "stalled",
-                f"the plant, or its machine, stalled for {stall.lasted_s:.2f} s",
-            )
-            for stall in stalls
-        }
-        changes = fault_events(bus.faults for bus in loop.buses.values()) if loop else {}
-        return buses | late | divergences(emulated, brief.schedule.period_ns) | changes
+        found = trouble_events(tick, bus_troubles(end.troubles(), emulated))
+        return found | stall_events(stalls) | divergences(emulated, brief.schedule.period_ns)
 
     notice = link.publisher(keys.notice(name, PLANT.name))
     herald = Herald(news, lambda event: notice.put(Notice(event).encode()))
@@ -209,6 +186,8 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         loop = lockstep = LockstepLoop(brief, emulated, hub, poses, rows, say, taps, absent, orders)
         counters, progress_of, body = lockstep.counters, lockstep.progress, lockstep.run
         waits_for = lockstep.waits_for
+    for served in loop.buses.values():
+        served.faults.note = herald.note
     narrator.meter = PlantMeter(loop.buses, emulated, waits_for)
     sampler = Sampler()
     began_ns, waited_ns = process_cpu_ns(), processor_wait_ns()
@@ -227,7 +206,7 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         say(progress_of())
         summary = PlantReport(
             events=tuple(herald.events),
-            remarks=tuple(refusals.lines()),
+            remarks=(*refusals.lines(), *herald.remarks()),
             left_early=stop.reason if counters.ticks < brief.schedule.ticks else "",
             missing_privileges=tuple(missing_privileges),
             cpu_ns=process_cpu_ns() - began_ns,
@@ -247,6 +226,23 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         report.put(summary.encode())
         stop.await_release()
     return counters
+
+
+def _hellos(
+    every_s: float,
+    starts: Iterable[tuple[Publisher, Pose]],
+    silences: Iterable[Publisher],
+    truths: Iterable[Publisher],
+) -> Hellos:
+    """What the plant says until the run begins: start poses, and that its other links are there."""
+    hellos = Hellos(every_s)
+    for pose, start in starts:
+        hellos.add(pose, PoseFix(EARLY, 0, start.x_m, start.y_m, start.theta_rad).encode())
+    for silence in silences:
+        hellos.add(silence, Silence(EARLY).encode())
+    for truth in truths:
+        hellos.add(truth, Rows(0, 0, b"", False).encode())
+    return hellos
 
 
 def _relays(brief: PlantBrief, link: Link) -> dict[str, Publisher]:

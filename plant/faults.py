@@ -200,7 +200,7 @@ STRIKES: Mapping[str, Strike] = {
 class BusFaults:
     """The faults of the robots on one bus."""
 
-    __slots__ = ("_robots", "_ticks", "disturbances", "schedule", "struck")
+    __slots__ = ("_robots", "_ticks", "disturbances", "note", "schedule", "struck")
 
     def __init__(
         self, planned: Iterable[PlannedFault], robots: Sequence[EmulatedRobot], ticks: Schedule
@@ -210,6 +210,8 @@ class BusFaults:
         self.disturbances = Disturbances(robots)
         """Faults of the bus itself: of its frames and CAN controllers."""
         self.schedule = FaultSchedule(one for one in planned if one.target in self._robots)
+        self.note: Callable[[Event], None] = lambda _: None
+        """Called with the event of each that begins or ends."""
         self.struck: Callable[[], None] = lambda: None
         """Called when something has struck: drives may be due at other times than they said."""
 
@@ -220,6 +222,8 @@ class BusFaults:
 
     def _change(self, tick: int) -> None:
         changes = self.schedule.due(tick)
+        for change in changes:
+            self.note(change.event)
         lasting = [c.planned.target for c in changes if c.planned.fault.kind in EFFECTS]
         for name in dict.fromkeys(lasting):
             effects = RobotEffects()
@@ -235,12 +239,3 @@ class BusFaults:
         if strikes:
             self.struck()
         self.disturbances.follow(self.schedule.acting, changes)
-
-
-def fault_events(faults: Iterable[BusFaults]) -> dict[str, Event]:
-    """All beginnings and ends of faults so far, each under a name of its own."""
-    return {
-        f"fault {bus} {n}": change.event
-        for bus, of_bus in enumerate(faults)
-        for n, change in enumerate(of_bus.schedule.log)
-    }

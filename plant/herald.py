@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
-from configs.events import MAX_EVENTS, Event
+from configs.events import Event, EventLog
 
 
 class Herald:
@@ -20,7 +20,9 @@ class Herald:
         self._look = look
         self._announce = announce
         self._seen: set[str] = set()
-        self.events: list[Event] = []
+        self._log = EventLog()
+        self.events = self._log.kept
+        self.remarks = self._log.remarks
 
     def look(self, tick: int) -> None:
         """Note each event that is new."""
@@ -31,6 +33,5 @@ class Herald:
 
     def note(self, event: Event) -> None:
         """Keep and announce an event that has just happened."""
-        if len(self.events) < MAX_EVENTS:
-            self.events.append(event)
+        if self._log.take(event):
             self._announce(event)

@@ -2,7 +2,9 @@
 
 from collections.abc import Iterable, Mapping
 
+from bridge.process.awake import Stall
 from configs.events import Event, when
+from configs.roles import PLANT
 from plant.robot import EmulatedRobot
 
 
@@ -15,6 +17,23 @@ def bus_troubles(troubles: Mapping[str, str], robots: Iterable[EmulatedRobot]) -
                 text = f"{robot.brief.robot}'s {side} drive ignored {count} frames: no such command"
                 found.setdefault(robot.brief.bus, []).append(f"{text}, value or length")
     return {bus: "; ".join(texts) for bus, texts in found.items()}
+
+
+def trouble_events(tick: int, troubles: Mapping[str, str]) -> dict[str, Event]:
+    """An event of each bus in trouble, as it is at a tick."""
+    return {
+        f"bus {bus}": Event(tick, f"bus/{bus}", "bus_trouble", text)
+        for bus, text in troubles.items()
+    }
+
+
+def stall_events(stalls: Iterable[Stall]) -> dict[str, Event]:
+    """An event of each stall of the plant."""
+    text = "the plant, or its machine, stalled for {:.2f} s"
+    return {
+        f"stall {one.tick}": Event(one.tick, PLANT.name, "stalled", text.format(one.lasted_s))
+        for one in stalls
+    }
 
 
 def divergences(robots: Iterable[EmulatedRobot], period_ns: int) -> dict[str, Event]:

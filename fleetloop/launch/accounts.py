@@ -38,8 +38,10 @@ def stats_of(outcome: Outcome, *, realtime: bool, period_s: float) -> RunStats:
         _add_report(stats, process, report)
     # What a process said on the way is in its report as well, if it lived to make one.
     lost = {name: said for name, said in outcome.said.items() if name not in outcome.reports}
-    for events in (*lost.values(), *outcome.events.values()):
-        stats.events += events
+    for process, log in (*lost.items(), *outcome.events.items()):
+        stats.events += log.kept
+        if remarks := log.remarks():
+            stats.remarks.setdefault(short_name(process), []).extend(remarks)
     for process, remarks in outcome.remarks.items():
         stats.remarks.setdefault(process, []).extend(remarks)
     plant = outcome.reports.get(PLANT.name)

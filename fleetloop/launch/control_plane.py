@@ -11,7 +11,7 @@ from bridge.network import keys
 from bridge.network.link import Arrival, Link
 from bridge.network.messages import Progress
 from configs.brief import Schedule
-from configs.events import MAX_EVENTS, Event
+from configs.events import Event, EventLog
 from configs.roles import AGENT, PLANT, is_observer, short_name
 from fleetloop.launch.child import Child
 from fleetloop.launch.clock_offsets import ClockOffsets
@@ -125,7 +125,7 @@ class ControlPlane:
         """Record an event of a process that the launcher has observed, now or at a tick."""
         now = self.outcome.ticks if tick is None else tick
         event = Event(now, short_name(process), kind, text)
-        self._take(self.outcome.events.setdefault(process, []), event)
+        self._take(self.outcome.events.setdefault(process, EventLog()), event)
 
     def process(self, arrival: Arrival) -> None:
         """Take one message."""
@@ -151,7 +151,7 @@ class ControlPlane:
             case "notice":
                 if (event := self.words.event(process, arrival.payload)) is not None:
                     self._note_absence(process, event)
-                    self._take(self.outcome.said.setdefault(process, []), event)
+                    self._take(self.outcome.said.setdefault(process, EventLog()), event)
             case _:
                 self._process_report(process, arrival.payload)
 
@@ -202,7 +202,6 @@ class ControlPlane:
                 self.held.discard(controller)
                 self.struck.pop(controller, None)
 
-    def _take(self, account: list[Event], event: Event) -> None:
-        if len(account) < MAX_EVENTS:
-            account.append(event)
+    def _take(self, account: EventLog, event: Event) -> None:
+        if account.take(event):
             self._on_event(event)

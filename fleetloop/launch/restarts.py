@@ -12,6 +12,7 @@ from typing import Self
 
 from bridge.network.barrier import Hellos
 from bridge.network.link import Link, waiting
+from configs.events import EventLog
 from configs.roles import AGENT
 from fleetloop.launch.child import Child, Failure
 from fleetloop.launch.control_plane import ControlPlane
@@ -109,8 +110,9 @@ class Restarts:
         self._resume()
         plane.alive.discard(process)
         outcome = plane.outcome
-        said, report = outcome.said.pop(process, []), outcome.reports.pop(process, None)
-        outcome.former.setdefault(process, []).extend(said if report is None else report.events)
+        said, report = outcome.said.pop(process, EventLog()), outcome.reports.pop(process, None)
+        events = said.kept if report is None else report.events
+        outcome.former.setdefault(process, []).extend(events)
         # What came meanwhile is no silence.
         for arrival in waiting(link):
             plane.process(arrival)

@@ -173,8 +173,10 @@ def test_a_fault_that_was_ordered_is_repeated_at_its_tick_and_one_that_was_refus
                 order._replace(targets=("r2 -> r1",)), logged.bench.tick_now
             )
         logged.tick()
-    log = logged.bench.agent.faults.schedule.log
-    assert [(it.tick - began, it.acts) for it in log] == [(0, True), (100, False)]
+    changes = [it for it in logged.bench.agent.guard.events if it.kind.startswith("fault")]
+    assert [(it.tick - began, it.kind) for it in changes] == [
+        *((0, "fault_applied"), (100, "fault_cleared"))
+    ]
     assert [it.kind for it in logged.entries()].count(Kind.ORDER) == 1
     logged.assert_repeated()
 

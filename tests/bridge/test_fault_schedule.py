@@ -29,9 +29,9 @@ def test_what_acts_at_a_tick_is_what_was_planned_for_it(planned: list[tuple[int,
         for n, (first, length) in enumerate(planned)
     ]
     schedule = FaultSchedule(faults)
+    changes: list[Change] = []
     for tick in range(120):
-        due = schedule.due(tick)
-        assert due == schedule.log[len(schedule.log) - len(due) :]
+        changes += schedule.due(tick)
         wanted = {
             one.name
             for one in faults
@@ -39,6 +39,11 @@ def test_what_acts_at_a_tick_is_what_was_planned_for_it(planned: list[tuple[int,
         }
         assert {one.name for one in schedule.acting} == wanted
         assert schedule.next_tick > tick
+    begun = [(one.tick, one.planned.name) for one in changes if one.acts]
+    ended = [(one.tick, one.planned.name) for one in changes if not one.acts]
+    assert sorted(begun) == sorted((one.from_tick, one.name) for one in faults)
+    ends = [(one.to_tick, one.name) for one in faults if one.to_tick is not None]
+    assert sorted(ended) == sorted(end for end in ends if end[0] < 120)
 
 
 def test_an_instant_strikes_once_and_acts_no_more() -> None:
@@ -68,7 +73,7 @@ def test_a_fault_that_is_cleared_before_it_acts_never_does() -> None:
     schedule = FaultSchedule([pushes("push", 5, 9)])
     assert schedule.clear("push", 5)
     assert schedule.due(7) == []
-    assert schedule.log == []
+    assert schedule.due(9) == []
 
 
 def test_a_planned_fault_that_is_cleared_after_it_begins_ends_then_and_never_later() -> None:

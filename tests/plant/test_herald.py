@@ -25,3 +25,15 @@ def test_what_happens_again_and_again_is_kept_up_to_a_bound() -> None:
         herald.note(Event(tick, "r1", "stopped"))
     assert said == herald.events
     assert [event.tick for event in said] == list(range(MAX_EVENTS))
+    assert herald.remarks() == [f"5 events after the first {MAX_EVENTS} are not listed"]
+
+
+def test_what_the_launcher_acts_on_is_announced_beyond_the_bound() -> None:
+    said: list[Event] = []
+    herald = Herald(lambda _: {}, said.append)
+    for tick in range(MAX_EVENTS):
+        herald.note(Event(tick, "r1", "fault_applied"))
+    awaited = Event(MAX_EVENTS, "r1", "awaited")
+    herald.note(awaited)
+    assert said[-1] == awaited
+    assert awaited not in herald.events

@@ -2,7 +2,7 @@
 
 from bridge.network.reports import AgentReport, PlantReport
 from bridge.process.awake import Stall
-from configs.events import Event
+from configs.events import MAX_EVENTS, Event, EventLog
 from fleetloop.launch.accounts import stats_of
 from fleetloop.launch.outcome import Outcome
 
@@ -23,15 +23,32 @@ def test_a_robot_that_stops_soon_after_the_plant_stood_still_stopped_because_of_
         assert stats.machine["plant_stalls"] == [{"t_s": 2.0, "lasted_s": 0.1}]
 
 
+def log_of(*events: Event) -> EventLog:
+    log = EventLog()
+    for event in events:
+        log.take(event)
+    return log
+
+
 def test_what_a_process_said_is_kept_if_it_did_not_live_to_report_it() -> None:
     a, b = Event(3, "r1", "stopped", "a"), Event(4, "r1", "rearming")
     c, silent = Event(2, "r2", "stopped", "c"), Event(9, "r1", "silent")
     ended = outcome(PlantReport(), AgentReport(events=(a, b), remarks=("odd",)))
-    ended.said = {"agent/r1": [a], "agent/r2": [c]}
-    ended.events = {"agent/r1": [silent]}
+    ended.said = {"agent/r1": log_of(a), "agent/r2": log_of(c)}
+    ended.events = {"agent/r1": log_of(silent)}
     stats = stats_of(ended, realtime=True, period_s=0.01)
     assert stats.events == [a, b, c, silent]
     assert stats.remarks == {"r1": ["odd"]}
+
+
+def test_events_that_are_not_listed_are_counted_in_the_remarks() -> None:
+    ended = outcome(PlantReport(), AgentReport(remarks=("odd",)))
+    silent = [Event(tick, "r1", "silent") for tick in range(MAX_EVENTS + 3)]
+    ended.events = {"agent/r1": log_of(*silent)}
+    stats = stats_of(ended, realtime=True, period_s=0.01)
+    assert len(stats.events) == MAX_EVENTS
+    said = f"3 events after the first {MAX_EVENTS} are not listed"
+    assert stats.remarks == {"r1": ["odd", said]}
 
 
 def test_what_the_process_before_said_comes_first() -> None:
