@@ -51,6 +51,17 @@ def between(least: float, most: float) -> Callable[[float | None], float | None]
     return check
 
 
+def above_zero(most: float) -> Callable[[float | None], float | None]:
+    """A check of an option's value: more than 0 and at most this."""
+
+    def check(value: float | None) -> float | None:
+        if value is not None and not 0.0 < value <= most:  # not a number is neither
+            raise typer.BadParameter(f"{value:g}: must be more than 0 and at most {most:g}.")
+        return value
+
+    return check
+
+
 def finite(value: float | None) -> float | None:
     """A check of an option's value: a number."""
     if value is not None and not math.isfinite(value):

@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 import typer
 
-from fleetloop.numbers import LONGEST_S, RunFirst, between
+from fleetloop.numbers import LONGEST_S, RunFirst, above_zero, between
 from fleetloop.options import listed
 
 app = typer.Typer(
@@ -79,7 +79,7 @@ def inject(
         float | None,
         typer.Option(
             "--for",
-            callback=between(0.0, LONGEST_S),
+            callback=above_zero(LONGEST_S),
             metavar="SECONDS",
             help="So long, in scenario time. Default: until it is cleared.",
         ),
