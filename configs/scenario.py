@@ -140,6 +140,14 @@ class Scenario(BaseModel):
 
         return to_toml(self)
 
+    def __eq__(self, other: object) -> bool:
+        """Whether both have the same values, wherever they come from."""
+        if not isinstance(other, Scenario):
+            return NotImplemented
+        return all(getattr(self, it) == getattr(other, it) for it in type(self).model_fields)
+
+    __hash__ = None  # type: ignore[assignment]
+
     def __repr_args__(self) -> Iterable[tuple[str | None, object]]:
         """What tells scenarios apart; all of it is in `to_toml`."""
         yield None, self.name

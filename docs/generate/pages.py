@@ -69,7 +69,7 @@ _PAGES = {
     ),
     "events.md": _Page(
         "Events",
-        """What happens at a tick: in `summary.json` and the channel `log` of the record, and in `[[expect]]`.
+        """What happens at a tick: in `summary.json`, the record's channel `log` and `[[expect]]`.
         *Exact*: in lockstep its tick, text and place in the list are determined by scenario and
         seed.""",
         events_page,

@@ -97,7 +97,7 @@ class Fleet:
     def happened(self, robot: str = "r1") -> list[str]:
         """Kinds of the events of a robot's controller since it was armed."""
         kinds = [event.kind for event in self.run.events if event.source == robot]
-        return [kind for kind in kinds if kind != "armed"]
+        return [kind for kind in kinds if kind != "armed" and not kind.startswith("fault_")]
 
     def reasons(self, robot: str = "r1") -> list[str]:
         """Texts of its stops."""
