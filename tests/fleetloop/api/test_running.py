@@ -101,10 +101,13 @@ def test_ctrl_c_ends_a_run_in_order_and_interrupts_the_program(
             sent.append(far.t_s)
             os.kill(os.getpid(), signal.SIGINT)
 
-    before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt, match="interrupted by SIGINT"):
-        fleetloop.run(short.with_(until_s=20.0), out=tmp_path / "run", on_progress=interrupt)
-    assert signal.getsignal(signal.SIGINT) is before
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # xdist has another
+    try:
+        with pytest.raises(KeyboardInterrupt, match="interrupted by SIGINT"):
+            fleetloop.run(short.with_(until_s=20.0), out=tmp_path / "run", on_progress=interrupt)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
     run = Run(tmp_path / "run")
     assert run.verdict == "interrupted"
     assert 0.3 < run.t_s[-1] < 2.0
