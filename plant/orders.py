@@ -103,7 +103,8 @@ class PlantOrders:
                 tick = pacing.pause(earliest - 1)
             case Pace.STEP:
                 tick = pacing.step(int(order.value))
-                pacing.anchor(earliest, now_ns)
+                if isinstance(tick, int):
+                    pacing.anchor(earliest, now_ns)
             case Pace.RESUME:
                 pacing.resume()
                 pacing.anchor(earliest, now_ns)

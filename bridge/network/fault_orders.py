@@ -1,10 +1,9 @@
-"""Orders of faults during a run, and the answers to orders.
+"""Orders of faults during a run.
 
 The launcher has validated an order by the scenario; the plant and the controllers carry it out at a
 tick, and answer with that tick or with a reason why not.
 
     FaultOrder   [1, number, ends, name, targets, fault, from_tick, ticks, exact] @order/<process>
-    FaultAnswer  [1, number, tick, refusal] @answer/<process>
 
 `fault` is the table of [[fault]] without the keys that the other fields give. In real time the
 launcher orders of each process what concerns it. In lockstep it orders of the plant, which owns
@@ -17,7 +16,7 @@ from dataclasses import fields, replace
 from typing import Any, NamedTuple, get_type_hints
 
 from bridge.fault_schedule import FaultSchedule
-from bridge.network.packing import ints, pack, printable, unpack
+from bridge.network.packing import ints, pack, unpack
 from bridge.network.run_orders import order_tick
 from configs.conformity import conforms
 from configs.edges import hearer
@@ -89,26 +88,6 @@ class FaultOrder(NamedTuple):
     def tick(self, earliest: int, ticks: int) -> int | str:
         """The tick at which it acts in a run of so many, or why it can't."""
         return order_tick(self.from_tick, earliest, ticks, exact=self.exact)
-
-
-class FaultAnswer(NamedTuple):
-    """What a process does with an order."""
-
-    number: int
-    tick: int  # at which it acts
-    refusal: str = ""  # why it doesn't; "" if it does
-
-    def encode(self) -> bytes:
-        """Bytes for the wire."""
-        return pack(*self._replace(refusal=self.refusal[:MOST_TEXT]))
-
-    @classmethod
-    def decode(cls, payload: bytes) -> "FaultAnswer | None":
-        """The message in the bytes, None if there is none."""
-        read = unpack(payload, 4)
-        if read is None or not ints(read[1:3]) or not _is_text(read[3]):
-            return None
-        return cls(read[1], read[2], printable(read[3]))
 
 
 def _table(fault: Fault) -> dict[str, Any]:

@@ -1,9 +1,16 @@
-"""The inbox of a process for what is ordered during a run, by the launcher or through the plant."""
+"""The inbox of a process for what is ordered during a run, and its answers.
+
+Orders come from the launcher, or through the plant.
+
+    OrderAnswer  [1, number, tick, refusal] @answer/<process>
+"""
 
 from collections import deque
+from typing import NamedTuple
 
 from bridge.network import keys
-from bridge.network.fault_orders import FaultAnswer, FaultOrder
+from bridge.network.fault_orders import MOST_TEXT, FaultOrder
+from bridge.network.packing import ints, pack, printable, unpack
 from bridge.network.refused_messages import Refusals
 from bridge.network.run_orders import LeaderOrder, PaceOrder, Standstill
 from bridge.network.zenoh_link import ZenohLink
@@ -13,6 +20,28 @@ Order = FaultOrder | LeaderOrder | PaceOrder
 MOST_WAITING = 1 << 10
 """Orders that one process keeps until its next tick; older ones are dropped unanswered."""
 _KINDS = (FaultOrder, LeaderOrder, PaceOrder, Standstill)
+
+
+class OrderAnswer(NamedTuple):
+    """What a process does with an order."""
+
+    number: int
+    tick: int  # at which it acts
+    refusal: str = ""  # why it doesn't; "" if it does
+
+    def encode(self) -> bytes:
+        """Bytes for the wire."""
+        return pack(*self._replace(refusal=self.refusal[:MOST_TEXT]))
+
+    @classmethod
+    def decode(cls, payload: bytes) -> "OrderAnswer | None":
+        """The message in the bytes, None if there is none."""
+        read = unpack(payload, 4)
+        if read is None or not ints(read[1:3]):
+            return None
+        if type(read[3]) is not str or len(read[3]) > MOST_TEXT:
+            return None
+        return cls(read[1], read[2], printable(read[3]))
 
 
 def order_of(payload: bytes) -> Order | Standstill | None:
@@ -59,7 +88,7 @@ class OrderInbox:
     def answer(self, order: Order, tick: int | str) -> None:
         """Say the tick at which an order acts, or why it doesn't."""
         if isinstance(tick, str):
-            said = FaultAnswer(order.number, 0, tick)
+            said = OrderAnswer(order.number, 0, tick)
         else:
-            said = FaultAnswer(order.number, tick)
+            said = OrderAnswer(order.number, tick)
         self._answers.put(said.encode())

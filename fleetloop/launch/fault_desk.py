@@ -18,8 +18,9 @@ from math import ceil
 from typing import Any
 
 from bridge.network import keys
-from bridge.network.fault_orders import FaultAnswer, FaultOrder, targets_to
+from bridge.network.fault_orders import FaultOrder, targets_to
 from bridge.network.link import Link, Publisher
+from bridge.network.orders import OrderAnswer
 from configs.brief import Schedule
 from configs.errors import ScenarioError
 from configs.faults.absences import Absence
@@ -119,7 +120,7 @@ class FaultDesk:
 
     def take(self, process: str, payload: bytes) -> bool:
         """Take the answer of a process; whether it is well formed."""
-        answer = FaultAnswer.decode(payload)
+        answer = OrderAnswer.decode(payload)
         pending = None if answer is None else self._pending.get(answer.number)
         if answer is None or pending is None:
             return answer is not None  # else it comes late

@@ -21,8 +21,8 @@ from math import ceil
 from typing import Any
 
 from bridge.network import keys
-from bridge.network.fault_orders import FaultAnswer
 from bridge.network.link import Link, Publisher
+from bridge.network.orders import OrderAnswer
 from bridge.network.run_orders import LeaderOrder, Pace, PaceOrder
 from configs.brief import Schedule
 from configs.errors import ScenarioError
@@ -125,7 +125,7 @@ class Steering:
 
     def take(self, process: str, payload: bytes) -> bool:
         """Take the answer of a process to an order of this desk; False if it isn't one."""
-        answer = FaultAnswer.decode(payload)
+        answer = OrderAnswer.decode(payload)
         pending = None if answer is None else self._pending.get(answer.number)
         if answer is None or pending is None:
             return False

@@ -1,17 +1,12 @@
 """Orders of pace and leader: what is encoded comes back, and nothing else is one."""
 
-from collections import deque
-from types import SimpleNamespace
-
 import msgpack
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.network.fault_orders import FaultAnswer, FaultOrder
-from bridge.network.orders import OrderInbox, order_of
-from bridge.network.refused_messages import Refusals
+from bridge.network.fault_orders import FaultOrder
+from bridge.network.orders import order_of
 from bridge.network.run_orders import LeaderOrder, Pace, PaceOrder, Standstill, order_tick
-from configs.faults.bodies import Push
 from configs.leader_speed import SpeedChange
 from configs.reach import Reach
 
@@ -63,28 +58,3 @@ def test_an_order_acts_at_its_tick_or_says_why_not() -> None:
     assert order_tick(100, 7, 100, exact=False) == "the run ends before: it has 100 ticks"
     change = LeaderOrder(1, 0, False, 0.3, 5, Reach(*[0.0] * 5)).change(7, 1000)
     assert change == SpeedChange(7000, 0.3, 5)
-
-
-def test_an_inbox_takes_orders_counts_others_and_notes_that_time_stands_still() -> None:
-    said: list[bytes] = []
-    heard: list = []
-    link = SimpleNamespace(
-        publisher=lambda _: SimpleNamespace(put=said.append),
-        each=lambda _, act: heard.append(act),
-    )
-    refusals = Refusals()
-    inbox = OrderInbox(link, "run", "agent/r1", refusals)
-    fault = FaultOrder(3, False, "push", ("r1",), Push(kind="push", at_s=0.0), 0, None, False)
-    pause = PaceOrder(4, Pace.PAUSE)
-    for payload in (fault.encode(), b"?", Standstill(8).encode(), pause.encode()):
-        heard[0](payload)
-    assert isinstance(inbox.waiting, deque)
-    assert inbox.take() == [fault, pause]
-    assert inbox.stands
-    assert len(refusals.lines()) == 1
-    inbox.answer(pause, 7)
-    inbox.answer(fault, "why not")
-    assert [FaultAnswer.decode(one) for one in said] == [
-        FaultAnswer(4, 7),
-        FaultAnswer(3, 0, "why not"),
-    ]

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from bridge.network.fault_orders import FaultAnswer, FaultOrder
+from bridge.network.fault_orders import FaultOrder
+from bridge.network.orders import OrderAnswer
 from configs.deployment import Deployment
 from configs.errors import ScenarioError
 from configs.faults.absences import Absence
@@ -68,7 +69,7 @@ class Bench:
 
     def answer(self, process: str, tick: int, refusal: str = "") -> None:
         number = self.sent[-1][1].number
-        assert self.desk.take(process, FaultAnswer(number, tick, refusal).encode())
+        assert self.desk.take(process, OrderAnswer(number, tick, refusal).encode())
         self.desk.look()
 
     def faults(self) -> dict[str, tuple[str, int, int | None]]:
@@ -152,7 +153,7 @@ def test_what_is_not_answered_is_told_after_a_while() -> None:
     bench.now_s = ANSWER_S + 10.0
     bench.desk.look()
     assert "plant: no answer" in bench.answers[0]["error"]
-    assert bench.desk.take("plant", FaultAnswer(1, 1017).encode())  # too late: nothing happens
+    assert bench.desk.take("plant", OrderAnswer(1, 1017).encode())  # too late: nothing happens
     assert not bench.desk.take("plant", b"\xc1")
 
 
