@@ -26,6 +26,8 @@ listens, and so that nothing jumps for the others it takes its path variable fro
 (`agents.joining`). A controller that was started again begins STOPPED, with one attempt to arm, and
 joins as one that is late. A stopped robot goes on sharing its path variable, so that its neighbours
 aren't cut off. A dry run goes through the same phases without a frame.
+
+One class: it is the order in which its parts, in modules of their own, act within a period.
 """
 
 from collections.abc import Sequence
@@ -129,7 +131,6 @@ class Agent:
         self._located = self._diverged = False  # by a fix; the next path variable is beyond reach
         self.feedback_since = self._drives.feedback_since
         """Whether both encoder frames were received after a bus time [ns]."""
-        self._reach = brief.reach
         self._records_ages = any(signal.name.startswith(AGE_PREFIX) for signal in brief.signals)
         self._encoder_check = EncoderCheck(brief.host.encoder_mismatch_limit_wheel_rad, self._h)
         fused = brief.localisation == "fused"
@@ -217,10 +218,7 @@ class Agent:
         if isinstance(acts, str):
             return acts
         change = order.change(acts, self._schedule.period_ns)
-        problem = self._reception.change_leader_speed(change, order.reach)
-        if problem is None:
-            self._reach = order.reach
-        return problem or acts
+        return self._reception.change_leader_speed(change, order.reach) or acts
 
     # --- one period --------------------------------------------------------------------------
 
@@ -351,7 +349,7 @@ class Agent:
     def _accept_path_variable(self, t_s: float, after: CoordinationState) -> None:
         """Accept the next path variable; one beyond reach is rejected, and the robot stops."""
         v_hat, mu, s = after
-        far = self._reach.beyond(t_s, s, v_hat if isfinite(mu) else mu)
+        far = self.admission.reach.beyond(t_s, s, v_hat if isfinite(mu) else mu)
         if far is None:
             self._coordination = after
         if (far is None) is self._diverged:

@@ -6,14 +6,11 @@ the same bytes, so a run over processes must leave the same record, bit for bit.
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 from agents.agent import Agent
-from agents.bus_clock import BusClock
 from agents.inputs import LoggedAgent
 from agents.status import Narrator
-from bridge.can_bus.packet import Key, Submitted, Transmitted
-from bridge.frame import Frame
 from bridge.network.inputs import InputBuffer
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix, Progress
 from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer, row_of
@@ -24,6 +21,7 @@ from configs.edges import hearer
 from configs.events import Event
 from configs.faults.base import PlannedFault
 from configs.roles import AGENT, PLANT
+from fleetloop.controller_port import Controller, ControllerPort
 from fleetloop.record.writer import Source
 from fleetloop.robot_states import RobotBoard, RobotState
 from plant.bus.build import build_buses
@@ -49,84 +47,6 @@ class Keeper(Protocol):
 
     def inputs(self, robot: str, first: int, block: bytes, final: bool) -> None:
         """Take a block of a controller's input log."""
-
-
-class _Controller(NamedTuple):
-    """A controller and its clock."""
-
-    agent: Agent
-    clock: BusClock
-
-    @classmethod
-    def of(cls, agent: Agent) -> "_Controller":
-        """A controller before its first tick."""
-        return cls(agent, BusClock(agent.brief.schedule, agent.feedback_since))
-
-    def react(self, received: Sequence[tuple[int, Frame]], asked_ns: int) -> list[Frame]:
-        """The answer to a question of a bus time: frames with their bus times."""
-        agent, clock = self
-        said: list[Frame] = []
-        on_frame, due = agent.on_frame, clock.due
-        for at_ns, (can_id, data) in received:
-            on_frame(can_id, data, at_ns)
-            tick = due(at_ns)
-            if tick is not None:
-                said += agent.step(tick)
-        tick = clock.due_at_end(asked_ns)
-        if tick is not None:
-            said += agent.step(tick)
-        return said
-
-
-class _Controllers:
-    """The port of a bus whose clients are its robots' controllers, called when they are asked."""
-
-    __slots__ = ("_asked", "_controllers", "_frames", "_pending", "_stamp_ns")
-
-    def __init__(self, controllers: Mapping[str, _Controller]) -> None:
-        self._controllers = controllers
-        self._stamp_ns = 0
-        self._frames: Sequence[Frame] = ()
-        self._pending: dict[str, list[tuple[int, Frame]]] = {robot: [] for robot in controllers}
-        self._asked = ""
-
-    def deliver(self, stamp_ns: int, frames: Sequence[Frame]) -> None:
-        self._stamp_ns, self._frames = stamp_ns, frames
-
-    def receive(self) -> list[Frame]:
-        stamp_ns, frames = self._stamp_ns, self._frames
-        answers: list[Frame] = []
-        for agent, clock in self._controllers.values():
-            on_frame = agent.on_frame
-            tick = None
-            for can_id, data in frames:
-                on_frame(can_id, data, stamp_ns)
-                if tick is None:
-                    tick = clock.due(stamp_ns)
-                    if tick is not None:
-                        answers += agent.step(tick)
-            if tick is None:
-                tick = clock.due_at_end(stamp_ns)
-                if tick is not None:
-                    answers += agent.step(tick)
-        return answers
-
-    def forward(self, stamp_ns: int, ended: Sequence[Transmitted], asked: str | None) -> None:
-        for robot, pending in self._pending.items():
-            pending += [p.as_heard_by(robot) for p in ended if p.heard_by(robot)]
-        self._stamp_ns, self._asked = stamp_ns, asked or ""
-
-    def submitted(self) -> list[Submitted]:
-        robot = self._asked
-        received, self._pending[robot] = self._pending[robot], []
-        said = self._controllers[robot].react(received, self._stamp_ns)
-        return [Submitted(robot, frame) for frame in said]
-
-    def departed(self) -> Sequence[Key]:
-        return ()
-
-    def return_credit(self, key: Key, count: int) -> None:
-        """Not counted: a controller sends less in a tick than a queue holds."""
 
 
 class InProcessRun:
@@ -184,10 +104,10 @@ class InProcessRun:
         def begin(group: Sequence[EmulatedRobot]) -> Callable[[int], None]:
             return partial(self._begin, [(robot, *ends[robot]) for robot in group])
 
-        controllers = {agent.brief.robot: _Controller.of(agent) for agent in self._agents}
+        controllers = {agent.brief.robot: Controller.of(agent) for agent in self._agents}
 
-        def port(_: str, group: Sequence[EmulatedRobot]) -> _Controllers:
-            return _Controllers({r.brief.robot: controllers[r.brief.robot] for r in group})
+        def port(_: str, group: Sequence[EmulatedRobot]) -> ControllerPort:
+            return ControllerPort({r.brief.robot: controllers[r.brief.robot] for r in group})
 
         names = dict.fromkeys(robot.brief.bus for robot in self._robots) if plant.traffic else {}
         self._logs = {bus: FrameBuffer(partial(_write_traffic, writer, bus)) for bus in names}
