@@ -70,6 +70,7 @@ class Kind(IntEnum):
     POSE = 2
 
 
+_VIEWS, _KINDS = len(View), len(Kind)
 VIEW_TOPICS: Mapping[View, str] = {
     View.PATHS: "scene/paths",
     View.ROBOTS: "scene/robots",
@@ -121,22 +122,22 @@ POSE_TYPE = np.dtype(
 
 def channel_id(robot_number: int, kind: Kind) -> int:
     """MCAP's channel id of a robot's channel; behind those of the views."""
-    return len(View) + robot_number * len(Kind) + kind + 1
+    return _VIEWS + robot_number * _KINDS + kind + 1
 
 
 def view_of(channel: int) -> View | None:
     """The view that a channel is by its id; None: a robot's channel."""
-    return View(channel) if channel <= len(View) else None
+    return View(channel) if channel <= _VIEWS else None
 
 
 def kind_of(channel: int) -> Kind:
     """The kind of a robot's channel by its id."""
-    return Kind((channel - len(View) - 1) % len(Kind))
+    return Kind((channel - _VIEWS - 1) % _KINDS)
 
 
 def robot_number_of(channel: int) -> int:
     """The robot of a robot's channel by its id."""
-    return (channel - len(View) - 1) // len(Kind)
+    return (channel - _VIEWS - 1) // _KINDS
 
 
 def topic(robot: str, kind: Kind) -> str:
@@ -183,7 +184,7 @@ class Layout:
     @property
     def channels(self) -> range:
         """The ids of all channels."""
-        return range(1, len(View) + len(self.robots) * len(Kind) + 1)
+        return range(1, _VIEWS + len(self.robots) * _KINDS + 1)
 
     def topic(self, channel: int) -> str:
         """The topic of a channel."""

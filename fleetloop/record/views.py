@@ -45,8 +45,18 @@ class _Edge(NamedTuple):
     """The column of the age of what is heard; None: ages don't vary."""
 
 
+class _Taken(NamedTuple):
+    """What is drawn of some instants, but for the first one by robot or edge and instant."""
+
+    ticks: np.ndarray
+    poses: np.ndarray
+    references: np.ndarray
+    s: np.ndarray
+    ages: np.ndarray
+
+
 class Views:
-    """Makes the messages of a record's views; of consecutive blocks, from tick 0 on.
+    """Makes the messages of a record's views from consecutive blocks of rows.
 
     Args:
         layout: of the record.
@@ -65,29 +75,51 @@ class Views:
         self._lifetime_ns = scene.LIFETIME_PERIODS * self._every * period_ns
         self._templates: dict[tuple[View, tuple[int, ...]], Template] = {}
         self._edges = [_edge(layout, *named) for named in drawing.edges]
+        self._taken: list[_Taken] = []
 
-    def messages(
+    def take(
         self, first_tick: int, plant: Sequence[np.ndarray], controller: Sequence[np.ndarray]
-    ) -> Iterator[tuple[View, list[np.ndarray]]]:
-        """The messages of ticks from the first one on, by view; those of no view are left out.
+    ) -> None:
+        """Take the rows of consecutive ticks.
 
         Args:
             first_tick: of the rows.
             plant: rows of each robot, float64; a robot may have fewer than others, or none.
             controller: likewise.
         """
-        if first_tick == 0 and (paths := self._paths()):
-            yield View.PATHS, paths
         count = max(map(len, (*plant, *controller)))
         index = np.arange(-first_tick % self._every, count, self._every)
         if not len(index):
             return
-        ticks = first_tick + index
         poses = _picked(plant, index, _TRUE_POSE)
         used = _picked(controller, index, _USED_POSE + _REFERENCE + _S)
         poses = np.where(_known(poses)[..., None], poses, used[..., :3])
-        there, s = _known(poses), used[..., 6]
-        references = used[..., 3:6]
+        s = used[..., 6]
+        ages = np.empty((len(self._edges), len(index)))
+        for number, edge in enumerate(self._edges):
+            ages[number] = _age(edge, index, s, controller)
+        self._taken.append(_Taken(first_tick + index, poses, used[..., 3:6], s, ages))
+
+    @property
+    def taken(self) -> int:
+        """How many instants were taken of which there are no messages yet."""
+        return sum(len(one.ticks) for one in self._taken)
+
+    def messages(self) -> Iterator[tuple[View, list[np.ndarray]]]:
+        """The messages of what was taken since the last time, by view, but for views without one.
+
+        Those of a view come in parts, each of messages of equal length.
+        """
+        if not self._taken:
+            return
+        ticks, poses, references, s, ages = (
+            np.concatenate(parts, axis=axis)
+            for parts, axis in zip(zip(*self._taken, strict=True), (0, 1, 1, 1, 1), strict=True)
+        )
+        self._taken.clear()
+        if ticks[0] == 0 and (paths := self._paths()):
+            yield View.PATHS, paths
+        there = _known(poses)
         yield from self._view(
             View.ROBOTS,
             ticks,
@@ -101,7 +133,7 @@ class Views:
             lambda some, at: scene.references_numbers(references[some, at]),
         )
         if self._edges:
-            yield from self._drawn_edges(ticks, index, poses, s, controller)
+            yield from self._drawn_edges(ticks, poses, ages)
         yield from self._view(
             View.TRANSFORMS,
             ticks,
@@ -111,17 +143,11 @@ class Views:
         yield View.FLEET, [self._fleet(ticks, s)]
 
     def _drawn_edges(
-        self,
-        ticks: np.ndarray,
-        index: np.ndarray,
-        poses: np.ndarray,
-        s: np.ndarray,
-        controller: Sequence[np.ndarray],
+        self, ticks: np.ndarray, poses: np.ndarray, ages: np.ndarray
     ) -> Iterator[tuple[View, list[np.ndarray]]]:
         begins = poses[[edge.speaker for edge in self._edges], :, :2]
         ends = poses[[edge.hearer for edge in self._edges], :, :2]
         exists = np.stack([_exists(edge.windows, ticks) for edge in self._edges])
-        ages = np.stack([_age(edge, index, s, controller) for edge in self._edges])
         shares = ages / self._silence_s
         shares[~exists | (shares > 1.0)] = np.nan
         yield from self._view(

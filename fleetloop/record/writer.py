@@ -4,6 +4,10 @@ Blocks of one source (a robot's plant or controller rows) come in order; those o
 as they like. A group of `CHUNK_TICKS` ticks is written once every source has delivered it or said
 that nothing follows, in the order of the robots; the rest at the end. So the file depends on the
 run alone, and a source that ends early holds no other source's rows back.
+
+Views are written once there are `VIEW_INSTANTS` instants of them. If a recorder is killed, what it
+held is lost: rows that have not come of all sources yet, and of the rows in the file the views of
+the last instants, fewer than `VIEW_INSTANTS`; early in a run that is all views, the paths too.
 """
 
 import contextlib
@@ -23,6 +27,9 @@ from fleetloop.record.messages import pose_messages, row_messages
 from fleetloop.record.schema import Kind, Layout, channel_id
 from fleetloop.record.views import Views
 
+VIEW_INSTANTS = 40
+"""Least instants of the views that are written together, as each chunk costs time: 2 s of scenario
+time, or more where a tick is longer than their period."""
 Source = Literal["plant", "controller"]
 _KINDS: dict[str, Kind] = {"plant": Kind.PLANT, "controller": Kind.CONTROLLER}
 
@@ -157,6 +164,7 @@ class RecordWriter:
         try:
             while any(rows.count for rows in self._sources.values()):
                 self._write_group(CHUNK_TICKS)
+            self._write_views()
         except InfrastructureError as error:
             self._lost = str(error)
             raise
@@ -168,7 +176,7 @@ class RecordWriter:
         self._file.discard()
 
     def _write_group(self, ticks: int) -> None:
-        """Write the next ticks of every source: rows and poses of each robot, then the views."""
+        """Write the next ticks of every source: rows and poses of each robot; then views."""
         first = 0
         taken: dict[Kind, list[np.ndarray]] = {kind: [] for kind in _KINDS.values()}
         for (number, kind), held in self._sources.items():
@@ -182,8 +190,12 @@ class RecordWriter:
             if kind is Kind.PLANT:
                 channel = channel_id(number, Kind.POSE)
                 self._chunk(channel, pose_messages(channel, first, rows, self._period_ns))
-        plant, controller = taken[Kind.PLANT], taken[Kind.CONTROLLER]
-        for view, messages in self._views.messages(first, plant, controller):
+        self._views.take(first, taken[Kind.PLANT], taken[Kind.CONTROLLER])
+        if self._views.taken >= VIEW_INSTANTS:
+            self._write_views()
+
+    def _write_views(self) -> None:
+        for view, messages in self._views.messages():
             self._chunk(view, *messages)
 
     def _chunk(self, channel: int, *messages: np.ndarray) -> None:

@@ -170,14 +170,16 @@ def test_chunks_that_are_swapped_doubled_or_missing_are_damage(
     found = chunks(content)
     start = content.index(found[0])
     end = content[start + sum(map(len, found)) :] if kept == "end" else b""
-    # Of each robot rows, poses, rows; then five views, before the first ones the paths.
-    first, second, rest = found[:12], found[12:23], found[23:]
-    assert len(rest) == 12  # with the events
+    # Of each robot rows, poses, rows, three times; then six views, then events.
+    first, second, rest = found[:6], found[6:12], found[12:]
+    assert len(rest) == 6 + 6 + 1
     for other in (
         second + first + rest,
         found[:1] + found,
         second + rest,
         first + rest,
+        [*first, *second, *rest, rest[-2]],
+        [*first, *second, *rest, rest[-1]],
     ):
         body = content[:start] + b"".join(other)
         assert "damaged at byte" in check(tmp_path / "a.mcap", body + end, truth)

@@ -20,6 +20,8 @@ ROBOTS = ("r1", "r2")
 LAYOUT = dict.fromkeys(ROBOTS, SIGNALS)
 WIDTHS = {"plant": len(PLANT_SIGNALS), "controller": len(SIGNALS)}
 PERIOD_NS = 1_000_000
+BEYOND_VIEWS = 5 * CHUNK_TICKS + 5
+"""Ticks behind the first chunk of each view."""
 
 
 def rows(robot: str, source: str, first: int, count: int) -> np.ndarray:
@@ -58,15 +60,17 @@ def test_what_was_written_is_read(tmp_path: Path, ticks: int) -> None:
 
 
 def test_the_file_does_not_depend_on_the_order_of_arrival(tmp_path: Path) -> None:
-    write(tmp_path / "a.mcap", 2000)
+    write(tmp_path / "a.mcap", BEYOND_VIEWS)
     # All of one source first, then all of the next: as late as blocks can be.
-    write(tmp_path / "b.mcap", 2000, lambda calls: sorted(calls, key=lambda c: (c[1:], c[0])))
+    write(
+        tmp_path / "b.mcap", BEYOND_VIEWS, lambda calls: sorted(calls, key=lambda c: (c[1:], c[0]))
+    )
     assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
 
 
 def test_the_file_does_not_depend_on_where_blocks_begin_and_end(tmp_path: Path) -> None:
-    write(tmp_path / "a.mcap", 2000)
-    write(tmp_path / "b.mcap", 2000, block=17)
+    write(tmp_path / "a.mcap", BEYOND_VIEWS)
+    write(tmp_path / "b.mcap", BEYOND_VIEWS, block=17)
     assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
 
 

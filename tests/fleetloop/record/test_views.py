@@ -14,7 +14,7 @@ from support.controller_rows import SIGNALS
 from configs.brief import Drawing, DrawnRobot, Wheels
 from configs.paths import Circle, World
 from configs.signals import PLANT_SIGNALS, USED_SIGNALS, Signal, age_signals
-from fleetloop.record.writer import RecordWriter
+from fleetloop.record.writer import VIEW_INSTANTS, RecordWriter, finish_truncated
 
 PERIOD_NS = 2_000_000
 TICKS = 1100  # more than two groups of a record's; the last one is cut
@@ -67,6 +67,11 @@ def messages(path: Path, rows: dict[tuple[str, str], np.ndarray], drawing: Drawi
     with RecordWriter(path, TABLES, "", PERIOD_NS, drawing=drawing) as writer:
         for (robot, source), table in rows.items():
             writer.add(robot, source, 0, table.tobytes())
+    return read(path)
+
+
+def read(path: Path) -> dict[str, list[tuple[int, Any]]]:
+    """Every message by topic, with its log time."""
     found: dict[str, list[tuple[int, Any]]] = {}
     with path.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
@@ -274,3 +279,23 @@ def test_a_robot_that_has_no_path_variable_yet_is_not_part_of_the_differences(
     _, said = messages(tmp_path / "a.mcap", rows)["fleet"][3]
     assert (said.s_spread, said.s_difference[0]) == (0.0, 0.0)
     assert np.isnan(said.s_difference[1])
+
+
+@pytest.mark.parametrize("ticks", [512, 1024, 1536])
+def test_a_killed_recorder_leaves_out_views_of_the_last_instants_of_its_rows_alone(
+    tmp_path: Path, ticks: int
+) -> None:
+    with RecordWriter(tmp_path / "a.mcap", TABLES, "", PERIOD_NS, drawing=DRAWING) as writer:
+        for robot in ROBOTS:
+            writer.add(robot, "plant", 0, plant(robot, ticks).tobytes())
+            writer.add(robot, "controller", 0, controller(robot, ticks).tobytes())
+        (tmp_path / "killed.mcap").write_bytes((tmp_path / "a.mcap").read_bytes())
+    finish_truncated(tmp_path / "killed.mcap")
+    whole, killed = read(tmp_path / "a.mcap"), read(tmp_path / "killed.mcap")
+    for topic, said in whole.items():
+        kept = killed.get(topic, [])
+        assert [t_ns for t_ns, _ in kept] == [t_ns for t_ns, _ in said][: len(kept)]
+        if topic.startswith("robot/"):
+            assert len(kept) == len(said)
+        else:
+            assert len(said) - len(kept) < VIEW_INSTANTS
