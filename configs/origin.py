@@ -1,17 +1,15 @@
 """Where a loaded scenario is from: its file, as far as changes of it need that."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 
-@dataclass(frozen=True, slots=True)
-class Origin:
-    """Not part of a scenario: two from different files may be equal, so all origins are."""
+class Origin(NamedTuple):
+    """A file."""
 
-    source: str = field(compare=False)
+    source: str
     """The file, in messages."""
-    folder: str = field(compare=False)
+    folder: str
     """Where modules of one's own are looked for first; "" for the current one."""
-    data: Mapping[str, Any] = field(compare=False)
+    data: Mapping[str, Any]
     """What the file says: no defaults."""

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
 from annotated_types import Len
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
+from pydantic import BaseModel, ConfigDict, Field
 
 from configs.choices import chosen_anew, shared_part
 from configs.drives import Drive
@@ -96,21 +96,18 @@ class Scenario(BaseModel):
         """A copy with these sections instead of its own; what was made of the old ones goes."""
         copied = super().model_copy(update=update, deep=deep)
         if update:
-            copied.originating(None)  # its file says something else
-        for made in ("ages_vary", "members", "topology", "reach"):
-            copied.__dict__.pop(made, None)
+            for made in copied.__dict__.keys() - type(self).model_fields.keys():
+                del copied.__dict__[made]
         return copied
 
-    _origin: Origin | None = PrivateAttr(None)
-
-    @property
+    @cached_property
     def origin(self) -> Origin | None:
         """The file that this was loaded from; None if it wasn't, or was changed since."""
-        return self._origin
+        return None
 
-    def originating(self, origin: Origin | None) -> Self:
-        """This scenario, told where it is from."""
-        self._origin = origin
+    def originating(self, origin: Origin) -> Self:
+        """This scenario, told where it is from: no field, so scenarios are equal without it."""
+        self.__dict__["origin"] = origin
         return self
 
     def with_(
@@ -139,14 +136,6 @@ class Scenario(BaseModel):
         from configs.loading import to_toml
 
         return to_toml(self)
-
-    def __eq__(self, other: object) -> bool:
-        """Whether both have the same values, wherever they come from."""
-        if not isinstance(other, Scenario):
-            return NotImplemented
-        return all(getattr(self, it) == getattr(other, it) for it in type(self).model_fields)
-
-    __hash__ = None  # type: ignore[assignment]
 
     def __repr_args__(self) -> Iterable[tuple[str | None, object]]:
         """What tells scenarios apart; all of it is in `to_toml`."""

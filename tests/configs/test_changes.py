@@ -98,7 +98,10 @@ def test_a_scenario_that_is_from_no_file_is_changed_with_its_defaults(small: Sce
 
 def test_origin_is_no_part_of_a_scenario(small: Scenario) -> None:
     other = loads("another.toml", small.to_toml())
+    assert other.origin != small.origin
+    assert other.topology.edges  # made once, and kept beside the fields as origin is
     assert other == small
+    assert other != small.with_(seed=3)
     assert pickle.loads(pickle.dumps(small)).with_(seed=3) == small.with_(seed=3)
 
 
