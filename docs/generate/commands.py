@@ -51,11 +51,12 @@ def _text(words: str) -> str:
 
 def _statuses() -> str:
     """The members of `ExitStatus` with the texts below them in its source."""
-    (body,) = (ast.parse(inspect.getsource(ExitStatus)).body,)
-    members = body[0].body  # type: ignore[attr-defined]
+    (source,) = ast.parse(inspect.getsource(ExitStatus)).body
+    if not isinstance(source, ast.ClassDef):
+        raise TypeError(f"{ExitStatus}: no class in its source")
     said: dict[str, str] = {}
     name = ""
-    for line in members:
+    for line in source.body:
         if isinstance(line, ast.Assign) and isinstance(line.targets[0], ast.Name):
             name = line.targets[0].id
             said[name] = "What was asked for is done, and held."

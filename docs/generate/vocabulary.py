@@ -101,8 +101,7 @@ def _messages() -> list[type]:
 
 
 def _message(message: type) -> tuple[str, str, str, str]:
-    hints = get_type_hints(message)
-    fields = ", ".join(f"{name}: {_type(hints[name])}" for name in message._fields)  # type: ignore[attr-defined]
+    fields = ", ".join(f"{name}: {_type(hint)}" for name, hint in get_type_hints(message).items())
     most = messages.MOST_BYTES.get(_kind(message.__name__), "")
     return f"`{message.__name__}`", f"`[1, {fields}]`", str(most), prose(message.__doc__)
 

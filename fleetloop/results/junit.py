@@ -16,7 +16,7 @@ from xml.etree import ElementTree as ET
 
 from fleetloop.results import run_folder
 from fleetloop.results.outcome import Outcome
-from fleetloop.results.tables import finding, label, trouble_lines
+from fleetloop.results.tables import claim, trouble_lines
 
 _FORBIDDEN = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML can't have."""
@@ -70,10 +70,10 @@ def suite(name: str, outcome: Outcome, allow_unchecked: bool) -> ET.Element:
         again = "" if taken[called] == 1 else f" ({taken[called]})"
         one = case(made, class_name, called + again, 0.0)
         if expect["held"] is False:
-            say(one, "failure", "expectation", f"{label(expect)}: {finding(expect)}")
+            say(one, "failure", "expectation", claim(expect))
         elif expect["held"] is None:
             tag = "skipped" if allow_unchecked else "error"
-            say(one, tag, "not reached", f"{label(expect)}: {finding(expect)}")
+            say(one, tag, "not reached", claim(expect))
     count(made, outcome["took_s"])
     if outcome.get("started"):
         made.set("timestamp", _text(outcome["started"]))

@@ -24,7 +24,7 @@ from bokeh.plotting import figure
 
 from fleetloop.results.marks import Marks
 from fleetloop.results.palette import ROBOTS, STATE_LINES
-from fleetloop.results.panel import Panel
+from fleetloop.results.panel import Bound, Panel, Spot
 
 HEIGHT, SMALL = 230, 190
 _LEFT_BORDER = 62
@@ -200,14 +200,11 @@ def _expectations(plot: figure, panel: Panel) -> None:
     """Bounds over their windows and the worst places, on top of the lines."""
     found: list[GlyphRenderer[Any]] = []
     if panel.bounds:
-        bounds = ColumnDataSource(
-            {
-                "x0": [one.from_s for one in panel.bounds],
-                "x1": [one.to_s for one in panel.bounds],
-                "y": [one.level for one in panel.bounds],
-                "colour": [STATE_LINES[one.state] for one in panel.bounds],
-                "text": [one.text for one in panel.bounds],
-            }
+        bounds = _told(
+            panel.bounds,
+            x0=[one.from_s for one in panel.bounds],
+            x1=[one.to_s for one in panel.bounds],
+            y=[one.level for one in panel.bounds],
         )
         found.append(
             plot.segment(
@@ -222,13 +219,10 @@ def _expectations(plot: figure, panel: Panel) -> None:
             )
         )
     if panel.spots:
-        spots = ColumnDataSource(
-            {
-                "x": [one.t_s for one in panel.spots],
-                "y": [one.value for one in panel.spots],
-                "colour": [STATE_LINES[one.state] for one in panel.spots],
-                "text": [one.text for one in panel.spots],
-            }
+        spots = _told(
+            panel.spots,
+            x=[one.t_s for one in panel.spots],
+            y=[one.value for one in panel.spots],
         )
         found.append(
             plot.scatter(
@@ -246,6 +240,12 @@ def _expectations(plot: figure, panel: Panel) -> None:
         renderer.tags = ["bounds"]
     if found:
         plot.add_tools(_hover(found, [("", "@text")]))
+
+
+def _told(marks: Sequence[Bound | Spot], **places: list[float]) -> ColumnDataSource:
+    """Places of marks, with the colours of their states and their texts."""
+    colours, texts = [STATE_LINES[one.state] for one in marks], [one.text for one in marks]
+    return ColumnDataSource({**places, "colour": colours, "text": texts})
 
 
 def _hover(renderers: "Sequence[GlyphRenderer[Any]]", tooltips: list[tuple[str, str]]) -> HoverTool:

@@ -36,6 +36,8 @@ from fleetloop.results.view import View
 PAGE = "report.html"
 MOST_EVENTS = 200
 """Of a page; summary.json has all."""
+_HELD = {False: "failed", None: "not reached", True: "held"}
+"""Of expectations, in words, the gravest first."""
 
 
 def write_report(run: Path, record: Record | None = None) -> Path:
@@ -111,7 +113,7 @@ def why(summary: Summary) -> Iterator[str]:
     expected = summary["expectations"]
     for robot, reason in summary["stopped_robots"].items():
         yield f"{robot} stopped itself: {reason}"
-    for held, words in ((False, "failed"), (None, "not reached"), (True, "held")):
+    for held, words in _HELD.items():
         found = [one for one in expected if one["held"] is held]
         if found:
             yield f"{len(found)} of {len(expected)} expectations {words}"
@@ -124,17 +126,15 @@ def _expectations(summary: Summary) -> str:
         f'<tr><td class="state {state_of(one)}">{MARKS[state_of(one)]} {escape(mark(one))}</td>'
         f'<td class="text">{escape(label(one))}</td><td>{escape(found_value(one))}</td>'
         f'<td class="text">{escape(worst_place(one))}</td><td>{escape(margin(one))}</td></tr>'
-        for one in sorted(summary["expectations"], key=_gravity)
+        for held in _HELD
+        for one in summary["expectations"]
+        if one["held"] is held
     )
     head = "".join(
         f'<th class="text">{name}</th>' for name in ("", "expectation", "found", "worst", "margin")
     )
     table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
     return f'<div class="wide">{table}</div>' if rows else ""
-
-
-def _gravity(expect: dict[str, object]) -> int:
-    return {False: 0, None: 1, True: 2}[expect["held"]]  # type: ignore[index]
 
 
 def _rest(known: Known) -> Iterator[str]:
