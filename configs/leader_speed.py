@@ -39,6 +39,15 @@ def speed_at(changes: Sequence[SpeedChange], t_ns: float) -> float:
     return before + (speed - before) * ((t_ns - from_ns) / ramp_ns)
 
 
+def corners(changes: Sequence[SpeedChange], until_ns: int) -> list[int]:
+    """Instants from 0 on [ns], the last one included, between which v_r is a straight line.
+
+    Of a step there are two: the last nanosecond before it, and its own.
+    """
+    found = {t_ns for one in changes for t_ns in (one.from_ns - 1, one.from_ns, one.to_ns)}
+    return sorted({0, *(t_ns for t_ns in found if 0 < t_ns < until_ns), until_ns})
+
+
 def with_change(changes: Sequence[SpeedChange], change: SpeedChange) -> Sequence[SpeedChange] | str:
     """The changes with one more, in place of one at its time but the first; why not, if it can't.
 

@@ -1,7 +1,7 @@
 """The report's figures of a run, one at a time; they show themselves in a notebook."""
 
-from collections.abc import Callable, Mapping
-from io import BytesIO
+from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import matplotlib as mpl
@@ -12,14 +12,9 @@ from configs.errors import ScenarioError
 from configs.scenario import Scenario
 from fleetloop.record.reader import Record
 from fleetloop.results import figures
+from fleetloop.results.publication import png
 
-_Draw = Callable[[Record, Scenario], Figure]
-_ERRORS: Mapping[str, tuple[str, str]] = {
-    "x_e_m": ("x$_e$", "m"),
-    "y_e_m": ("y$_e$", "m"),
-    "theta_e_rad": ("θ$_e$", "rad"),
-}
-_FIGURES: Mapping[str, _Draw] = {
+_FIGURES: Mapping[str, figures.Draw] = {
     "graph": figures.graph,
     "positions": figures.positions,
     "path_variables": figures.path_variables,
@@ -27,7 +22,8 @@ _FIGURES: Mapping[str, _Draw] = {
     "speed_estimates": figures.speed_estimates,
     "torques": figures.torques,
     "law_signals": figures.law_signals,
-} | {name: figures.error_of(name, *about) for name, about in _ERRORS.items()}
+    **figures.ERRORS,
+}
 
 
 def draw(name: str, record: Record, scenario: Scenario) -> Figure:
@@ -37,7 +33,7 @@ def draw(name: str, record: Record, scenario: Scenario) -> Figure:
         ScenarioError: there is none of that name.
     """
     if name not in _FIGURES:
-        raise ScenarioError(f"signal = {name!r}: one of {', '.join(_ERRORS)}")
+        raise ScenarioError(f"signal = {name!r}: one of {', '.join(figures.ERRORS)}")
     with mpl.rc_context(figures.STYLE), np.errstate(all="ignore"):
         return _shows_itself(_FIGURES[name](record, scenario))
 
@@ -50,12 +46,6 @@ def all_of(record: Record, scenario: Scenario) -> Mapping[str, Figure]:
 
 def _shows_itself(figure: Figure) -> Figure:
     """Notebooks ask an object for a picture; a figure that isn't pyplot's has none of its own."""
-
-    def picture() -> bytes:
-        buffer = BytesIO()
-        figure.savefig(buffer, format="png")
-        return buffer.getvalue()
-
     shown: Any = figure
-    shown._repr_png_ = picture
+    shown._repr_png_ = partial(png, figure)
     return figure

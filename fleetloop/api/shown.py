@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 from fleetloop.results.summary import Summary
 from fleetloop.results.tables import (
-    claim,
     final_line,
-    mark,
+    marked_claim,
     robot_header,
     robot_rows,
     spread_line,
@@ -29,7 +28,7 @@ def html(summary: Summary, notes: Sequence[str]) -> str:
 
 def lines(summary: Summary) -> list[str]:
     """What is below the table."""
-    expected = [f"{mark(one)}: {claim(one)}" for one in summary["expectations"]]
+    expected = map(marked_claim, summary["expectations"])
     said = [f"{final_line(summary)}; {spread_line(summary)}", *expected]
     return [*said, *trouble_lines(summary)]
 

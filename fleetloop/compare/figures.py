@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 
 from fleetloop.compare.measures import SPREAD, THETA_ERROR, TORQUE, Course
 from fleetloop.compare.results import Row
-from fleetloop.results.drawing import DPI, HEIGHT_IN, WIDTH_IN, drawable, style_of
+from fleetloop.results.decimation import drawable
+from fleetloop.results.drawing import DPI, HEIGHT_IN, WIDTH_IN, style_of
 from fleetloop.results.figures import STYLE, Captioned
 from fleetloop.settling import FINAL_S, SETTLE_BAND
 

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 from configs.brief import Drawing, DrawnRobot, Wheels
 from configs.curves import formation_offset, reference_path
-from configs.leader_speed import SpeedChange, speed_at
+from configs.leader_speed import SpeedChange, corners, speed_at
 from configs.resolve import leader_brief
 from configs.scenario import Scenario
 from fleetloop.results.palette import robot_style
@@ -32,10 +32,7 @@ def drawing(scenario: Scenario) -> Drawing:
 
 def way_m(changes: tuple[SpeedChange, ...], until_s: float) -> float:
     """The integral of the leader's speed from 0 to a time [m]."""
-    until_ns = round(until_s * 1e9)
-    corners = {t for one in changes for t in (one.from_ns - 1, one.from_ns, one.to_ns)}
-    times_ns = sorted({0, until_ns, *(t for t in corners if 0 < t < until_ns)})
     return sum(
         (speed_at(changes, a) + speed_at(changes, b)) / 2.0 * (b - a) * 1e-9
-        for a, b in pairwise(times_ns)
+        for a, b in pairwise(corners(changes, round(until_s * 1e9)))
     )

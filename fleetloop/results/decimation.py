@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-DRAWABLE = 1e30
+_DRAWABLE = 1e30
 """Of a motion that diverged only what is smaller is drawn: axes can't be laid out beyond."""
 POINTS = 2000
 
@@ -23,7 +23,7 @@ class Points(NamedTuple):
 
 def drawable(values: np.ndarray) -> np.ndarray:
     """NaN for what can't be drawn."""
-    return np.where(np.abs(values) < DRAWABLE, values, np.nan)
+    return np.where(np.abs(values) < _DRAWABLE, values, np.nan)
 
 
 def decimated(t: np.ndarray, values: np.ndarray, points: int = POINTS) -> Points:

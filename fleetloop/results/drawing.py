@@ -10,14 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fleetloop.record.reader import Record
+from fleetloop.results.decimation import drawable
 from fleetloop.settling import settled_from
 
 WIDTH_IN, HEIGHT_IN, DPI = 6.4, 3.6, 150
 COLOURS = ("#08306b", "#d95f02", "#1b9e77", "#9e2a8c", "#7f7f7f", "#b8860b")
 _DASHES: tuple[object, ...] = ("-", (0, (6, 2)), (0, (2, 1.2)), (0, (7, 2, 1.5, 2)))
-_POINTS = 1500
-_DRAWABLE = 1e30
-"""Of a motion that diverged only what is smaller is drawn: axes can't be laid out beyond."""
+_STRETCHES = 1500
 
 
 def over_time(
@@ -57,13 +56,8 @@ def _settled(series: Sequence[np.ndarray]) -> int | None:
     return last if last < longest - 2 else None
 
 
-def drawable(values: np.ndarray) -> np.ndarray:
-    """NaN for what can't be drawn."""
-    return np.where(np.abs(values) < _DRAWABLE, values, np.nan)
-
-
 def envelope(
-    t: np.ndarray, values: np.ndarray, stretches: int = _POINTS
+    t: np.ndarray, values: np.ndarray, stretches: int = _STRETCHES
 ) -> tuple[np.ndarray, np.ndarray]:
     """Few enough points to draw, with every peak: smallest and largest value of each stretch."""
     values = drawable(values)
@@ -76,11 +70,6 @@ def envelope(
     chosen = np.stack([first + blocks.argmin(axis=1), first + blocks.argmax(axis=1)])
     index = np.append(np.sort(chosen, axis=0).T.ravel(), len(values) - 1)
     return t[index], values[index]
-
-
-def stride(length: int) -> slice:
-    """Few enough points to draw, evenly."""
-    return slice(None, None, max(1, length // _POINTS))
 
 
 def style_of(n: int) -> tuple[str, object]:

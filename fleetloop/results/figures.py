@@ -9,7 +9,7 @@
 Lines, colours and panels are `fleetloop.results.drawing`'s.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,27 +17,25 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from configs.resolve import leader_brief
 from configs.scenario import Scenario
 from configs.signals import law_table
 from fleetloop.record.reader import Record
+from fleetloop.results.decimation import drawable, stride
 from fleetloop.results.drawing import (
     COLOURS,
     DPI,
     HEIGHT_IN,
     WIDTH_IN,
     axes_of,
-    drawable,
     envelope,
     legend,
     over_time,
-    stride,
     style_of,
 )
 from fleetloop.results.graph_drawing import drawn
 from fleetloop.results.network import ages_of
 from fleetloop.results.network_figures import ages, edge_states
-from fleetloop.results.summary import leader_speed
+from fleetloop.results.summary import leader_profile
 
 _COLUMNS, _PANEL_IN, _TITLE_IN, _STRETCHES = 3, 1.1, 0.5, 300
 """Of the figure of the laws' signals."""
@@ -124,7 +122,7 @@ def positions(record: Record, _: Scenario) -> Figure:
 # --- over time ------------------------------------------------------------------------------------
 
 
-def error_of(signal: str, symbol: str, unit: str) -> Callable[[Record, Scenario], Figure]:
+def error_of(signal: str, symbol: str, unit: str) -> "Draw":
     """A figure of one path following error; beside it the settled part at its own scale."""
 
     def draw(record: Record, _: Scenario) -> Figure:
@@ -158,22 +156,12 @@ def speed_estimates(record: Record, scenario: Scenario) -> Figure:
     figure = over_time(record, series, "Estimates of the reference speed", "v̂$_r$ [m/s]")
     axes = figure.axes[0]
     end = max(rows["t_s"][-1] for rows in record.controller.values() if len(rows))
-    corners_ns = _corners_ns(scenario, end)
-    speeds = leader_speed(scenario)(corners_ns)
-    axes.plot(corners_ns * 1e-9, speeds, color="black", linewidth=0.8, label="leader v$_r$")
+    profile = leader_profile(scenario, float(end))
+    axes.plot(*profile, color="black", linewidth=0.8, label="leader v$_r$")
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, 0.0), max(high, 1e-3))
     legend(axes, len(series) + 1)
     return figure
-
-
-def _corners_ns(scenario: Scenario, end_s: float) -> np.ndarray:
-    """Instants between which the leader's speed is a straight line [ns]; two at a step."""
-    end_ns = round(end_s * 1e9)
-    changes = leader_brief(scenario).speed_changes
-    corners_ns = {t_ns for one in changes for t_ns in (one.from_ns - 1, one.from_ns, one.to_ns)}
-    inner_ns = {t_ns for t_ns in corners_ns if 0 < t_ns < end_ns}
-    return np.array(sorted({0, *inner_ns, end_ns}), dtype=np.int64)
 
 
 def torques(record: Record, _: Scenario) -> Figure:
@@ -220,7 +208,7 @@ def law_signals(record: Record, _: Scenario) -> Figure:
                 colour, dash = style_of(n)
                 t, values = envelope(series["t_s"], series[name], _STRETCHES)
                 axes.plot(t, values, color=colour, linestyle=dash, linewidth=0.8, label=robot)
-        axes.set_title(f"{name} [{unit}]", fontsize=7)
+        axes.set_title(f"{name} [{unit}]", fontsize=7, parse_math=False)
         axes.tick_params(labelsize=6)
     for axes in panels[len(units) :]:
         axes.set_axis_off()
@@ -251,16 +239,18 @@ def clock_figures(record: Record, _: Scenario) -> Figure:
     return figure
 
 
-_FIGURES: Sequence[tuple[str, str, Callable[[Record, Scenario], Figure]]] = (
+Draw = Callable[[Record, Scenario], Figure]
+ERRORS: Mapping[str, Draw] = {
+    "x_e_m": error_of("x_e_m", "x$_e$", "m"),
+    "y_e_m": error_of("y_e_m", "y$_e$", "m"),
+    "theta_e_rad": error_of("theta_e_rad", "θ$_e$", "rad"),
+}
+_FIGURES: Sequence[tuple[str, str, Draw]] = (
     ("fig3_graph", "The directed graph (the paper's Figure 3).", graph),
     ("fig4_positions", "Robot positions and orientations (Figure 4).", positions),
-    ("fig5_x_e", "Path following errors x_e (Figure 5).", error_of("x_e_m", "x$_e$", "m")),
-    ("fig6_y_e", "Path following errors y_e (Figure 6).", error_of("y_e_m", "y$_e$", "m")),
-    (
-        "fig7_theta_e",
-        "Path following errors θ_e (Figure 7).",
-        error_of("theta_e_rad", "θ$_e$", "rad"),
-    ),
+    ("fig5_x_e", "Path following errors x_e (Figure 5).", ERRORS["x_e_m"]),
+    ("fig6_y_e", "Path following errors y_e (Figure 6).", ERRORS["y_e_m"]),
+    ("fig7_theta_e", "Path following errors θ_e (Figure 7).", ERRORS["theta_e_rad"]),
     (
         "fig8_parameter_errors",
         "Path parameter errors over the edges (Figure 8).",

@@ -7,7 +7,6 @@ from configs.events import KINDS
 from configs.faults.plan import planned_faults
 from configs.scenario import Scenario
 from fleetloop.results.summary import Summary
-from fleetloop.results.tables import finding, label, mark
 
 STATES = {True: "held", False: "failed", None: "open"}
 """Of an expectation, by `held`: a key of `palette.MARKS`."""
@@ -54,11 +53,6 @@ def marks_of(summary: Summary, scenario: Scenario, end_s: float) -> Marks:
 def state_of(expect: dict[str, Any]) -> str:
     """Of an expectation as in the summary."""
     return STATES[expect["held"]]
-
-
-def words_of(expect: dict[str, Any]) -> str:
-    """An expectation and what was found, in one line."""
-    return f"{mark(expect)}: {label(expect)}; {finding(expect)}"
 
 
 def _faults(summary: Summary, end_s: float) -> Iterator[FaultMark]:

@@ -12,8 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fleetloop.record.reader import Record
+from fleetloop.results.decimation import drawable, stride
 from fleetloop.results.derived import spread
-from fleetloop.results.drawing import DPI, WIDTH_IN, drawable, envelope, legend, stride, style_of
+from fleetloop.results.drawing import DPI, WIDTH_IN, envelope, legend, style_of
 from fleetloop.results.figures import STYLE, Captioned
 from fleetloop.results.known import Known
 

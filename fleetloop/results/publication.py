@@ -4,6 +4,8 @@ from collections.abc import Iterable
 from io import BytesIO
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from configs.errors import InfrastructureError
 from fleetloop.results import run_folder
 from fleetloop.results.figures import Captioned
@@ -19,7 +21,7 @@ def write_figures(run: Path, figures: Iterable[Captioned]) -> list[Drawn]:
     Raises:
         InfrastructureError: one can't be written.
     """
-    drawn = [(item, png(item)) for item in figures]
+    drawn = [(item, png(item.figure)) for item in figures]
     folder = run / FIGURES
     try:
         folder.mkdir(exist_ok=True)
@@ -30,9 +32,9 @@ def write_figures(run: Path, figures: Iterable[Captioned]) -> list[Drawn]:
     return drawn
 
 
-def png(item: Captioned) -> bytes:
+def png(figure: Figure) -> bytes:
     """A figure as a PNG file."""
     buffer = BytesIO()
     # No software name or date in the file: equal runs make equal figures.
-    item.figure.savefig(buffer, format="png", metadata={"Software": None})
+    figure.savefig(buffer, format="png", metadata={"Software": None})
     return buffer.getvalue()

@@ -4,15 +4,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from configs.resolve import leader_brief
-from configs.scenario import Scenario
 from configs.signals import SPREAD, law_table
 from fleetloop.results.decimation import Points, decimated
 from fleetloop.results.derived import spread
 from fleetloop.results.network import ages_of
 from fleetloop.results.palette import ROBOTS, robot_style
 from fleetloop.results.panel import Line, LineStyle, Panel, Section
-from fleetloop.results.summary import leader_speed
+from fleetloop.results.summary import leader_profile
 from fleetloop.results.view import MOST_LINES, View, group_of, line, widest
 
 ERRORS = (("x_e_m", "xₑ", "m"), ("y_e_m", "yₑ", "m"), ("theta_e_rad", "θₑ", "rad"))
@@ -79,19 +77,9 @@ def _spread(view: View) -> Panel:
 
 def _speeds(view: View) -> Panel:
     panel = view.panel("v_r_hat", "v̂ᵣ and the leader's vᵣ [m/s]", "m/s")
-    corners_ns = corners(view.scenario, view.end_s)
-    speeds = leader_speed(view.scenario)(corners_ns)
-    panel.lines.append(Line("leader", (), _LEADER, Points(corners_ns * 1e-9, speeds)))
+    profile = Points(*leader_profile(view.scenario, view.end_s))
+    panel.lines.append(Line("leader", (), _LEADER, profile))
     return panel
-
-
-def corners(scenario: Scenario, end_s: float) -> np.ndarray:
-    """Instants between which the leader's speed is a straight line [ns]; two at a step."""
-    end_ns = round(end_s * 1e9)
-    changes = leader_brief(scenario).speed_changes
-    corners_ns = {t_ns for one in changes for t_ns in (one.from_ns - 1, one.from_ns, one.to_ns)}
-    inner_ns = {t_ns for t_ns in corners_ns if 0 < t_ns < end_ns}
-    return np.array(sorted({0, *inner_ns, end_ns}), dtype=np.int64)
 
 
 def _torques(view: View) -> Section:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from configs.events import KINDS, Event, in_order, told
-from configs.leader_speed import speed_at
+from configs.leader_speed import corners, speed_at
 from configs.membership import Membership
 from configs.resolve import leader_brief
 from configs.roles import LAUNCHER, RECORDER
@@ -177,6 +177,13 @@ def leader_speed(scenario: Scenario) -> Callable[[np.ndarray], np.ndarray]:
     """v_r over scenario time [ns] → [m/s], as the leader says it."""
     changes = leader_brief(scenario).speed_changes
     return np.vectorize(partial(speed_at, changes), otypes=[np.float64])
+
+
+def leader_profile(scenario: Scenario, end_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """v_r from 0 to a time as straight lines: their ends [s], and v_r there [m/s]."""
+    changes = leader_brief(scenario).speed_changes
+    times_ns = np.array(corners(changes, round(end_s * 1e9)), dtype=np.int64)
+    return times_ns * 1e-9, leader_speed(scenario)(times_ns)
 
 
 def _cut_short(record: Record, scenario: Scenario, stats: RunStats) -> dict[str, str]:

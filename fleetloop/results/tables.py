@@ -247,6 +247,11 @@ def claim(expect: dict[str, Any]) -> str:
     return f"{label(expect)}: {finding(expect)}"
 
 
+def marked_claim(expect: dict[str, Any]) -> str:
+    """The same with the word whether it held before it."""
+    return f"{mark(expect)}: {claim(expect)}"
+
+
 def label(expect: dict[str, Any]) -> str:
     """What an expectation says, behind its name if it has one."""
     name = expect.get("name")

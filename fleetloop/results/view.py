@@ -9,10 +9,11 @@ import numpy as np
 from configs.scenario import Scenario
 from fleetloop.record.reader import Record
 from fleetloop.results.decimation import POINTS, Points, decimated, drawable
-from fleetloop.results.marks import Marks, marks_of, state_of, words_of
+from fleetloop.results.marks import Marks, marks_of, state_of
 from fleetloop.results.palette import robot_style
 from fleetloop.results.panel import Band, Bound, Line, LineStyle, Panel, Spot
 from fleetloop.results.summary import ERRORS, Summary
+from fleetloop.results.tables import marked_claim
 
 MOST_LINES = 12
 """More robots, and a band is drawn of all and lines of a few."""
@@ -88,7 +89,7 @@ class View:
             window = one.get("window")
             if one.get("signal") != name or not window:
                 continue
-            state, text = state_of(one), words_of(one)
+            state, text = state_of(one), marked_claim(one)
             from_s, to_s = window["from_s"], min(window["to_s"], self.end_s)
             from_s += one.get("settle_within_s") or 0.0
             levels = [one.get("min"), one.get("max")]

@@ -1,11 +1,13 @@
 """The virtual leader's speed over time."""
 
+from itertools import pairwise
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from configs.errors import ScenarioError
-from configs.leader_speed import SpeedChange, in_order, speed_at, with_change
+from configs.leader_speed import SpeedChange, corners, in_order, speed_at, with_change
 from configs.loading import load
 
 PROFILE = (
@@ -25,6 +27,18 @@ PROFILE = (
 )
 def test_speeds_hold_step_and_ramp(t_ns: int, speed: float) -> None:
     assert speed_at(PROFILE, t_ns) == pytest.approx(speed, abs=1e-15)
+
+
+def test_between_corners_speeds_are_straight_lines() -> None:
+    found = corners(PROFILE, 40)
+    assert found == [0, 9, 10, 19, 20, 27, 28, 32, 40]
+    for a, b in pairwise(found):
+        ends = speed_at(PROFILE, a), speed_at(PROFILE, b)
+        for t_ns in range(a, b + 1):
+            share = (t_ns - a) / (b - a)
+            straight = ends[0] + share * (ends[1] - ends[0])
+            assert speed_at(PROFILE, t_ns) == pytest.approx(straight, abs=1e-15)
+    assert corners(PROFILE, 22) == [0, 9, 10, 19, 20, 22]
 
 
 @given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.integers(0, 1000), st.integers(0, 1200))

@@ -37,7 +37,7 @@ def test_any_course_is_drawn(values: np.ndarray) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         figures = all_figures([row("one", values), row("other", values)], seed=1)
-        assert [png(figure)[:4] for figure in figures] == [b"\x89PNG"] * 2
+        assert [png(one.figure)[:4] for one in figures] == [b"\x89PNG"] * 2
 
 
 def test_the_scale_is_that_of_the_laws_that_came_through() -> None:
