@@ -9,7 +9,6 @@ controls...               see `fleetloop.door.controls`
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from itertools import count
 
 from bridge.network.link import Link
 from configs.brief import Schedule
@@ -18,6 +17,7 @@ from fleetloop.door.controls import Controls
 from fleetloop.door.requests import Request, Respond
 from fleetloop.launch.control_plane import ControlPlane
 from fleetloop.launch.fault_desk import FaultDesk
+from fleetloop.launch.order_book import OrderBook
 from fleetloop.launch.run_status import RunStatus
 from fleetloop.launch.spawn import Orders
 from fleetloop.launch.steering import Steering
@@ -40,51 +40,41 @@ class RunRequests:
         self._orders = orders
         self._viewer = viewer
         self.controls = Controls()
-        numbers = count(1)
-
-        def tick() -> int:
-            return plane.outcome.ticks
-
-        def is_absent(process: str) -> bool:
-            return process in plane.absent
-
+        self._book = book = OrderBook(
+            schedule,
+            lambda process: process in plane.absent,
+            lambda: plane.outcome.ticks,
+            plane.now,
+        )
         self.steering = Steering(
             orders.scenario,
-            schedule,
             orders.speed,
-            numbers,
-            is_absent,
-            tick,
-            plane.now,
+            book,
             lambda kind, text, at: plane.note(LAUNCHER.name, kind, text, at),
         )
         self.faults = FaultDesk(
             orders.scenario,
-            schedule,
             orders.deployment.fault_problem,
-            is_absent,
-            tick,
-            plane.now,
-            numbers,
+            book,
             lambda: self.steering.paused,
         )
-        self.status = RunStatus(plane, schedule, orders.scenario.ends_at_s, self.steering)
+        self.status = RunStatus(plane, book, orders.scenario.ends_at_s, self.steering)
         self.status.controller = lambda: self.controls.controller
-        plane.on_answer, plane.on_alive = self.take, self.faults.repeat
+        plane.on_answer, plane.on_alive = book.take, self._repeat
 
     def open(self, link: Link, run: str, processes: Iterable[str]) -> None:
         """Declare what orders and answers need."""
-        self.faults.open(link, run, processes)
-        self.steering.open(link, run, processes)
+        self._book.open(link, run, processes)
 
-    def take(self, process: str, payload: bytes) -> bool:
-        """Take the answer of a process to an order; whether it is well formed."""
-        return self.steering.take(process, payload) or self.faults.take(process, payload)
+    def _repeat(self, process: str) -> None:
+        """Tell a process that is there, or there again, what it doesn't know."""
+        self._book.repeat(process)
+        self.faults.repeat(process)
 
     def look(self) -> None:
         """Answer what is due."""
+        self._book.look()
         self.faults.look()
-        self.steering.look()
         self._viewer.look()
 
     def of_run(self, run: str, stop: Callable[[str], None]) -> Mapping[str, Request]:
@@ -92,8 +82,9 @@ class RunRequests:
         self.steering.on_stop = stop
 
         def about(respond: Respond) -> None:
-            tick, t_s = self.faults.now()
+            tick = self._book.tick()
             folder, name = str(self._orders.record.parent.absolute()), self._orders.scenario.name
+            t_s = self._book.seconds(tick)
             respond({"run": run, "folder": folder, "scenario": name, "tick": tick, "t_s": t_s})
 
         return {

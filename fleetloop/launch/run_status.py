@@ -20,12 +20,12 @@ from typing import Any
 
 from bridge.network.messages import Progress
 from bridge.network.status import PlantStatus
-from configs.brief import Schedule
 from configs.events import Event
 from configs.leader_speed import speed_at
 from configs.roles import AGENT
 from fleetloop.door.requests import Request, Respond
 from fleetloop.launch.control_plane import ControlPlane
+from fleetloop.launch.order_book import OrderBook
 from fleetloop.launch.steering import Steering
 
 MOST_EVENTS = 1 << 13
@@ -79,7 +79,7 @@ class RunStatus:
 
     Args:
         plane: of the run.
-        schedule: of the run.
+        orders: of the run.
         ends_at_s: when the scenario ends.
         steering: of the run.
     """
@@ -87,13 +87,13 @@ class RunStatus:
     def __init__(
         self,
         plane: ControlPlane,
-        schedule: Schedule,
+        orders: OrderBook,
         ends_at_s: float,
         steering: Steering,
     ) -> None:
         self.events = EventLog()
         self._plane = plane
-        self._schedule = schedule
+        self._orders = orders
         self._ends_at_s = ends_at_s
         self._steering = steering
         self.controller: Callable[[], str | None] = lambda: None
@@ -117,16 +117,17 @@ class RunStatus:
         self._pace.note(self._plane.now(), progress.t_ns * 1e-9)
 
     def _status(self, respond: Respond) -> None:
-        tick, steering = self._plane.outcome.ticks, self._steering
-        t_s = steering.seconds(tick)
+        orders, steering = self._orders, self._steering
+        tick, realtime = orders.tick(), orders.schedule.realtime
+        t_s = orders.seconds(tick)
         respond(
             {
                 "state": self._state(tick),
                 "tick": tick,
                 "t_s": t_s,
                 "ends_at_s": self._ends_at_s,
-                "clock": "realtime" if self._schedule.realtime else "lockstep",
-                "speed": 1.0 if self._schedule.realtime else steering.speed,
+                "clock": "realtime" if realtime else "lockstep",
+                "speed": 1.0 if realtime else steering.speed,
                 "real_time_factor": 0.0 if steering.paused else self._pace.rate(),
                 "leader_speed_m_s": speed_at(steering.changes, t_s * 1e9),
                 "controller": self.controller(),
@@ -188,7 +189,7 @@ class RunStatus:
         respond({"events": [self._row(one) for one in events], "next": number})
 
     def _row(self, event: Event) -> dict[str, Any]:
-        return {**event._asdict(), "t_s": self._steering.seconds(event.tick)}
+        return {**event._asdict(), "t_s": self._orders.seconds(event.tick)}
 
 
 def _used_s(pid: int) -> float | None:

@@ -1,7 +1,6 @@
 """Orders of faults and what becomes of them, as the launcher keeps account."""
 
 from collections.abc import Iterable
-from itertools import count
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,7 +14,8 @@ from configs.faults.absences import Absence
 from configs.loading import load
 from configs.resolve import schedule
 from configs.roles import processes_of
-from fleetloop.launch.fault_desk import ANSWER_S, REACHED_S, FaultDesk
+from fleetloop.launch.fault_desk import REACHED_S, FaultDesk
+from fleetloop.launch.order_book import ANSWER_S, OrderBook
 
 REALTIME = "clock.mode='realtime'"
 VCAN = {"interface": "socketcan", "channel": "vcan0"}
@@ -32,22 +32,24 @@ class Bench:
         self.paused = False
         self.sent: list[tuple[str, FaultOrder]] = []
         self.answers: list[dict[str, Any]] = []
-        self.desk = FaultDesk(
-            self.scenario,
+        self.book = OrderBook(
             schedule(self.scenario),
-            Deployment.model_validate(
-                {"robot": {name: {"bus": VCAN} for name in real}}
-            ).fault_problem,
             lambda process: process in self.absent,
             lambda: self.tick,
             lambda: self.now_s,
-            count(1),
+        )
+        self.desk = FaultDesk(
+            self.scenario,
+            Deployment.model_validate(
+                {"robot": {name: {"bus": VCAN} for name in real}}
+            ).fault_problem,
+            self.book,
             lambda: self.paused,
         )
         self.absences: list[tuple[str, str, int, int | None]] = []
         self.desk.on_absences = self._absences
         link = SimpleNamespace(subscribe=lambda *_: None, publisher=self._publisher)
-        self.desk.open(link, "run", processes_of(self.scenario.names))
+        self.book.open(link, "run", processes_of(self.scenario.names))
 
     def _absences(self, absent: Iterable[Absence]) -> None:
         self.absences = [one[:4] for one in absent]
@@ -69,7 +71,7 @@ class Bench:
 
     def answer(self, process: str, tick: int, refusal: str = "") -> None:
         number = self.sent[-1][1].number
-        assert self.desk.take(process, OrderAnswer(number, tick, refusal).encode())
+        assert self.book.take(process, OrderAnswer(number, tick, refusal).encode())
         self.desk.look()
 
     def faults(self) -> dict[str, tuple[str, int, int | None]]:
@@ -151,10 +153,10 @@ def test_what_is_not_answered_is_told_after_a_while() -> None:
     bench = Bench()
     bench.inject(kind="push")
     bench.now_s = ANSWER_S + 10.0
-    bench.desk.look()
+    bench.book.look()
     assert "plant: no answer" in bench.answers[0]["error"]
-    assert bench.desk.take("plant", OrderAnswer(1, 1017).encode())  # too late: nothing happens
-    assert not bench.desk.take("plant", b"\xc1")
+    assert bench.book.take("plant", OrderAnswer(1, 1017).encode())  # too late: nothing happens
+    assert not bench.book.take("plant", b"\xc1")
 
 
 def test_a_run_that_stands_still_is_not_waited_for() -> None:
