@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from configs.errors import ScenarioError
+from fleetloop.numbers import RunFirst
 
 if TYPE_CHECKING:
     from configs.overrides import Overrides
@@ -47,6 +48,18 @@ ClockOption = Annotated[
 ]
 SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Override the seed.")]
 RunArg = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its record.mcap.")]
+GoingOnArg = Annotated[
+    str,
+    typer.Argument(
+        metavar="RUN",
+        help="Name or folder of a run that goes on on this machine; none: the only one.",
+        show_default=False,
+    ),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+ForceOption = Annotated[
+    bool, typer.Option("--force", help="Also while another client, as a page, has the controls.")
+]
 PartialOption = Annotated[
     bool,
     typer.Option(
@@ -109,6 +122,22 @@ VersionOption = Annotated[
         "--version", callback=_print_version, is_eager=True, help="Print versions and end."
     ),
 ]
+
+
+def verbs_of_run(about: str) -> typer.Typer:
+    """Verbs before which a run that goes on may be named; their context has it as its object."""
+    app = typer.Typer(
+        cls=RunFirst,
+        no_args_is_help=True,
+        context_settings={"help_option_names": ["-h", "--help"]},
+        rich_markup_mode="rich",
+    )
+
+    @app.callback(help=about)
+    def of_run(ctx: typer.Context, run: GoingOnArg = "") -> None:
+        ctx.obj = run
+
+    return app
 
 
 def listed(option: str, text: str | None) -> tuple[str, ...]:

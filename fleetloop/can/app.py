@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from fleetloop.numbers import LONGEST_S, between
+from fleetloop.options import JsonOption
 
 app = typer.Typer(
     help="List, monitor, feed, bridge and export the CAN buses of live runs. BUS is a bus (r1), or"
@@ -24,6 +25,10 @@ ProtocolOption = Annotated[
         help="Drive protocol to decode: odrive, or module:ROW of a module in the current folder.",
     ),
 ]
+OutOption = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", metavar="FILE", help="Output file. Default: standard output."),
+]
 
 
 @app.command("list")
@@ -36,7 +41,7 @@ def list_(
         int, typer.Option("--bitrate", min=1, metavar="BIT/S", help="Bit rate that load refers to.")
     ] = 1_000_000,
     protocol: ProtocolOption = "odrive",
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: JsonOption = False,
     watch: Annotated[
         bool,
         typer.Option(
@@ -218,7 +223,7 @@ def slcan(
 def endpoints(
     bus: Annotated[
         str | None,
-        typer.Argument(metavar="[BUS]", help="A live bus, to read the versions of its drives."),
+        typer.Argument(metavar="BUS", help="A live bus, to read the versions of its drives."),
     ] = None,
     firmware: Annotated[
         str | None,
@@ -228,10 +233,7 @@ def endpoints(
             help="Firmware version, instead of a bus, e.g. 0.6.11.",
         ),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FILE", help="Output file. Default: standard output."),
-    ] = None,
+    out: OutOption = None,
     protocol: ProtocolOption = "odrive",
 ) -> None:
     """Print the endpoints of the drives in the form of the vendor's flat_endpoints.json."""
@@ -245,14 +247,11 @@ def dbc(
     source: Annotated[
         str | None,
         typer.Argument(
-            metavar="[SCENARIO|RUN]",
+            metavar="SCENARIO|RUN",
             help="A scenario or a run, for the addresses of its drives. Default: two drives, 0, 1.",
         ),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FILE", help="Output file. Default: standard output."),
-    ] = None,
+    out: OutOption = None,
     bus: Annotated[
         str | None, typer.Option("--bus", metavar="BUS", help="Only the drives on this bus.")
     ] = None,

@@ -11,7 +11,7 @@ def check(
     scenario: Annotated[
         str | None,
         typer.Argument(
-            metavar="[SCENARIO]",
+            metavar="SCENARIO",
             help="A scenario file or the name of a shipped one. Default: list the shipped ones.",
         ),
     ] = None,

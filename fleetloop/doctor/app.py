@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from fleetloop.numbers import between
+from fleetloop.options import JsonOption
 
 
 def doctor(
@@ -20,7 +21,7 @@ def doctor(
         float,
         typer.Option("--for", callback=between(0.05, 600.0), metavar="S", help="Measure so long."),
     ] = 1.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Examine this machine: can it hold a rate, what is missing, what is left over; remedies."""
     from fleetloop.doctor.command import doctor as examine

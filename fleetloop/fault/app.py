@@ -4,35 +4,12 @@ from typing import Annotated, Any
 
 import typer
 
-from fleetloop.numbers import LONGEST_S, RunFirst, above_zero, between
-from fleetloop.options import listed
+from fleetloop.numbers import LONGEST_S, above_zero, between
+from fleetloop.options import ForceOption, JsonOption, listed, verbs_of_run
 
-app = typer.Typer(
-    cls=RunFirst,
-    no_args_is_help=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    rich_markup_mode="rich",
+app = verbs_of_run(
+    "Faults of a run while it goes on: list, inject and clear them; the kinds there are."
 )
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-ForceOption = Annotated[
-    bool, typer.Option("--force", help="Also while another client, as a page, has the controls.")
-]
-
-
-@app.callback()
-def _of_run(
-    ctx: typer.Context,
-    run: Annotated[
-        str,
-        typer.Argument(
-            metavar="RUN",
-            help="Name or folder of a run that goes on on this machine; none: the only one.",
-            show_default=False,
-        ),
-    ] = "",
-) -> None:
-    """Faults of a run while it goes on: list, inject and clear them; the kinds there are."""
-    ctx.obj = run
 
 
 @app.command("list")

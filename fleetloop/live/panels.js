@@ -70,7 +70,7 @@ function showRobots() {
     const pick = (column) => (now ? now[r * N + NOW[column]] : NaN);
     const error = Math.hypot(pick("x_e"), pick("y_e")), torque = Math.max(Math.abs(pick("tau_right")), Math.abs(pick("tau_left")));
     const drives = [...new Set([said.right_drive, said.left_drive].filter(Boolean))].join(" | ").toLowerCase().replaceAll("_", " ");
-    const cells = [error < 0.1 ? `${number(1000 * error, 1)} mm` : `${number(error, 2)} m`, limit ? share(torque / limit) : `${number(torque, 2)} Nm`,
+    const cells = [error < 0.1 ? `${number(1000 * error, 1)} mm` : `${number(error, 2)} m`, limit ? share(torque / limit) : `${number(torque, 2)} N·m`,
       finite(said.bus_load) ? share(said.bus_load) : finite(said.bus_frames_per_s) ? `${number(said.bus_frames_per_s / 1000, 1)} k/s` : "–", finite(said.neighbour_age_s) ? `${number(1000 * said.neighbour_age_s, 0)} ms` : "–"];
     const alarm = /stopped|diverged|absent/.test(said.phase || "");
     return {key: [name, said.phase, drives, cells], make: () => el("tr", {class: alarm ? "failed" : ""}, el("th", {scope: "row"}, chip(r), name),

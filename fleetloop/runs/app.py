@@ -5,8 +5,7 @@ from typing import Annotated
 import typer
 
 from fleetloop.numbers import between
-
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+from fleetloop.options import ForceOption, GoingOnArg, JsonOption
 
 
 def ps(as_json: JsonOption = False) -> None:
@@ -17,23 +16,14 @@ def ps(as_json: JsonOption = False) -> None:
 
 
 def stop(
-    run: Annotated[
-        str,
-        typer.Argument(
-            metavar="[RUN]",
-            help="Name or folder of a run that goes on on this machine; none: the only one.",
-            show_default=False,
-        ),
-    ] = "",
+    run: GoingOnArg = "",
     within: Annotated[
         float,
         typer.Option(
             callback=between(0.1, 3600.0), metavar="S", help="Longest time to wait for its end."
         ),
     ] = 60.0,
-    force: Annotated[
-        bool, typer.Option("--force", help="Also if its controls are held by somebody else.")
-    ] = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """End a run as Ctrl-C does, wait for its end and say how it ended: its record is kept."""

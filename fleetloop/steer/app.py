@@ -4,34 +4,10 @@ from typing import Annotated, Any
 
 import typer
 
-from fleetloop.numbers import LONGEST_S, RunFirst, between, finite, speed
+from fleetloop.numbers import LONGEST_S, between, finite, speed
+from fleetloop.options import ForceOption, JsonOption, verbs_of_run
 
-app = typer.Typer(
-    cls=RunFirst,
-    no_args_is_help=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    rich_markup_mode="rich",
-)
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-ForceOption = Annotated[
-    bool, typer.Option("--force", help="Also while another client, as a page, has the controls.")
-]
-
-
-@app.callback()
-def _of_run(
-    ctx: typer.Context,
-    run: Annotated[
-        str,
-        typer.Argument(
-            metavar="RUN",
-            help="Name or folder of a run that goes on on this machine; none: the only one.",
-            show_default=False,
-        ),
-    ] = "",
-) -> None:
-    """A run while it goes on: pause, step, speed, the leader's speed, e-stop, stop."""
-    ctx.obj = run
+app = verbs_of_run("A run while it goes on: pause, step, speed, the leader's speed, e-stop, stop.")
 
 
 @app.command()
