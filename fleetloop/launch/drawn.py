@@ -1,5 +1,6 @@
 """Scenario → what 3-D views of its record draw besides its rows."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 from configs.brief import Drawing, DrawnRobot, Wheels
@@ -12,9 +13,9 @@ from fleetloop.results.palette import robot_style
 
 def drawing(scenario: Scenario) -> Drawing:
     """Robots in the colours of pages and figures, their paths as far as the leader goes, edges."""
-    ahead_m = way_m(leader_brief(scenario).speed_changes, scenario.ends_at_s)
+    least_m, most_m = ways_m(leader_brief(scenario).speed_changes, scenario.ends_at_s)
     starts = [robot.s_0 for robot in scenario.robot]
-    span = min(starts) + min(ahead_m, 0.0), max(starts) + max(ahead_m, 0.0)
+    span = min(starts) + least_m, max(starts) + most_m
     path = reference_path(scenario.path)
     robots = []
     for number, robot in enumerate(scenario.robot):
@@ -30,9 +31,23 @@ def drawing(scenario: Scenario) -> Drawing:
     return Drawing(tuple(robots), edges, scenario.coordination.silence_limit_s)
 
 
-def way_m(changes: tuple[SpeedChange, ...], until_s: float) -> float:
-    """The integral of the leader's speed from 0 to a time [m]."""
-    return sum(
-        (speed_at(changes, a) + speed_at(changes, b)) / 2.0 * (b - a) * 1e-9
-        for a, b in pairwise(corners(changes, round(until_s * 1e9)))
-    )
+def ways_m(changes: Sequence[SpeedChange], until_s: float) -> tuple[float, float]:
+    """The least and the greatest way of the leader, the integral of its speed from 0 on [m].
+
+    Of all times from 0, where the way is 0, to `until_s`.
+    """
+    way_m = least_m = most_m = 0.0
+    for begin, end in pairwise(corners(changes, round(until_s * 1e9))):
+        first, last, lasts_s = (
+            speed_at(changes, begin),
+            speed_at(changes, end),
+            (end - begin) * 1e-9,
+        )
+        parts = [(first, last, lasts_s)]
+        if first * last < 0.0:  # it turns in between
+            turns_s = lasts_s * first / (first - last)
+            parts = [(first, 0.0, turns_s), (0.0, last, lasts_s - turns_s)]
+        for at_first, at_last, part_s in parts:
+            way_m += (at_first + at_last) / 2.0 * part_s
+            least_m, most_m = min(least_m, way_m), max(most_m, way_m)
+    return least_m, most_m

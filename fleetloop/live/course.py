@@ -6,10 +6,10 @@ import numpy as np
 
 from agents.paths import robot_path
 from configs.curves import formation_offset, reference_path
-from configs.leader_speed import SpeedChange, speed_at
 from configs.resolve import leader_brief
 from configs.scenario import Scenario
 from fleetloop.check.torque import limits
+from fleetloop.launch.drawn import ways_m
 
 _POINTS = 400
 _MARGIN_M = 0.5
@@ -18,24 +18,17 @@ _MOST_M = 500.0
 """Of a path that is drawn."""
 
 
-def planned_s_m(changes: tuple[SpeedChange, ...], end_s: float) -> float:
-    """The way of the virtual leader until a time: ∫ v_r dt, backwards counted as nothing."""
-    t_ns = np.linspace(0.0, end_s * 1e9, 2000)
-    speeds = np.array([max(speed_at(changes, t), 0.0) for t in t_ns])
-    return float(np.trapezoid(speeds, t_ns * 1e-9))
-
-
 def courses(scenario: Scenario) -> dict[str, np.ndarray]:
-    """Of each robot, points (n, 2) of its path from where it starts to where it is to end."""
-    far_m = planned_s_m(leader_brief(scenario).speed_changes, scenario.ends_at_s)
+    """Of each robot, points (n, 2) of its path as far as it is to drive, forwards and backwards."""
+    least_m, most_m = ways_m(leader_brief(scenario).speed_changes, scenario.ends_at_s)
     centre = reference_path(scenario.path)
     found = {}
-    start_m = min(robot.s_0 for robot in scenario.robot)
-    end_m = max(robot.s_0 for robot in scenario.robot) + min(far_m + _MARGIN_M, _MOST_M)
+    start_m = min(robot.s_0 for robot in scenario.robot) + max(least_m, -_MOST_M)
+    end_m = max(robot.s_0 for robot in scenario.robot) + min(most_m + _MARGIN_M, _MOST_M)
     for robot in scenario.robot:
         path = robot_path(centre, formation_offset(robot.offset))
         points = []
-        for s in np.linspace(min(start_m, robot.s_0), end_m, _POINTS):
+        for s in np.linspace(start_m, end_m, _POINTS):
             try:
                 points.append(path(float(s))[:2])
             except Exception:  # a path of the user's own, beyond the end that it has
