@@ -22,6 +22,7 @@ from configs.errors import FleetloopError
 MOST_LINE_BYTES = 1 << 16
 """Of a request."""
 
+_NONE: Mapping[str, type] = MappingProxyType({})
 Answer = dict[str, Any]
 Respond = Callable[[Answer], None]
 """Called once with the answer, at once or later."""
@@ -36,7 +37,7 @@ class Request(NamedTuple):
     """Called with `respond` and the arguments by name; raises FleetloopError to refuse."""
     changes: bool = False
     """It changes the run."""
-    optional: Mapping[str, type] = MappingProxyType({})
+    optional: Mapping[str, type] = _NONE
     """Arguments that may be left out."""
 
 
@@ -63,7 +64,9 @@ def serve(
     request = requests.get(name) if isinstance(name, str) else None
     if request is None:
         answer({"error": f"{str(name)[:40]!r}: no such request; known: {', '.join(requests)}"})
-    elif wrong := _wrong(asked, request) or (refuse() if request.changes else ""):
+    elif wrong := mismatch(asked, request.arguments, request.optional) or (
+        refuse() if request.changes else ""
+    ):
         answer({"error": f"{name}: {wrong}"})
     else:
         try:
@@ -80,10 +83,12 @@ def _parsed(line: bytes) -> Answer | str:
     return asked if isinstance(asked, dict) else "must be an object with a key 'request'"
 
 
-def _wrong(asked: Answer, request: Request) -> str:
-    """Why these arguments aren't the request's, "" if they are."""
-    wanted: dict[str, type] = {**request.arguments, **request.optional}
-    if not request.arguments.keys() <= asked.keys() <= wanted.keys():
+def mismatch(
+    asked: Answer, arguments: Mapping[str, type], optional: Mapping[str, type] = _NONE
+) -> str:
+    """Why these aren't a request's arguments, "" if they are; a whole number becomes a float."""
+    wanted: dict[str, type] = {**arguments, **optional}
+    if not arguments.keys() <= asked.keys() <= wanted.keys():
         return f"takes {', '.join(wanted) or 'no arguments'}, not {', '.join(asked) or 'none'}"
     for key, value in asked.items():
         kind = wanted[key]

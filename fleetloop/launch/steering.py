@@ -5,13 +5,15 @@
     run.step           ticks               tick: the last one now
     run.resume         -                   tick: from which on time goes on
     run.speed          factor              tick: from which on; speed (0: as fast as it can)
-    run.leader_speed   speed_m_s, ramp_s   tick, t_s: from which on v_r is, or goes towards, that
+    run.leader_speed   speed_m_s, ramp_s   tick: from which on v_r is, or goes towards, that; late,
+                                           refused: processes with another tick, or a reason
     run.leader         -                   leader: the section that repeats it
     run.stop           -                   tick: about where the run ends
 
-What is asked in lockstep only is refused in real time. An order that can't be carried out is
-refused with the reason. None of them changes what is computed but that of v_r, which is a step of
-the scenario's section [leader] from then on, for controllers that re-join as well.
+Every tick comes with its time, t_s. What is asked in lockstep only is refused in real time. An
+order that can't be carried out is refused with the reason. None of them changes what is computed
+but that of v_r, which is a step of the scenario's section [leader] from then on, for controllers
+that re-join as well.
 """
 
 from collections.abc import Callable, Mapping

@@ -7,7 +7,9 @@ shows the verdict to those who look, and goes.
 
 import asyncio
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from bridge.network import keys
 from bridge.network.client import StoppedError, open_client
@@ -97,8 +99,8 @@ async def _ask(door: RunDoor, hub: Hub) -> None:
         await asyncio.sleep(_STATUS_S if hub.watched else 1.0)
 
 
-def _event(said: dict[str, object]) -> Event:
-    return Event(*(said[key] for key in Event._fields))  # type: ignore[arg-type]
+def _event(said: Mapping[str, Any]) -> Event:
+    return Event(*(said[key] for key in Event._fields))
 
 
 async def _serve(brief: ViewerBrief, link: Link, stop: Stop) -> str:

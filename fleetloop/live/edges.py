@@ -13,7 +13,7 @@ from math import exp, isnan, nan
 
 import numpy as np
 
-from configs.edges import Edge, InEdge
+from configs.edges import Edge, InEdge, edge_text
 from configs.signals import AGE_PREFIX, Signal
 
 OK, ABSENT, DEAD = 0, 1, 2
@@ -117,7 +117,7 @@ def cut_edges(faults: Sequence[Mapping[str, object]], edges: Sequence[Edge]) -> 
     acting = [one for one in faults if one.get("state") == "acting"]
     cut = [one for one in acting if one.get("kind") == "link_partition"]
     named = {str(it) for one in cut for it in _list(one.get("targets"))}
-    return {edge for edge in edges if f"{edge[0]} -> {edge[1]}" in named}
+    return {edge for edge in edges if edge_text(edge) in named}
 
 
 def _list(value: object) -> list[object]:

@@ -119,7 +119,7 @@ class Hub:
         viewer.page.push(partial(self.board, viewer))
 
     def idle(self) -> None:
-        """Nobody looks: keep what waits small, a few times a minute."""
+        """Nobody looks: keep what waits small, every `_IDLE_SETTLE_S`."""
         now_s = self._clock.monotonic_s()
         if now_s - self._settled_s >= _IDLE_SETTLE_S:
             self._settled_s = now_s

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from configs.errors import ScenarioError
+from fleetloop.door.requests import mismatch
 
 MOST_BYTES = 1 << 14
 """Of an order."""
@@ -60,13 +61,8 @@ def parsed(text: object) -> Order:
     wanted = ARGUMENTS.get(request) if isinstance(request, str) else None
     if wanted is None:
         raise ScenarioError(f"{str(request)[:40]!r}: no such order")
-    if said.keys() != wanted.keys():
-        raise ScenarioError(f"{request}: takes {', '.join(wanted) or 'no arguments'}")
-    for key, kind in wanted.items():
-        if kind is float and type(said[key]) is int:  # JavaScript has one kind of number
-            said[key] = float(said[key])
-        if type(said[key]) is not kind:
-            raise ScenarioError(f"{request}: {key} must be of type {kind.__name__}")
+    if wrong := mismatch(said, wanted):
+        raise ScenarioError(f"{request}: {wrong}")
     return Order(number, request, said)
 
 

@@ -13,6 +13,7 @@ Behind it a websocket needs a session that this server has signed, which only co
 import hmac
 import logging
 import secrets
+from collections.abc import Collection
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -32,18 +33,12 @@ from configs.errors import InfrastructureError
 from fleetloop.live.hub import MOST_VIEWERS, Hub
 
 ADDRESS = "127.0.0.1"
-TOKEN_BYTES = 24
 _MOST_MESSAGE_BYTES = 1 << 16
 """Of what a browser sends."""
 _PAGE, _SOCKET, _FILES = "/", "/ws", "/static/"
 _LOOK_EVERY_MS = 250
 _UNUSED_MS = 10_000
 """A session without a browser ends after this time."""
-
-
-def new_token() -> str:
-    """A token that nobody guesses."""
-    return secrets.token_urlsafe(TOKEN_BYTES)
 
 
 class _Refused(RequestHandler):
@@ -99,16 +94,14 @@ class _Headers(OutputTransform):
 class _Gate(Router):
     """Looks at each request before the application does."""
 
-    def __init__(self, inside: TornadoApplication, hub: Hub, token: str) -> None:
+    def __init__(
+        self, inside: TornadoApplication, hub: Hub, token: str, hosts: Collection[str]
+    ) -> None:
         self._inside = inside
         self._hub = hub
         self._token = token
-        self._hosts: frozenset[str] = frozenset()
+        self._hosts = hosts
         self._refusals = TornadoApplication([], transforms=[_Headers])
-
-    def open(self, port: int) -> None:
-        """The port is known."""
-        self._hosts = frozenset(f"{name}:{port}" for name in (ADDRESS, "localhost"))
 
     def find_handler(self, request: HTTPServerRequest, **kwargs: Any) -> HTTPMessageDelegate | None:
         """Whoever answers the request."""
@@ -175,8 +168,7 @@ class LiveServer:
             include_cookies=[],
         )
         inside.add_transform(_Headers)
-        gate = _Gate(inside, hub, token)
-        gate.open(self.port)
+        gate = _Gate(inside, hub, token, hosts)
         http = HTTPServer(gate, max_header_size=1 << 14, max_body_size=1 << 10)
         http.add_sockets(sockets)
         self._bokeh = BaseServer(IOLoop.current(), inside, http)

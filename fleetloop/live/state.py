@@ -4,12 +4,11 @@
     status      as the run's door says it: `run.status`, and its faults
     events      of the run, in the order in which they came
 
-Rows wait, undecoded, until `settle`: a page that nobody looks at costs nothing but their memory,
-which is bounded.
+Rows wait, undecoded, until `settle`, in bounded memory.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,11 +19,10 @@ from configs.resolve import agent_brief, schedule, signals_of
 from configs.scenario import Scenario
 from configs.signals import PLANT_SIGNALS, Signal
 from fleetloop.live.edges import LiveEdge, cut_edges
-from fleetloop.live.expected import LiveExpectations
+from fleetloop.live.expected import LiveExpectations, Source
 from fleetloop.live.series import History, Track
 from fleetloop.results.expectations import verdict
 
-Source = Literal["plant", "controller"]
 SAMPLE_S = 0.01
 """A bin of the series, in scenario time, or a tick if that is longer."""
 CHARTED = 16

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Coroutine
+from secrets import token_urlsafe
 from typing import Any
 
 import pytest
@@ -14,7 +15,7 @@ from configs.loading import load
 from configs.scenario import Scenario
 from fleetloop.live.hub import Hub
 from fleetloop.live.page import MOST_UNDRAWN
-from fleetloop.live.server import LiveServer, new_token
+from fleetloop.live.server import LiveServer
 from fleetloop.live.state import LiveState
 
 
@@ -38,7 +39,7 @@ class Bench:
     def __init__(self, scenario: Scenario) -> None:
         self.desk = WrittenDesk()
         self.hub = Hub(LiveState(scenario), self.desk, "<b>two</b>-000001")
-        self.token = new_token()
+        self.token = token_urlsafe()
         self.server = LiveServer(self.hub, self.token)
         self.address = self.server.address
         self.place = f"127.0.0.1:{self.server.port}"
@@ -79,7 +80,7 @@ def test_only_the_right_token_opens_the_page(scenario: Scenario) -> None:
     async def test(bench: Bench) -> None:
         base = f"http://{bench.place}/"
         assert (await answer(bench.address)).code == 200
-        for wrong in ("", "?token=", f"?token={bench.token[:-1]}", f"?token={new_token()}"):
+        for wrong in ("", "?token=", f"?token={bench.token[:-1]}", f"?token={token_urlsafe()}"):
             said = await answer(base + wrong)
             assert said.code == 403
             assert b"token" in said.body
