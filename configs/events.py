@@ -8,6 +8,7 @@ list are the same in every run. Others are about machines, processes and other p
 """
 
 from collections.abc import Iterable, Sequence
+from enum import IntEnum
 from typing import NamedTuple
 
 MAX_EVENTS = 512
@@ -25,6 +26,14 @@ class Event(NamedTuple):
     text: str = ""
 
 
+class Gravity(IntEnum):
+    """How grave events of a kind are: levels of logs, marks of pages."""
+
+    INFO = 0
+    WARNING = 1
+    ERROR = 2
+
+
 class EventKind(NamedTuple):
     """A kind of event."""
 
@@ -34,38 +43,60 @@ class EventKind(NamedTuple):
     """It is a notice: said while the run goes on, and listed with the results."""
     acted_on: bool = False
     """The launcher acts on it."""
+    gravity: Gravity = Gravity.INFO
 
 
 KINDS: dict[str, EventKind] = {
     "armed": EventKind("both drives of a robot are in closed loop, before tick 0", told=False),
     "drive_error": EventKind(
-        "a drive dropped out or fell silent, as the robot's controller saw it", told=False
+        "a drive dropped out or fell silent, as the robot's controller saw it",
+        told=False,
+        gravity=Gravity.WARNING,
     ),
-    "stopped": EventKind("a controller took the torque from both wheels"),
+    "stopped": EventKind("a controller took the torque from both wheels", gravity=Gravity.WARNING),
     "rearming": EventKind("a robot that had stopped begins to arm"),
     "rearmed": EventKind("a robot that had stopped drives again"),
     "joined": EventKind("a robot joins the formation late"),
     "rejoined": EventKind("a robot joins the formation again after a restart of its controller"),
     "left": EventKind("a robot leaves the formation, as the scenario has it"),
-    "diverged": EventKind("the motion of a body left its bounds"),
-    "law": EventKind("a law recorded a number that isn't finite"),
+    "diverged": EventKind("the motion of a body left its bounds", gravity=Gravity.ERROR),
+    "law": EventKind("a law recorded a number that isn't finite", gravity=Gravity.ERROR),
     "fault_applied": EventKind("a fault of the scenario, or an ordered one, begins to act"),
     "fault_cleared": EventKind("a fault acts no more"),
     "leader_speed": EventKind("a speed of the virtual leader was ordered", exact=False),
-    "bus_trouble": EventKind("a bus failed, or drives ignored frames", exact=False),
-    "stalled": EventKind("a process, or its machine, stood still", exact=False),
-    "silent": EventKind("a process shows no sign of life", exact=False),
-    "cut_off": EventKind("the network to a process, or its machine, went", exact=False),
-    "killed": EventKind("a fault kills the process of a controller", acted_on=True),
-    "frozen": EventKind("a fault freezes the process of a controller", acted_on=True),
+    "bus_trouble": EventKind(
+        "a bus failed, or drives ignored frames", exact=False, gravity=Gravity.WARNING
+    ),
+    "stalled": EventKind(
+        "a process, or its machine, stood still", exact=False, gravity=Gravity.WARNING
+    ),
+    "silent": EventKind("a process shows no sign of life", exact=False, gravity=Gravity.WARNING),
+    "cut_off": EventKind(
+        "the network to a process, or its machine, went", exact=False, gravity=Gravity.WARNING
+    ),
+    "killed": EventKind(
+        "a fault kills the process of a controller", acted_on=True, gravity=Gravity.WARNING
+    ),
+    "frozen": EventKind(
+        "a fault freezes the process of a controller", acted_on=True, gravity=Gravity.WARNING
+    ),
     "held": EventKind(
-        "lockstep doesn't wait for a controller until it answers", exact=False, acted_on=True
+        "lockstep doesn't wait for a controller until it answers",
+        exact=False,
+        acted_on=True,
+        gravity=Gravity.WARNING,
     ),
     "dropped": EventKind(
-        "lockstep doesn't wait for a controller any more", exact=False, acted_on=True
+        "lockstep doesn't wait for a controller any more",
+        exact=False,
+        acted_on=True,
+        gravity=Gravity.WARNING,
     ),
     "awaited": EventKind(
-        "lockstep stands still until a controller is started again", exact=False, acted_on=True
+        "lockstep stands still until a controller is started again",
+        exact=False,
+        acted_on=True,
+        gravity=Gravity.WARNING,
     ),
     "back": EventKind(
         "a process that was silent, cut off, held or dropped is there", exact=False, acted_on=True

@@ -1,9 +1,10 @@
 """A run in a notebook (HTML) and in a terminal (rich): the table of its robots and its verdict."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
+from fleetloop.results.pages import list_tag, table_tag
 from fleetloop.results.summary import Summary
 from fleetloop.results.tables import (
     final_line,
@@ -21,9 +22,8 @@ if TYPE_CHECKING:
 def html(summary: Summary, notes: Sequence[str]) -> str:
     """A fragment of HTML; what a user named is escaped."""
     head = f"<b>{escape(verdict_line(summary))}</b>"
-    rows = [_row("th", robot_header()), *(_row("td", row) for row in robot_rows(summary))]
-    table = f"<table>{''.join(rows)}</table>"
-    return f"<div>{head}{table}{_items(lines(summary))}{_items(notes)}</div>"
+    table = table_tag(robot_header(), robot_rows(summary))
+    return f"<div>{head}{table}{list_tag(lines(summary))}{list_tag(notes)}</div>"
 
 
 def lines(summary: Summary) -> list[str]:
@@ -56,11 +56,3 @@ def renderable(summary: Summary) -> "RenderableType":
     for row in robot_rows(summary):
         table.add_row(*map(Text, row))
     return Group(table, *map(Text, lines(summary)))
-
-
-def _row(tag: str, cells: Iterable[str]) -> str:
-    return f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells)}</tr>"
-
-
-def _items(texts: Sequence[str]) -> str:
-    return f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in texts)}</ul>" if texts else ""

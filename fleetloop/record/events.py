@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from configs.events import Event
+from configs.events import KINDS, Event, Gravity
 from fleetloop.record.cdr import Layer
 from fleetloop.record.chunks import Block
 from fleetloop.record.mcap_file import McapFile
@@ -17,14 +17,8 @@ from fleetloop.record.messages import framed
 from fleetloop.record.reader import Record
 from fleetloop.record.schema import View
 
-_INFO, _WARNING, _ERROR = 2, 3, 4
-"""Levels of foxglove_msgs/msg/Log."""
-_LEVELS = {
-    **dict.fromkeys(("drive_error", "stopped", "bus_trouble", "stalled", "silent"), _WARNING),
-    **dict.fromkeys(("cut_off", "killed", "frozen", "held", "dropped", "awaited"), _WARNING),
-    **dict.fromkeys(("diverged", "law"), _ERROR),
-}
-"""By kind; of all others it is information."""
+_LEVELS = {Gravity.INFO: 2, Gravity.WARNING: 3, Gravity.ERROR: 4}
+"""Of foxglove_msgs/msg/Log."""
 _LAST_NS = ((1 << 31) - 1) * 1_000_000_000
 """Of builtin_interfaces/Time."""
 
@@ -45,7 +39,7 @@ def log_message(event: Event, number: int, period_ns: int) -> np.ndarray:
     """The message of an event, as an array of one."""
     layer = Layer()
     layer.stamp()
-    layer.uint8(_LEVELS.get(event.kind, _INFO))
+    layer.uint8(_LEVELS[KINDS[event.kind].gravity])
     layer.string(f"{event.kind}: {event.text}" if event.text else event.kind)
     layer.string(event.source)
     layer.string("")  # file

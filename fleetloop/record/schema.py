@@ -80,7 +80,6 @@ VIEW_TOPICS: Mapping[View, str] = {
     View.FLEET: "fleet",
     View.LOG: "log",
 }
-SCENES = (View.PATHS, View.ROBOTS, View.REFERENCES, View.EDGES)
 FLEET_SIGNALS: tuple[Signal, ...] = (
     Signal(SPREAD, "m", "largest s_i minus the smallest"),
     Signal("s_difference", "m", "s_i minus the mean of all s, of the robots in their order"),

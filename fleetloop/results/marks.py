@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
-from configs.events import KINDS
+from configs.events import KINDS, Gravity
 from configs.faults.plan import planned_faults
 from configs.scenario import Scenario
 from fleetloop.results.summary import Summary
@@ -12,10 +12,6 @@ STATES = {True: "held", False: "failed", None: "open"}
 """Of an expectation, by `held`: a key of `palette.MARKS`."""
 MOST_TARGETS = 8
 """That are named of a fault."""
-_BAD = frozenset(
-    {"stopped", "diverged", "law", "drive_error", "bus_trouble", "stalled", "silent", "cut_off"}
-    | {"killed", "frozen", "held", "dropped"}
-)
 
 
 class FaultMark(NamedTuple):
@@ -90,6 +86,8 @@ def _fault(name: str, how: str, from_s: float, to_s: float | None, end_s: float)
 def _events(summary: Summary) -> Iterator[EventMark]:
     for row in summary.get("events", []):
         t_s, source, kind = row["t_s"], row["source"], row["kind"]
-        if kind not in KINDS or KINDS[kind].told or t_s >= 0.0:
+        known = KINDS.get(kind)  # None: of another version
+        if known is None or known.told or t_s >= 0.0:
+            bad = known is not None and known.gravity > Gravity.INFO
             said = ": ".join(filter(None, (source, kind, row["text"])))
-            yield EventMark(t_s, source, kind, f"{said}, at {t_s:.6g} s", kind in _BAD)
+            yield EventMark(t_s, source, kind, f"{said}, at {t_s:.6g} s", bad)

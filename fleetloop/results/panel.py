@@ -149,7 +149,6 @@ class Section:
     columns: int = 1
     keys: Sequence[tuple[str, LineStyle]] = ()
     """Groups of lines that aren't robots: what is told of them beside the panels."""
-    folded: bool = False
 
 
 def floor(unit: str, series: Iterable[np.ndarray]) -> float:

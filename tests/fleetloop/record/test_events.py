@@ -8,8 +8,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from support.controller_rows import SIGNALS
 
-from configs.events import KINDS, Event
-from fleetloop.record import events as log
+from configs.events import Event
 from fleetloop.record.events import add_events
 from fleetloop.record.reader import Record
 from fleetloop.record.writer import RecordWriter
@@ -71,7 +70,3 @@ def test_a_missing_part_is_named_as_before(tmp_path: Path) -> None:
         writer.note_lost("half of it")
     add_events(Record.open(tmp_path / "a.mcap"), EVENTS, 2_000_000)
     assert Record.open(tmp_path / "a.mcap").lost == "half of it"
-
-
-def test_every_kind_with_a_level_is_one_that_there_is() -> None:
-    assert log._LEVELS.keys() <= KINDS.keys()
