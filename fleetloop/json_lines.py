@@ -12,7 +12,7 @@ import sys
 from typing import Any, TextIO
 
 from configs.errors import InfrastructureError
-from fleetloop.streams import forget_output
+from fleetloop.streams import forget_output, is_utf8
 
 MOST_UNREAD_BYTES = 1 << 20
 """Beyond this, pictures of the moment are left out."""
@@ -31,7 +31,7 @@ class JsonLines:
         self._stream = stream = stream or sys.stdout
         stream.flush()
         self._fd = _descriptor(stream)
-        self._unicode = (stream.encoding or "").lower().replace("-", "") == "utf8"
+        self._unicode = is_utf8(stream)
         self._unread = bytearray()
         self._poll = select.poll()
         if self._fd is not None:

@@ -2,7 +2,7 @@
 
     robot  phase    |x_e| m  |y_e| m  τ N·m    bus  heard  drives
     r1     driving    0.012    0.003  +0.31   34 %  10 ms  closed loop control
-    r2     stopped    0.532    0.040  +0.00   34 %  10 ms  IDLE: ESTOP_REQUESTED
+    r2     stopped    0.532    0.040  +0.00   34 %  10 ms  idle: ESTOP_REQUESTED
 
 τ is the wheel's with the greater torque; `bus` the load of the robot's bus, or frames per second of
 bus time where it has no bit timing; `heard` the age of the oldest path state of its neighbours.

@@ -55,6 +55,11 @@ def register() -> None:
     codecs.register_error(PLAIN, _plain)
 
 
+def is_utf8(stream: TextIO) -> bool:
+    """Whether a stream takes any character as it is."""
+    return (stream.encoding or "").lower().replace("-", "") == "utf8"
+
+
 def spelled_for(stream: IO[str], text: str) -> str:
     """The text as the stream will show it, for layout in columns."""
     encoding = getattr(stream, "encoding", None) or "utf-8"

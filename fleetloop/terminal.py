@@ -19,7 +19,7 @@ from rich.text import Text
 from bridge.process.clock import SYSTEM_CLOCK
 from fleetloop.robot_rows import rows
 from fleetloop.robot_states import RobotState
-from fleetloop.streams import forget_output, spelled_for
+from fleetloop.streams import forget_output, is_utf8, spelled_for
 
 PLAIN_EVERY_S = 5.0
 LOOK_EVERY_S = 0.2
@@ -39,8 +39,7 @@ def say(text: str) -> None:
 
 def say_json(value: object) -> None:
     """Print a result for programs: in UTF-8, or in ASCII where the stream has another encoding."""
-    unicode = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
-    say(json.dumps(value, indent=2, ensure_ascii=not unicode))
+    say(json.dumps(value, indent=2, ensure_ascii=not is_utf8(sys.stdout)))
 
 
 class ResultConsole(Console):

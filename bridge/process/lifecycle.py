@@ -30,6 +30,7 @@ from typing import BinaryIO, TypeVar
 
 import setproctitle
 
+from bridge.process.kernel_stat import kernel_stat
 from bridge.process.waiting import readable
 from configs.errors import ExitStatus, FleetloopError, PeerLostError
 
@@ -210,11 +211,8 @@ def go_realtime(priority: int) -> list[str]:
 
 def launcher_stopped() -> bool:
     """Whether the process that started this one is stopped, as by Ctrl-Z: its router is, too."""
-    try:
-        stat = Path(f"/proc/{os.getppid()}/stat").read_text("ascii", "replace")
-    except OSError:
-        return False
-    return stat.rpartition(")")[2].split()[:1] in (["T"], ["t"])
+    stat = kernel_stat(os.getppid())
+    return stat is not None and stat.state in ("T", "t")
 
 
 def kill_self() -> None:

@@ -18,6 +18,7 @@ from pathlib import Path
 import agents.agent
 from bridge.can_bus import sockets
 from bridge.process.clock import SYSTEM_CLOCK, Clock
+from bridge.process.kernel_stat import kernel_stat
 from configs.errors import InfrastructureError
 from fleetloop.doctor.judgement import WakeUps
 from fleetloop.launch.child import refuse_shadowed_roles
@@ -126,11 +127,11 @@ def lone_roles(proc: Path = Path("/proc")) -> list[tuple[int, str]]:
             name = title.removeprefix(_TITLE).decode("utf-8", "replace")
             if not title.startswith(_TITLE) or not name.startswith(_ROLES):
                 continue
-            stat = (folder / "stat").read_text("ascii", "replace")
-            parent = int(stat.rpartition(")")[2].split()[1])
+            if (stat := kernel_stat(int(folder.name), proc)) is None:
+                continue
             status = (folder / "status").read_text("ascii", "replace")
             uid = next(it.split()[1] for it in status.splitlines() if it.startswith("Uid:"))
-            if int(uid) == os.getuid() and (parent == 1 or _is_init(proc / str(parent))):
+            if int(uid) == os.getuid() and (stat.parent == 1 or _is_init(proc / str(stat.parent))):
                 found.append((int(folder.name), name))
     return sorted(found)
 

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.kernel_stat import kernel_stat
 from bridge.process.lifecycle import Status, pack_brief
 from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
 from fleetloop.launch.fork_server import ForkServer
@@ -113,11 +114,8 @@ class Child:
 
     def state(self) -> str:
         """Why it may be silent, as far as the kernel knows: ", stopped by a signal"; else ""."""
-        try:
-            stat = Path(f"/proc/{self._pid}/stat").read_text("ascii", "replace")
-        except OSError:
-            return ""
-        return _STATES.get("".join(stat.rpartition(")")[2].split()[:1]), "")
+        stat = kernel_stat(self._pid)
+        return "" if stat is None else _STATES.get(stat.state, "")
 
     def release(self) -> None:
         """Tell it that its report has arrived."""

@@ -15,11 +15,11 @@ was heard of it last, cpu (processors used, of late) and waited_for. A robot has
 import os
 from collections import deque
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 from bridge.network.messages import Progress
 from bridge.network.status import PlantStatus
+from bridge.process.kernel_stat import kernel_stat
 from configs.events import Event
 from configs.leader_speed import speed_at
 from configs.roles import AGENT
@@ -176,11 +176,11 @@ class RunStatus:
     def _cpu_of(self, process: str) -> float | None:
         """Processors that a process of this machine has used of late."""
         child = self._plane.child(process)
-        used_s = None if child is None else _used_s(child.pid)
-        if child is None or used_s is None:
+        stat = None if child is None else kernel_stat(child.pid)
+        if child is None or stat is None:
             return None
         rate = self._cpu.setdefault(child.pid, _Rate(_CPU_OVER_S))
-        rate.note(self._plane.now(), used_s)
+        rate.note(self._plane.now(), stat.cpu_ticks / _TICKS_HZ)
         found = rate.rate()
         return None if found is None else round(found, 3)
 
@@ -190,13 +190,3 @@ class RunStatus:
 
     def _row(self, event: Event) -> dict[str, Any]:
         return {**event._asdict(), "t_s": self._orders.seconds(event.tick)}
-
-
-def _used_s(pid: int) -> float | None:
-    """Processor time of a process, all threads [s]; None if it isn't there."""
-    try:
-        stat = Path(f"/proc/{pid}/stat").read_text("ascii", "replace")
-        user, system = stat.rpartition(")")[2].split()[11:13]
-        return (int(user) + int(system)) / _TICKS_HZ
-    except (OSError, ValueError, IndexError):
-        return None

@@ -61,6 +61,8 @@ function showExpectations() {
   fill(at("expectations"), rows.length ? rows : [{key: "none", make: () => el("li", {class: "muted"}, "The scenario expects nothing.")}]);
 }
 
+// A drive's state in small letters; its errors as the drive's manual has them.
+const inWords = (drive) => drive.replace(/^[^:]*/, (state) => state.toLowerCase().replaceAll("_", " "));
 const share = (value) => (finite(value) ? `${(100 * value).toFixed(0)} %` : "–");
 function showRobots() {
   const table = at("robots"), now = view.last && view.last.now;
@@ -69,7 +71,7 @@ function showRobots() {
     const said = (board.run.robots || {})[name] || {}, limit = facts.torque_limits[name];
     const pick = (column) => (now ? now[r * N + NOW[column]] : NaN);
     const error = Math.hypot(pick("x_e"), pick("y_e")), torque = Math.max(Math.abs(pick("tau_right")), Math.abs(pick("tau_left")));
-    const drives = [...new Set([said.right_drive, said.left_drive].filter(Boolean))].join(" | ").toLowerCase().replaceAll("_", " ");
+    const drives = [...new Set([said.right_drive, said.left_drive].filter(Boolean).map(inWords))].join(" | ");
     const cells = [error < 0.1 ? `${number(1000 * error, 1)} mm` : `${number(error, 2)} m`, limit ? share(torque / limit) : `${number(torque, 2)} N·m`,
       finite(said.bus_load) ? share(said.bus_load) : finite(said.bus_frames_per_s) ? `${number(said.bus_frames_per_s / 1000, 1)} k/s` : "–", finite(said.neighbour_age_s) ? `${number(1000 * said.neighbour_age_s, 0)} ms` : "–"];
     const alarm = /stopped|diverged|absent/.test(said.phase || "");

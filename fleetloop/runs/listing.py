@@ -1,11 +1,11 @@
 """`fleetloop ps`: the runs of this user that go on on this machine, from their doors."""
 
-from pathlib import Path
 from typing import NamedTuple
 
 from rich.table import Table
 
 from bridge.can_bus import sockets
+from bridge.process.kernel_stat import kernel_stat
 from configs.errors import InfrastructureError
 from fleetloop.door.client import CONNECT_S, RefusedError, RunClient, doors
 from fleetloop.terminal import ResultConsole, note, say_json
@@ -55,11 +55,8 @@ def _state(client: RunClient) -> str:
 
 
 def _suspended(pid: int) -> bool:
-    try:
-        stat = Path(f"/proc/{pid}/stat").read_text("ascii", "replace")
-    except OSError:
-        return False
-    return stat.rpartition(")")[2].split()[:1] == ["T"]
+    stat = kernel_stat(pid)
+    return stat is not None and stat.state == "T"
 
 
 def list_runs(*, as_json: bool) -> None:

@@ -40,7 +40,7 @@ def process(proc: Path, pid: int, title: bytes, parent: int, uid: int | None = N
     folder.mkdir()
     uid = os.getuid() if uid is None else uid
     (folder / "cmdline").write_bytes(title + b"\0")
-    (folder / "stat").write_text(f"{pid} (fleetloop age) S {parent} 1 1 0")
+    (folder / "stat").write_text(f"{pid} (fleetloop age) S {parent} 1 1 0 -1 0 0 0 0 0 2 1\n")
     (folder / "status").write_text(f"Name:\tx\nUid:\t{uid}\t{uid}\t{uid}\t{uid}\n")
     (folder / "comm").write_text("systemd\n" if title == b"systemd --user" else "x\n")
 
