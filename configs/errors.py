@@ -12,6 +12,7 @@ class ExitStatus(IntEnum):
     """Exit status of every command and of every role's process."""
 
     OK = 0
+    """What was asked for is done, and held."""
     FAILED = 1
     """An expectation failed or was not reached, runs differ, or a record isn't all there."""
     USAGE = 2

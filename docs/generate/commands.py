@@ -4,6 +4,7 @@ import ast
 import inspect
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 import typer
@@ -54,13 +55,9 @@ def _statuses() -> str:
     (source,) = ast.parse(inspect.getsource(ExitStatus)).body
     if not isinstance(source, ast.ClassDef):
         raise TypeError(f"{ExitStatus}: no class in its source")
-    said: dict[str, str] = {}
-    name = ""
-    for line in source.body:
-        if isinstance(line, ast.Assign) and isinstance(line.targets[0], ast.Name):
-            name = line.targets[0].id
-            said[name] = "What was asked for is done, and held."
-        elif isinstance(line, ast.Expr) and name:
-            said[name] = str(ast.literal_eval(line.value))
-    rows = [(str(int(ExitStatus[one])), one.lower(), text) for one, text in said.items()]
+    rows = []
+    for member, said in pairwise(source.body):
+        if isinstance(member, ast.Assign) and isinstance(said, ast.Expr):
+            name = ast.unparse(member.targets[0])
+            rows.append((f"{ExitStatus[name]:d}", name.lower(), str(ast.literal_eval(said.value))))
     return table(("status", "name", ""), rows)

@@ -13,7 +13,7 @@ STEP_S = 0.0005
 
 
 def built(seed: int = 1, **changes: object) -> Powertrain:
-    return powertrain(replace(MODEL, seed=seed, **changes), INERTIA)  # type: ignore[arg-type]
+    return powertrain(replace(MODEL, seed=seed, **changes), INERTIA)
 
 
 def test_either_wheel_feels_its_own_demand() -> None:

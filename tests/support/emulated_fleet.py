@@ -86,13 +86,13 @@ class Fleet:
         return next(one for one in self.run._robots if one.brief.robot == robot)
 
     def states(self, robot: str = "r1") -> list[AxisState]:
-        return [drive.state for drive in self.robot(robot).drives]  # type: ignore[attr-defined]
+        return [drive.state for drive in self.robot(robot).drives]
 
     def watchdogs(self, robot: str = "r1") -> list[bool]:
         """Whether the watchdog of each drive, right and left, has disarmed it."""
         expired = AxisError.WATCHDOG_TIMER_EXPIRED
         drives = self.robot(robot).drives
-        return [bool(drive.disarm_reason & expired) for drive in drives]  # type: ignore[attr-defined]
+        return [bool(drive.disarm_reason & expired) for drive in drives]
 
     def happened(self, robot: str = "r1") -> list[str]:
         """Kinds of the events of a robot's controller since it was armed."""

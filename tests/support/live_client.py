@@ -110,14 +110,14 @@ class HeadlessPage:
         assert model is not None
         events: list[Any] = []
         self.document.on_change(events.append)
-        model.data = data  # type: ignore[attr-defined]
+        model.data = data
         self.document.remove_on_change(events.append)
         task = asyncio.create_task(self._send(self._protocol.create("PATCH-DOC", events[:1])))
         self._sent.add(task)
         task.add_done_callback(self._sent.discard)
 
     def _data(self, name: str) -> Any:
-        return self.document.get_model_by_name(name).data  # type: ignore[union-attr]
+        return self.document.get_model_by_name(name).data
 
     async def _send(self, message: Any) -> int:
         sent: int = await message.send(self._connection)

@@ -24,7 +24,7 @@ MS = 1_000_000
 
 
 def channel(age_limit_ms: int = 1000, **effects: object) -> Channel[int]:
-    return Channel(Effects(**effects), "1 r1 -> r2", age_limit_ms * MS)  # type: ignore[arg-type]
+    return Channel(Effects(**effects), "1 r1 -> r2", age_limit_ms * MS)
 
 
 def trace(*delays_ms: float) -> TraceDelay:

@@ -41,7 +41,7 @@ def awaiting(arrivals: dict[float, str], within_s: float) -> tuple[Place, float]
     hellos = Hellos(EVERY_S, clock=clock)
     hellos.add(place, b"hello")
     await_hellos(
-        place,  # type: ignore[arg-type]
+        place,
         hellos,
         lambda arrival: missing.discard(arrival.tag),
         lambda: sorted(missing),

@@ -12,7 +12,7 @@ TABLE = age_signals(["r1"])
 
 
 def edge(**options: object) -> LiveEdge:
-    one = InEdge("r1", **options)  # type: ignore[arg-type]
+    one = InEdge("r1", **options)
     return LiveEdge(one, "r2", TABLE, share_period_s=SHARE_S, period_s=PERIOD_S)
 
 
@@ -20,7 +20,7 @@ def ages(ticks: int, arrives: object) -> np.ndarray:
     """Ages of an edge whose message arrives at ticks k share with `arrives(k)`."""
     made, age_s, every = [], 0.0, round(SHARE_S / PERIOD_S)
     for tick in range(ticks):
-        fresh = tick % every == 0 and arrives(tick // every)  # type: ignore[operator]
+        fresh = tick % every == 0 and arrives(tick // every)
         age_s = 0.0 if fresh else age_s + PERIOD_S
         made.append([age_s])
     return np.array(made)

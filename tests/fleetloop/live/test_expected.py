@@ -38,7 +38,7 @@ def fed(scenario: Scenario, ran: RanInProcess, first: int, upto: int) -> LiveExp
     for robot, table in tables(scenario).items():
         for source, width in (("plant", len(PLANT_SIGNALS)), ("controller", len(table))):
             rows = np.frombuffer(ran.rows[robot, source]).reshape(-1, width)
-            live.add(robot, source, first, rows[first:upto])  # type: ignore[arg-type]
+            live.add(robot, source, first, rows[first:upto])
     return live
 
 

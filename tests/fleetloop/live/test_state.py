@@ -38,7 +38,7 @@ def sizes(scenario: Scenario) -> dict[tuple[str, str], int]:
 def tell(state: LiveState, ran: RanInProcess, first: int, upto: int) -> None:
     for (robot, source), size in sizes(state.scenario).items():
         block = ran.rows[robot, source][first * size : upto * size]
-        state.hear(robot, source, first, block)  # type: ignore[arg-type]
+        state.hear(robot, source, first, block)
 
 
 def told(scenario: Scenario, ran: RanInProcess) -> LiveState:
@@ -143,7 +143,7 @@ def test_a_robot_without_rows_holds_up_no_other(scenario: Scenario, ran: RanInPr
         for (robot, source), size in sizes(scenario).items():
             if robot == "r1" or first < 2 * BLOCK:
                 block = ran.rows[robot, source][first * size : (first + BLOCK) * size]
-                state.hear(robot, source, first, block)  # type: ignore[arg-type]
+                state.hear(robot, source, first, block)
         state.settle()
     rows = state.history.since(0)
     assert len(rows) == state.schedule.ticks // state.stride

@@ -317,7 +317,7 @@ def test_when_all_faults_of_a_bus_have_ended_nothing_is_left_of_them(
         assert not fleet.bus().wire._apart
         assert not fleet.bus().wire.faults.acting
     else:
-        assert not fleet.run._buses["r1"]._interference.acts  # type: ignore[attr-defined]
+        assert not fleet.run._buses["r1"]._interference.acts
 
 
 def test_a_silent_drive_in_a_cut_bus_joins_the_other_one_when_it_speaks_again() -> None:
