@@ -69,7 +69,8 @@ class RunClient:
 
         Raises:
             RefusedError: the run says why not.
-            InfrastructureError: the run has ended, or doesn't answer in time.
+            RunEndedError: the run has ended.
+            InfrastructureError: it doesn't answer in time.
         """
         self._socket.settimeout(within_s)
         line = json.dumps({"request": request, **arguments}).encode() + b"\n"
@@ -77,10 +78,12 @@ class RunClient:
             self._socket.sendall(line)
             while b"\n" not in self._unread:
                 if not (more := self._socket.recv(_READ_BYTES)):
-                    raise RunEndedError(f"{self.run}: the run ended before it answered")
+                    raise BrokenPipeError
                 self._unread += more
         except TimeoutError as error:
             raise InfrastructureError(f"{self.run}: no answer in {within_s:g} s") from error
+        except ConnectionError as error:
+            raise RunEndedError(f"{self.run}: the run ended before it answered") from error
         except OSError as error:
             raise InfrastructureError(f"{self.run}: {error.strerror or error}") from error
         answer, _, self._unread = self._unread.partition(b"\n")
@@ -112,7 +115,8 @@ class RunClient:
         """
         self.ask("controls.take", who=who, force=force)
         yield
-        self.ask("controls.release")
+        with contextlib.suppress(RunEndedError):  # it has none any more
+            self.ask("controls.release")
 
     def close(self) -> None:
         """End the connection."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from configs.errors import InfrastructureError
-from fleetloop.door.client import ANSWER_S, RefusedError
+from fleetloop.door.client import ANSWER_S, RefusedError, RunEndedError
 
 _MOST_LINE_BYTES = 1 << 24
 """Of an answer."""
@@ -49,10 +49,11 @@ class RunDoor:
 
         Raises:
             RefusedError: the run says why not.
-            InfrastructureError: the run has ended, or doesn't answer in time.
+            RunEndedError: the run has ended.
+            InfrastructureError: it doesn't answer in time.
         """
         if not self.open_:
-            raise InfrastructureError("the run has ended")
+            raise RunEndedError("the run has ended")
         number = next(self._numbers)
         answer: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
         self._asked[number] = answer
@@ -91,4 +92,4 @@ class RunDoor:
             self.open_ = False
             for waiting in self._asked.values():
                 if not waiting.done():
-                    waiting.set_exception(InfrastructureError("the run has ended"))
+                    waiting.set_exception(RunEndedError("the run has ended"))

@@ -23,10 +23,9 @@ def steer(
         ScenarioError: there is no such run, or it refuses.
         InfrastructureError: it doesn't answer.
     """
-    with open_run(run) as client:
-        client.ask("controls.take", who=WHO, force=force)
+    with open_run(run) as client, client.controlled(WHO, force=force):
         said = client.ask(request, **arguments)
-        name = client.run  # the controls go with the connection
+        name = client.run
     if as_json:
         say_json({"run": name} | said)
     else:
