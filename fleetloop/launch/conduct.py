@@ -314,7 +314,7 @@ class Concluded(NamedTuple):
     record: Record
     summary: Summary
     unsaved: InfrastructureError | None
-    """Why the summary, the events of the record, or the layout could not be written."""
+    """Why the summary, the scenario, or the events of the record could not be written."""
 
 
 def conclude(scenario: Scenario, carried: Carried) -> Concluded:
