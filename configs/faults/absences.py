@@ -22,6 +22,10 @@ class Absence(NamedTuple):
     frozen: bool
     """Whether the process is there; otherwise it is killed."""
 
+    def lasts_at(self, tick: int) -> bool:
+        """Whether the controller is absent at a tick."""
+        return self.from_tick <= tick and (self.to_tick is None or tick < self.to_tick)
+
     def ended(self, tick: int) -> "Absence":
         """The same, ended at a tick if not before; it lasts for a tick at least."""
         if self.to_tick is not None and self.to_tick <= tick:

@@ -284,6 +284,21 @@ def test_no_fault_of_a_process_is_ordered_of_one_that_is_absent() -> None:
     bench.inject(kind="process_slow", robots=["r1"])
 
 
+def test_one_that_was_killed_is_absent_before_it_is_seen_to_have_ended() -> None:
+    bench = Bench(REALTIME)
+    bench.inject(kind="process_kill", robots=["r2"])
+    bench.answer("agent/r2", 1100)
+    bench.tick = 1100
+    bench.desk.look()
+    with pytest.raises(ScenarioError, match="r2: its controller is absent: process_slow can't act"):
+        bench.inject(kind="process_slow", robots=["r2"])
+    # What concerns its links is told to it when it is started again, and awaited of nobody.
+    bench.inject(kind="link_loss", edges=["r1 -> r2"], probability=0.5)
+    bench.tick = 1200
+    bench.desk.look()
+    assert bench.answers[-1]["fault"]["name"] == "link_loss"
+
+
 def test_where_none_could_come_again_none_is_ordered_to_or_started() -> None:
     bench = Bench()
     with pytest.raises(
