@@ -16,7 +16,7 @@ import sys
 import traceback
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import Enum
 from pathlib import Path
 from types import ModuleType
@@ -328,6 +328,18 @@ class Choice:
     def load(self) -> Any:
         """The class."""
         return load(self.plugin)
+
+    def __getattr__(self, key: str) -> Any:
+        """A parameter, as the file's table has it: `scenario.control.k1`."""
+        if key.startswith("_"):
+            raise AttributeError(key)
+        return getattr(self.parameters, key)
+
+    def __dir__(self) -> list[str]:
+        return [*object.__dir__(self), *(one.name for one in fields(self.parameters))]
+
+    def __repr__(self) -> str:
+        return f"{self.name}: {self.parameters}"
 
     def __reduce__(self) -> Any:
         return _restored, (self.plugin, pickle.dumps(self.parameters))

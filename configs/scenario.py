@@ -129,6 +129,8 @@ class Scenario(BaseModel):
         """
         from configs.loading import changed as changed_scenario
 
+        if not isinstance(changes, Mapping | None):
+            raise TypeError(f"with_({changes!r}): keys and values, as {{'control.k1': 3.0}}")
         return changed_scenario(self, {**(changes or {}), **sections})
 
     def to_toml(self) -> str:

@@ -228,13 +228,17 @@ def fleetloop_run(tmp_path: Path) -> "Callable[..., Run]":
         allow_unchecked: bool = False,
         **options: Any,
     ) -> "Run":
+        __tracebackhide__ = True
         import fleetloop
 
         number = sum(1 for _ in tmp_path.glob("run-*")) + 1
-        made = fleetloop.run(scenario, **({"out": tmp_path / f"run-{number}"} | options))
         try:
+            made = fleetloop.run(scenario, **({"out": tmp_path / f"run-{number}"} | options))
             return made.raise_for_verdict(allow_unchecked=allow_unchecked) if must_hold else made
         except fleetloop.NotHeldError as error:
-            pytest.fail(f"{error}\n{made.folder}", pytrace=False)
+            words = f"{error}\n{made.folder}"
+        except fleetloop.FleetloopError as error:
+            words = str(error)
+        pytest.fail(words)
 
     return run

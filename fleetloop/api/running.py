@@ -43,7 +43,7 @@ END_S = 20.0
 """Longest time of an orderly end over processes, from Ctrl-C on."""
 WORDS = Words(
     in_process="in_process=True",
-    lockstep='with_(clock={"mode": "lockstep"})',
+    lockstep='in_process=False, or with_(clock={"mode": "lockstep"})',
     speed="speed =",
     deployment="deployment =",
     force="force=True",

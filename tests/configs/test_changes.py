@@ -118,3 +118,18 @@ def test_a_scenario_shows_itself_in_one_line(small: Scenario) -> None:
     assert repr(small) == (
         "Scenario('small', robots=2, law='adaptive_dsc', until_s=30.0, clock='lockstep', seed=1)"
     )
+
+
+def test_parameters_of_a_law_are_read_as_they_are_changed(small: Scenario) -> None:
+    control = small.with_(control={"k1": 3.0}).control
+    assert (control.k1, control.parameters.k1) == (3.0, 3.0)
+    assert "k1" in dir(control)
+    assert repr(control).startswith("adaptive_dsc: AdaptiveDsc.Gains(k1=3.0, ")
+    assert pickle.loads(pickle.dumps(control)) == control
+    with pytest.raises(AttributeError, match="k9"):
+        control.k9  # noqa: B018
+
+
+def test_changes_are_keys_and_values(small: Scenario) -> None:
+    with pytest.raises(TypeError, match="keys and values, as"):
+        small.with_("control.k1=3.0")

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -258,3 +259,36 @@ def test_the_plant_alone_answers_cansend_and_candump(tmp_path) -> None:
         question, answer = seen.splitlines()
         assert "remote request" in question
         assert bytes.fromhex(answer.split("]")[1])[:4] == np.float32(24.0).tobytes()
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_the_example_host_in_c_drives_and_notices_an_emergency_stop(tmp_path) -> None:
+    source = Path(__file__).parents[2] / "examples" / "host_socketcan.c"
+    program = tmp_path / "host_socketcan"
+    subprocess.run(["cc", "-std=c11", "-o", program, source], check=True, timeout=30)
+    deployment = on_socketcan(tmp_path, BOTH)
+    options = {"overrides": ["drive.watchdog_s=1.0"], "deployment": deployment}
+    with EmulatedPlant(SCENARIO, robots=["r1"], **options) as plant:
+        before = plant.poses()["r1"]
+        command = [program, "vcan0", "0.3"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=30)
+        assert (done.returncode, done.stderr) == (0, "")
+        lines = done.stdout.splitlines()
+        assert (lines[0], lines[-1], len(lines)) == ("armed", "idle", 2 + 21)  # ten a second
+        after = plant.poses()["r1"]
+        assert np.hypot(after.x_m - before.x_m, after.y_m - before.y_m) > 0.1
+        # In the second run an emergency stop comes as soon as it drives.
+        host = subprocess.Popen(
+            ["stdbuf", "-oL", *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        try:
+            assert host.stdout is not None
+            assert host.stdout.readline() == "armed\n"
+            plant.inject("drive_estop", robots=["r1"])
+            out, error = host.communicate(timeout=30)
+        finally:
+            host.kill()
+        assert host.returncode == 1
+        assert re.match(r"host_socketcan: node [01]: errors, state 1, errors 0x02000000\n", error)
+        assert out.endswith("idle\n")
+        assert plant.poses()["r1"].torque_right_wheel_N_m == 0.0

@@ -11,6 +11,7 @@ MADE = HOME / "docs" / "reference"
 """Pages that are made of the types in the code: see tests/docs/test_reference.py."""
 PAGES = (
     HOME / "README.md",
+    HOME / "examples" / "README.md",
     *(page for page in sorted((HOME / "docs").rglob("*.md")) if MADE not in page.parents),
 )
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)

@@ -26,3 +26,8 @@ def test_one_that_ends_before_its_expectations_may_be_let_through(fleetloop_run)
     with pytest.raises(pytest.fail.Exception, match="not reached"):
         fleetloop_run(cut)
     assert fleetloop_run(cut, allow_unchecked=True).verdict == "not checked"
+
+
+def test_a_scenario_that_can_not_be_run_fails_in_the_words_of_its_error(fleetloop_run) -> None:
+    with pytest.raises(pytest.fail.Exception, match="no shipped scenario of that name"):
+        fleetloop_run("two_robts")
