@@ -68,7 +68,8 @@ def test_commands_that_are_shown_are_understood() -> None:
     assert seen > 30
 
 
-OURS = re.compile(r"(\.uv/bin/)?(uv run )?fleetloop ")
+OURS = re.compile(r"(\.uv/bin/)?(uv run )?fleetloop |python host\.py( --channel r2|  )")
+"""Also what tests/examples runs."""
 PLACES = re.compile(r"\. \.venv/bin/activate$|mkdir \S+ && cd \S+$")
 
 

@@ -1,5 +1,6 @@
 """The hosts of examples/ drive emulated drives, notice what goes wrong, and leave them idle."""
 
+import shlex
 import shutil
 import signal
 import subprocess
@@ -10,12 +11,15 @@ from tempfile import TemporaryDirectory
 
 import can
 import pytest
+from support.snippets import snippets
 
 from fleetloop.testing import EmulatedPlant
 
 HERE = Path(__file__).resolve().parents[2] / "examples"
 WARNINGS = ("-std=c11", "-Wall", "-Wextra", "-Werror")
 END_S = 30.0
+CALM = ("drive.watchdog_s=1.0",)
+"""A busy machine is no reason to disarm."""
 pytestmark = pytest.mark.system
 
 
@@ -26,8 +30,7 @@ def plant() -> Iterator[EmulatedPlant]:
         TemporaryDirectory(prefix="fl-", dir="/tmp") as folder,
     ):
         patch.setenv("FLEETLOOP_RUNTIME", f"{folder}/r")
-        calm = ["drive.watchdog_s=1.0"]  # a busy machine is no reason to disarm
-        with EmulatedPlant("two_robots_100hz", robots=["r1"], overrides=calm) as started:
+        with EmulatedPlant("two_robots_100hz", robots=["r1"], overrides=CALM) as started:
             yield started
 
 
@@ -74,6 +77,22 @@ def test_it_clears_errors_arms_drives_forward_and_leaves_the_drives_idle(
     assert (lines[2], lines[-1]) == ("armed", "idle")
     assert plant.poses()["r1"].y_m > before.y_m + 0.1  # it looks along y
     assert states(plant) == {0: 1, 1: 1}
+
+
+def test_the_programs_of_its_page_drive_the_robots_that_they_name(fleetloop_plant) -> None:
+    plant = fleetloop_plant("two_robots_100hz", overrides=CALM)
+    shown = next(one.text for one in snippets("sh") if one.where.startswith("examples/"))
+    commands = [
+        shlex.split(line, comments=True)[1:] for line in shown.splitlines() if "python" in line
+    ]
+    before = plant.poses()
+    hosts = [
+        subprocess.Popen([sys.executable, *command], cwd=HERE, stdout=subprocess.DEVNULL)
+        for command in commands
+    ]
+    assert [one.wait(END_S) for one in hosts] == [0, 0]
+    after = plant.poses()
+    assert all(after[robot].y_m > before[robot].y_m + 0.1 for robot in ("r1", "r2"))
 
 
 def test_an_error_of_one_drive_stops_both(plant: EmulatedPlant) -> None:
