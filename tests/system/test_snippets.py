@@ -29,6 +29,7 @@ PYTHON_PAGE, DOOR = "docs/python.md:", "import fleetloop\n"
 POSES = "motion_capture()"  # in test_real_robot.py
 OWN = "# my_law.py", "# my_shapes.py", "# my_analysed_law.py"  # in tests of own laws
 WALKED = "# chase.py", "# my_path.py", "# my_drive.py"  # in tests/docs/test_pages.py
+READERS = "# rows.py", "# messages.py"  # in tests/fleetloop/record/test_stock_readers.py
 
 
 def shown(mark: str) -> list[Snippet]:
@@ -41,7 +42,7 @@ def test_every_program_that_is_shown_is_tried_here() -> None:
     for snippet in snippets("python"):
         if snippet.where.startswith(PYTHON_PAGE) or snippet.text.startswith(DOOR):
             continue  # in tests/fleetloop/api/test_page.py
-        marks = (LISTENS, FROM_AFAR, FIXTURE, SERIAL, POSES, *OWN, *WALKED)
+        marks = (LISTENS, FROM_AFAR, FIXTURE, SERIAL, POSES, *OWN, *WALKED, *READERS)
         assert sum(mark in snippet.text for mark in marks) == 1, snippet.where
 
 

@@ -52,7 +52,7 @@ def test_a_temporary_folder_goes_with_its_run_unless_it_is_saved(
 def test_a_named_folder_is_left_as_the_command_leaves_it(short: Scenario, tmp_path: Path) -> None:
     run = fleetloop.run(short, out=tmp_path / "mine")
     assert run.folder == tmp_path / "mine"
-    assert {"record.mcap", "summary.json", "scenario.toml"} <= {
+    assert {"record.mcap", "summary.json", "scenario.toml", "layout.json"} <= {
         path.name for path in run.folder.iterdir()
     }
     with pytest.raises(ScenarioError, match="mine: exists and is not an empty folder"):
