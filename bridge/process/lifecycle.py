@@ -71,6 +71,11 @@ class Stop:
         """The launcher has heard the last word, or will never hear it."""
         os.eventfd_write(self.release_fd, 1)
 
+    @property
+    def released(self) -> bool:
+        """Whether the launcher has let go."""
+        return bool(readable([self.release_fd], 0.0))
+
     def end(self, reason: str) -> None:
         """There is no launcher any more: stop, and don't wait for it to have the last word."""
         self.request(reason)

@@ -82,6 +82,7 @@ class WholeRun:
         except RecordError as error:
             found = Result(self.cell, Verdict.ERROR, str(error))
         finally:
+            run.close()
             shutil.rmtree(self.folder, ignore_errors=True)
         wall_s = round(SYSTEM_CLOCK.monotonic_s() - began_s, 3)
         return replace(found, command=again, wall_s=wall_s)

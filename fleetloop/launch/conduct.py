@@ -5,6 +5,7 @@ carry_out   the run: its folder, its processes or none, its statistics
 conclude    its summary and events, from the record
 """
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -178,6 +179,8 @@ class Carried(NamedTuple):
 
     folder: Path
     stats: RunStats
+    close: Callable[[], None] = lambda: None
+    """Ends what outlives the run until its summary is written."""
 
 
 def carry_out(
@@ -204,16 +207,17 @@ def carry_out(
         run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
         run_folder.write(folder / LAYOUT, layout_of(scenario))
         if manner.in_process:
-            stats = run_in_process(scenario, folder, listener, stop)
+            carried = Carried(folder, run_in_process(scenario, folder, listener, stop))
         else:
-            stats = _run_over_processes(scenario, folder, manner, deployment, listener, stop)
+            carried = _run_over_processes(scenario, folder, manner, deployment, listener, stop)
     except InfrastructureError:
         run_folder.discard(created)
         raise
-    if not stats.began:
+    if not carried.stats.began:
+        carried.close()
         run_folder.discard(created)
-    stats.started = local_date(started_ns).isoformat()
-    return Carried(folder, stats)
+    carried.stats.started = local_date(started_ns).isoformat()
+    return carried
 
 
 def _run_over_processes(
@@ -223,7 +227,7 @@ def _run_over_processes(
     deployment: Deployment,
     listener: Listener,
     stop: Stop,
-) -> RunStats:
+) -> Carried:
     name = f"{folder.name}-{SYSTEM_CLOCK.monotonic_ns() % 1_000_000:06d}"
     run = ProcessRun(
         scenario,
@@ -238,11 +242,12 @@ def _run_over_processes(
         live=manner.live,
     )
     listener.on_start(Start(folder, run.name, run.processes, run.robots))
-    return stats_of(
+    stats = stats_of(
         run.run(stop),
         realtime=scenario.clock.mode == "realtime",
         period_s=scenario.clock.control_period_s,
     )
+    return Carried(folder, stats, run.close)
 
 
 def run_in_process(
@@ -328,7 +333,11 @@ def conclude(scenario: Scenario, carried: Carried) -> Concluded:
         RecordError: the record can't be read.
         InfrastructureError: the record is gone.
     """
-    folder, stats = carried
+    with contextlib.closing(carried):
+        return _concluded(scenario, carried.folder, carried.stats)
+
+
+def _concluded(scenario: Scenario, folder: Path, stats: RunStats) -> Concluded:
     path = folder / run_folder.RECORD
     if not path.exists():
         gone = stats.reason or f"{path} is not there: the run's folder was removed or moved"

@@ -150,7 +150,7 @@ class ProcessRun:
         return self._plane.outcome
 
     def run(self, stop: Stop) -> Outcome:
-        """Run to the end, to a failure or to a stop; nothing that was started is left.
+        """Run to the end, to a failure or to a stop; of what was started a viewer may be left.
 
         Raises:
             InfrastructureError: the run could not start.
@@ -178,9 +178,16 @@ class ProcessRun:
             self.outcome.faults = self._asked.faults.ledger.rows(self.outcome.ticks)
             self.outcome.steered = self._asked.steering.steered
             complete(self._plane, link)
+        except BaseException:
+            self.close()
+            raise
         finally:
             end(self._plane.children, grace_s=0.0)
         return self.outcome
+
+    def close(self) -> None:
+        """End a viewer that is left; it shows the summary of the run first. Idempotent."""
+        self._viewer.close()
 
     # --- start -------------------------------------------------------------------------------
 
@@ -200,7 +207,7 @@ class ProcessRun:
                 spawn(self._orders, self._links, folder, fork_server, self._plane.children)
             if granted := placement.bus_guests(self._deployment):
                 open_.enter_context(Relay(link, folder, scenario.buses, granted))
-            open_.enter_context(self._viewer)
+            open_.callback(self._viewer.stop)
             yield link
 
     @contextlib.contextmanager

@@ -4,8 +4,8 @@
     live.open        -             url: of the page, once it listens; the same at the next time
     live.listening   token, url    -: the viewer itself says where its page is
 
-It takes no part in the run: its end is a notice, after which it may be asked for again. The run's
-end ends it.
+It takes no part in the run: its end is a notice, after which it may be asked for again. It outlives
+the run until its summary is written, which it shows.
 """
 
 import contextlib
@@ -15,7 +15,6 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Mapping
-from typing import Self
 
 from bridge.process.lifecycle import Status, pack_brief
 from configs.brief import ViewerBrief
@@ -25,11 +24,11 @@ from fleetloop import packages
 from fleetloop.door.requests import Request, Respond
 
 STOP_S = 2.0
-"""From asking it to stop until it is killed."""
+"""From letting go of it until it is killed."""
 
 
 class Viewer:
-    """Starts and ends the viewer; a context manager that ends it.
+    """Starts and ends the viewer.
 
     Args:
         brief: of its token; None: this run can have no viewer.
@@ -79,12 +78,18 @@ class Viewer:
             self._answer({"error": f"the viewer: no page within {self._start_deadline_s:g} s"})
             self.close()
 
+    def stop(self) -> None:
+        """Tell it that no rows follow; it stays until `close`."""
+        if self._process is not None:
+            self._process.send_signal(signal.SIGTERM)
+
     def close(self) -> None:
-        """End its process within a bound. Idempotent."""
+        """End its process within a bound; the summary of the run is written. Idempotent."""
         process, self._process = self._process, None
         if process is None:
             return
-        process.send_signal(signal.SIGTERM)
+        # Closing waits for a brief that isn't read yet.
+        threading.Thread(target=_let_go, args=(process,), daemon=True).start()
         try:
             process.wait(STOP_S)
         except subprocess.TimeoutExpired:
@@ -168,19 +173,20 @@ class Viewer:
                 with contextlib.suppress(OSError):
                     end.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
 
 def _hand_over(process: subprocess.Popen[bytes], brief: ViewerBrief) -> None:
-    """Write the brief; the pipe stays open, as the viewer's lifeline."""
+    """Write the brief; the pipe stays open, as the viewer's lifeline, until `Viewer.close`."""
     if process.stdin is not None:
         with contextlib.suppress(OSError, ValueError):
             process.stdin.write(pack_brief(brief))
             process.stdin.flush()
+
+
+def _let_go(process: subprocess.Popen[bytes]) -> None:
+    """Close the lifeline."""
+    if process.stdin is not None:
+        with contextlib.suppress(OSError):
+            process.stdin.close()
 
 
 def _how(code: int) -> str:

@@ -2,10 +2,11 @@
 
 Started by the launcher when the run's door is asked for it (`fleetloop.launch.viewer`). It yields
 the processor to everything else (nice 19), and its end is nothing to the run. Asked to stop, it
-shows the verdict to those who look, and goes.
+takes the last rows; once the launcher lets go of it, it shows the run's verdict, and goes.
 """
 
 import asyncio
+import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -122,11 +123,24 @@ async def _serve(brief: ViewerBrief, link: Link, stop: Stop) -> str:
         task.cancel()
     for arrival in waiting(link):
         heard.take(arrival)
-    hub.end("ended")
+    link.close()
+    hub.end()
+    while not stop.released:
+        await asyncio.sleep(_DRAIN_S)
+    hub.conclude(_summary(Path(brief.folder)))
     await hub.shown(_LAST_LOOK_S)
     server.stop()
     await door.close()
     return f"{state.tick + 1} ticks seen"
+
+
+def _summary(folder: Path) -> Mapping[str, Any] | None:
+    """The summary of the run; None: it has none."""
+    try:
+        summary: dict[str, Any] = json.loads((folder / run_folder.SUMMARY).read_bytes())
+    except (OSError, ValueError):
+        return None
+    return summary
 
 
 def run(brief: ViewerBrief, stop: Stop) -> str:

@@ -35,7 +35,7 @@ function showControls() {
   at("speed_group").hidden = facts.realtime;
   at("holder").textContent = board.ended ? "The run has ended." : mine ? "You have the controls." : outside || holder ? `Read only: ${outside || holder} has the controls.` : "Read only.";
   at("holder").title = you;
-  at("take").hidden = mine || board.ended !== "";
+  at("take").hidden = mine || board.ended;
   at("take").disabled = Boolean(outside);
   const speed = board.run.speed;
   if (finite(speed) && document.activeElement !== at("speed")) {
@@ -168,7 +168,7 @@ function lost() {
   const ended = board !== null && board.ended;
   at("state").textContent = ended ? "ended" : "no connection"; at("state").className = `pill ${ended ? "ended" : "failed"}`;
   if (!ended) say("The connection to the run is lost. What is drawn stays; load the page again to go on.", true);
-  if (board) { board.ended = board.ended || "lost"; showControls(); }
+  if (board) { board.ended = true; showControls(); }
   at("holder").textContent = ended ? "The run has ended." : "No connection.";
 }
 begin();

@@ -76,6 +76,7 @@ class Hub:
         self._tasks: set[asyncio.Task[None]] = set()  # orders on their way
         self._settled_s = self._judged_s = 0.0
         self._judging_s = _JUDGE_EVERY_S
+        self._concluded = False
 
     # --- viewers ----------------------------------------------------------------------------------
 
@@ -112,7 +113,7 @@ class Hub:
     def _push(self, viewer: Viewer) -> None:
         if not viewer.there:
             return
-        if self.state.ended:
+        if self._concluded:
             viewer.page.push_last(partial(self.board, viewer))
             return
         self.advance()
@@ -125,11 +126,17 @@ class Hub:
             self._settled_s = now_s
             self.state.settle()
 
-    def end(self, how: str) -> None:
-        """The run has ended: each viewer gets the last of everything, and the verdict."""
+    def end(self) -> None:
+        """The run has ended: no rows follow."""
         self.state.settle()
         self.state.judge()
-        self.state.ended, self.state.final = how, self.state.verdict()
+        self.state.ended = True
+
+    def conclude(self, summary: Mapping[str, Any] | None) -> None:
+        """Give each viewer the last of everything, with the run's verdict if it has a summary."""
+        if summary is not None:
+            self.state.conclude(summary)
+        self._concluded = True
 
     async def shown(self, within_s: float) -> None:
         """Wait until all browsers that are there have drawn the last frame, at most so long."""
@@ -165,14 +172,14 @@ class Hub:
                 "source": event.source,
                 "kind": event.kind,
                 "text": event.text,
-                "told": KINDS[event.kind].told,
+                "gravity": KINDS[event.kind].gravity.name.lower(),
             }
             for event in state.events[since:]
         ]
         return {
             "run": state.status,
             "ended": state.ended,
-            "verdict": state.final,
+            "verdict": state.verdict,
             "controls": {
                 "you": viewer.name,
                 "yours": self.controls.holder == viewer.name,

@@ -108,8 +108,7 @@ function showEvents() {
   const list = at("events"), low = list.scrollHeight - list.scrollTop - list.clientHeight < 30;
   const fresh = board.events.items.slice(Math.max(0, known_events - board.events.first));
   for (const one of fresh) {
-    const alarm = /stopped|diverged|error|killed|silent|cut_off|trouble/.test(one.kind) ? "failed" : /fault|held|frozen|dropped/.test(one.kind) ? "open" : "";
-    list.append(el("li", {class: alarm}, el("span", {class: "num muted"}, `${number(one.t_s, 3)} s`), el("b", {}, one.source), el("span", {}, one.kind.replaceAll("_", " "), one.text ? el("span", {class: "muted"}, ` ${one.text}`) : null)));
+    list.append(el("li", {class: {error: "failed", warning: "open"}[one.gravity]}, el("span", {class: "num muted"}, `${number(one.t_s, 3)} s`), el("b", {}, one.source), el("span", {}, one.kind.replaceAll("_", " "), one.text ? el("span", {class: "muted"}, ` ${one.text}`) : null)));
   }
   known_events = Math.max(known_events, board.events.next);
   while (list.children.length > 500) list.firstChild.remove();

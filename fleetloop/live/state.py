@@ -21,7 +21,6 @@ from configs.signals import PLANT_SIGNALS, Signal
 from fleetloop.live.edges import LiveEdge, cut_edges
 from fleetloop.live.expected import LiveExpectations, Source
 from fleetloop.live.series import History, Track
-from fleetloop.results.expectations import verdict
 
 SAMPLE_S = 0.01
 """A bin of the series, in scenario time, or a tick if that is longer."""
@@ -106,8 +105,9 @@ class LiveState:
         self.faults: Sequence[Mapping[str, Any]] = ()
         self.events: list[Event] = []
         self.events_known = False
-        self.ended = self.final = ""
-        """How the run ended and its verdict, once it has."""
+        self.ended = False
+        self.verdict = ""
+        """The run's own, once its summary is there."""
 
     # --- feeding ----------------------------------------------------------------------------------
 
@@ -144,6 +144,11 @@ class LiveState:
         events = in_order(self.events, self.robots) if self.events_known else None
         self.expectations.judge(events)
 
+    def conclude(self, summary: Mapping[str, Any]) -> None:
+        """The run's own verdict and expectations, from its summary."""
+        self.verdict = summary["verdict"]
+        self.expectations.judged = summary["expectations"]
+
     # --- what is drawn ----------------------------------------------------------------------------
 
     @property
@@ -176,19 +181,6 @@ class LiveState:
                 edge.note_age(age_s)
         rows = [(edge.age_s, edge.lost, edge.state(cut)) for edge in self.edges]
         return np.array(rows, dtype=float).reshape(-1, 3)
-
-    def verdict(self) -> str:
-        """The verdict on what was heard, of a run that has ended."""
-        judged = self.expectations.judged
-        short = self.tick + 1 < self.schedule.ticks
-        stopped = any(it.kind in ("stopped", "diverged") for it in self.events)
-        return verdict(judged, stopped=stopped and not self._drives_again(), cut_short=short)
-
-    def _drives_again(self) -> bool:
-        """Whether each robot that stopped arms again afterwards."""
-        last = {it.source: it.kind for it in self.events if it.kind in ("stopped", "rearmed")}
-        diverged = any(it.kind == "diverged" for it in self.events)
-        return not diverged and "stopped" not in last.values()
 
     # --- series -----------------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HT
 from tornado.websocket import websocket_connect
 
 from configs.errors import ScenarioError
+from configs.events import Event
 from configs.loading import load
 from configs.scenario import Scenario
 from fleetloop.live.hub import Hub
@@ -219,6 +220,36 @@ def test_a_slow_browser_is_skipped_and_goes_on_where_it_is(scenario: Scenario) -
             await page.take()
         page.set("heard", {"frame": [1e9]})
         page.set("heard", {"frame": ["x"]})
+        page.close()
+
+    served(scenario, test)
+
+
+def test_events_have_the_gravity_of_their_kind(scenario: Scenario) -> None:
+    async def test(bench: Bench) -> None:
+        for kind in ("diverged", "stopped", "joined"):
+            bench.hub.state.note_events([Event(3, "r1", kind, "")])
+        page = await HeadlessPage.open(bench.address)
+        board = await page.until(lambda it: it["events"]["items"] != [])
+        told = {one["kind"]: one["gravity"] for one in board["events"]["items"]}
+        assert told == {"diverged": "error", "stopped": "warning", "joined": "info"}
+        page.close()
+
+    served(scenario, test)
+
+
+def test_after_the_end_the_verdict_is_that_of_the_runs_summary(scenario: Scenario) -> None:
+    async def test(bench: Bench) -> None:
+        page = await HeadlessPage.open(bench.address)
+        bench.hub.end()
+        assert (await page.until(lambda it: it["ended"]))["verdict"] == ""
+        judged = [{"claim": "it holds", "held": True}]
+        bench.hub.conclude({"verdict": "interrupted", "expectations": judged})
+        board = await page.until(lambda it: it["verdict"])
+        assert (board["verdict"], board["expectations"]) == ("interrupted", judged)
+        (viewer,) = bench.hub.viewers.values()
+        while not viewer.page.has_last:
+            await page.take()
         page.close()
 
     served(scenario, test)
