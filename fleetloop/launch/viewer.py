@@ -9,12 +9,14 @@ the run until its summary is written, which it shows.
 """
 
 import contextlib
+import os
 import secrets
 import signal
 import subprocess
 import sys
 import threading
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 from bridge.process.lifecycle import Status, pack_brief
 from configs.brief import ViewerBrief
@@ -23,6 +25,8 @@ from configs.roles import VIEWER
 from fleetloop import packages
 from fleetloop.door.requests import Request, Respond
 
+NICE = 19
+"""Of all its threads: they are started after it is set."""
 STOP_S = 2.0
 """From letting go of it until it is killed."""
 
@@ -136,6 +140,7 @@ class Viewer:
             raise InfrastructureError(f"can't start the viewer: {error.strerror}") from error
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        _yield_processor(process.pid)
         self._process, self._token = process, token
         self._deadline_s = self._now_s() + self._start_deadline_s
         # It reads once it has imported its libraries; the launcher doesn't wait for that.
@@ -180,6 +185,17 @@ def _hand_over(process: subprocess.Popen[bytes], brief: ViewerBrief) -> None:
         with contextlib.suppress(OSError, ValueError):
             process.stdin.write(pack_brief(brief))
             process.stdin.flush()
+
+
+def _yield_processor(pid: int) -> None:
+    """Let everything else run before a process that leads a session of its own.
+
+    Where the kernel groups processes by session (autogroups), nice counts within a session, and
+    that of the group between them.
+    """
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, pid, NICE)
+        Path(f"/proc/{pid}/autogroup").write_text(str(NICE), "ascii")
 
 
 def _let_go(process: subprocess.Popen[bytes]) -> None:

@@ -7,7 +7,6 @@ takes the last rows; once the launcher lets go of it, it shows the run's verdict
 
 import asyncio
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -26,17 +25,21 @@ from configs.resolve import signals_of
 from configs.roles import VIEWER
 from configs.scenario import Scenario
 from fleetloop.live.door import RunDoor
+from fleetloop.live.expected import Source
 from fleetloop.live.hub import Hub
+from fleetloop.live.past import Block, Kept, feed, recorded
 from fleetloop.live.server import LiveServer
 from fleetloop.live.state import LiveState
+from fleetloop.record.scan import RecordError
 from fleetloop.results import run_folder
 
-NICE = 19
 ROOM_BYTES = 1 << 22
 """Of what waits of one source: a viewer that falls behind misses rows."""
 _DRAIN_S, _IDLE_S = 0.02, 0.1
 _STATUS_S, _FAULTS_S = 0.1, 0.5
 _ASK_S = 5.0
+_LOOK_BACK_S, _LEAST_OFTEN_S = 0.5, 8.0
+"""First and longest interval at which the record is read for rows from before."""
 _LAST_ROWS_S, _LAST_LOOK_S = 0.2, 1.0
 """Of the end: for rows that are on their way, and for browsers to draw the verdict."""
 
@@ -46,11 +49,12 @@ class Heard:
 
     Args:
         scenario: of the run.
-        state: takes the rows.
+        hub: has the picture.
     """
 
-    def __init__(self, scenario: Scenario, state: LiveState) -> None:
-        self._state = state
+    def __init__(self, scenario: Scenario, hub: Hub) -> None:
+        self._hub = hub
+        self.kept = Kept()
         self._row_bytes = {
             f"controller/{robot.name}": row_of(signals_of(scenario, robot)).size
             for robot in scenario.robot
@@ -58,7 +62,7 @@ class Heard:
 
     def subscribe(self, link: Link, run: str) -> None:
         """Subscribe to the rows."""
-        for robot in self._state.robots:
+        for robot in self._hub.state.robots:
             link.subscribe(keys.truth(run, robot), f"plant/{robot}", room_bytes=ROOM_BYTES)
             telemetry = keys.telemetry(run, robot)
             link.subscribe(telemetry, f"controller/{robot}", room_bytes=ROOM_BYTES)
@@ -66,10 +70,13 @@ class Heard:
     def take(self, arrival: Arrival) -> None:
         """Take a block of rows; what is none is passed over."""
         rows = Rows.decode(arrival.payload, self._row_bytes[arrival.tag])
-        if rows is not None and rows.length and 0 <= rows.first_tick < self._state.schedule.ticks:
+        state = self._hub.state
+        if rows is not None and rows.length and 0 <= rows.first_tick < state.schedule.ticks:
             source, _, robot = arrival.tag.partition("/")
-            plant = source == "plant"
-            self._state.hear(robot, "plant" if plant else "controller", rows.first_tick, rows.rows)
+            whose: Source = "plant" if source == "plant" else "controller"
+            block = Block(robot, whose, rows.first_tick, rows.rows)
+            self.kept.add(block)
+            state.hear(*block)
 
 
 async def _hear(link: Link, heard: Heard, hub: Hub) -> None:
@@ -82,19 +89,45 @@ async def _hear(link: Link, heard: Heard, hub: Hub) -> None:
         await asyncio.sleep(_DRAIN_S if hub.watched else _IDLE_S)
 
 
+async def _look_back(heard: Heard, hub: Hub, record: Path) -> None:
+    """Rows from before the first that was heard, once the record has them."""
+    wait_s, size = _LOOK_BACK_S, -1
+    while not heard.kept.over:
+        await asyncio.sleep(wait_s)
+        if heard.kept.follow({}):
+            break  # from the beginning
+        wait_s = min(2.0 * wait_s, _LEAST_OFTEN_S)
+        try:
+            if (now := record.stat().st_size) == size:
+                continue
+            size, state = now, LiveState(hub.state.scenario)
+            ends = await asyncio.to_thread(recorded, record, state)
+        except (OSError, RecordError):
+            continue  # it isn't there yet
+        if heard.kept.over:
+            break
+        whole = heard.kept.follow(ends)
+        feed(state, heard.kept.blocks)
+        hub.show(state)
+        if whole:
+            break
+    heard.kept.end()
+
+
 async def _ask(door: RunDoor, hub: Hub) -> None:
     """The run's status, its faults and events, several times a second."""
-    state, since, faults_s = hub.state, 0, 0.0
+    since, faults_s = 0, 0.0
     loop = asyncio.get_running_loop()
     while door.open_:
         try:
-            state.status = await door.ask("run.status", within_s=_ASK_S)
+            status = await door.ask("run.status", within_s=_ASK_S)
             said = await door.ask("run.events", within_s=_ASK_S, since=since)
-            since = said["next"]
+            since, state = said["next"], hub.state
+            state.status = status
             state.note_events(_event(one) for one in said["events"] if one["kind"] in KINDS)
             if loop.time() >= faults_s:
                 faults_s = loop.time() + _FAULTS_S
-                state.faults = (await door.ask("fault.list", within_s=_ASK_S))["faults"]
+                hub.state.faults = (await door.ask("fault.list", within_s=_ASK_S))["faults"]
         except FleetloopError:
             pass  # the run is ending, or stands still; the page goes on with what it has
         await asyncio.sleep(_STATUS_S if hub.watched else 1.0)
@@ -106,16 +139,16 @@ def _event(said: Mapping[str, Any]) -> Event:
 
 async def _serve(brief: ViewerBrief, link: Link, stop: Stop) -> str:
     scenario = loads(run_folder.SCENARIO, brief.scenario_toml, recorded=True)
-    state = LiveState(scenario)
     door = await RunDoor.open(Path(brief.door))
-    hub = Hub(state, door, brief.network.run)
+    hub = Hub(LiveState(scenario), door, brief.network.run)
     server = LiveServer(hub, brief.token)
-    heard = Heard(scenario, state)
+    heard = Heard(scenario, hub)
     heard.subscribe(link, brief.network.run)
     link.declare_live(keys.live(brief.network.run, VIEWER.name))
-    os.nice(NICE)
     await door.ask("live.listening", token=brief.token, url=server.address)
-    tasks = [asyncio.create_task(one) for one in (_hear(link, heard, hub), _ask(door, hub))]
+    record = Path(brief.folder) / run_folder.RECORD
+    going = (_hear(link, heard, hub), _look_back(heard, hub, record), _ask(door, hub))
+    tasks = [asyncio.create_task(one) for one in going]
     while not stop.requested:
         await asyncio.sleep(_IDLE_S)
     await asyncio.sleep(_LAST_ROWS_S)
@@ -131,7 +164,7 @@ async def _serve(brief: ViewerBrief, link: Link, stop: Stop) -> str:
     await hub.shown(_LAST_LOOK_S)
     server.stop()
     await door.close()
-    return f"{state.tick + 1} ticks seen"
+    return f"{hub.state.tick + 1} ticks seen"
 
 
 def _summary(folder: Path) -> Mapping[str, Any] | None:

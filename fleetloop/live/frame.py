@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fleetloop.live.series import CAPACITY
+from fleetloop.live.series import CAPACITY, History
 from fleetloop.live.state import NOW, SERIES, LiveState
 
 HEAD = ("frame", "tick", "t_s", "whole", "rows")
@@ -33,18 +33,22 @@ def legend(state: LiveState) -> dict[str, Any]:
 class Cursor:
     """How far one browser is."""
 
-    __slots__ = ("_number", "_sent", "frames")
+    __slots__ = ("_history", "_number", "_sent", "frames")
 
     def __init__(self) -> None:
         self.frames = 0
-        self._number = 0
-        self._sent = 2 * CAPACITY  # the first frame is a whole one
+        self._number = self._sent = 0
+        self._history: History | None = None
 
     def frame(self, state: LiveState) -> np.ndarray:
-        """The next frame: what is new since the last, or all if the browser's part gets large."""
+        """The next frame: what is new since the last.
+
+        It is all of it if the browser's part gets large, or the history is another one.
+        """
         rows = state.history.since(self._number)
-        whole = self._sent + len(rows) > 2 * CAPACITY
+        whole = state.history is not self._history or self._sent + len(rows) > 2 * CAPACITY
         if whole:
+            self._history = state.history
             rows, self._sent = state.history.since(0), 0
         self._sent += len(rows)
         self._number = state.history.end

@@ -114,10 +114,10 @@ class Hub:
         if not viewer.there:
             return
         if self._concluded:
-            viewer.page.push_last(partial(self.board, viewer))
+            viewer.page.push_last(self.state, partial(self.board, viewer))
             return
         self.advance()
-        viewer.page.push(partial(self.board, viewer))
+        viewer.page.push(self.state, partial(self.board, viewer))
 
     def idle(self) -> None:
         """Nobody looks: keep what waits small, every `_IDLE_SETTLE_S`."""
@@ -125,6 +125,11 @@ class Hub:
         if now_s - self._settled_s >= _IDLE_SETTLE_S:
             self._settled_s = now_s
             self.state.settle()
+
+    def show(self, state: LiveState) -> None:
+        """Show another picture of the run, with what was known beside its rows."""
+        state.take_over(self.state)
+        self.state = state
 
     def end(self) -> None:
         """The run has ended: no rows follow."""
@@ -179,6 +184,7 @@ class Hub:
         return {
             "run": state.status,
             "ended": state.ended,
+            "seen_from_s": state.seen_from_s,
             "verdict": state.verdict,
             "controls": {
                 "you": viewer.name,

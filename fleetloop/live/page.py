@@ -38,12 +38,11 @@ class Page:
 
     Args:
         document: an empty one.
-        state: what is drawn.
+        state: what is drawn, of a run that stays the same.
         about: what the script is told once: names of scenario and run, kinds of faults.
     """
 
     def __init__(self, document: Document, state: LiveState, about: dict[str, Any]) -> None:
-        self._state = state
         self._cursor = Cursor()
         self._events = 0
         self._drawn: int | None = None
@@ -63,10 +62,11 @@ class Page:
             for model in (self._feed, self._board_source, self._heard, self._orders):
                 document.add_root(model)
 
-    def push(self, board: Callable[[int], dict[str, Any]]) -> None:
+    def push(self, state: LiveState, board: Callable[[int], dict[str, Any]]) -> None:
         """Send the next frame, unless the browser is behind.
 
         Args:
+            state: what is drawn.
             board: the board with the events from this number on; called when one is due.
         """
         if self._drawn is None:
@@ -74,7 +74,7 @@ class Page:
         if self._cursor.frames - self._drawn >= MOST_UNDRAWN:
             self.skipped += 1
             return
-        self._feed.data = {"frame": self._cursor.frame(self._state)}
+        self._feed.data = {"frame": self._cursor.frame(state)}
         if self._cursor.frames % BOARD_EVERY == 1:
             self.push_board(board(self._events))
 
@@ -83,11 +83,11 @@ class Page:
         """Whether the browser has drawn the last frame."""
         return self._last is not None and (self._drawn or 0) >= self._last
 
-    def push_last(self, board: Callable[[int], dict[str, Any]]) -> None:
+    def push_last(self, state: LiveState, board: Callable[[int], dict[str, Any]]) -> None:
         """Send the last frame and board once, however far behind the browser is."""
         if self._drawn is not None and self._last is None:
             self.push_board(board(self._events))
-            self._feed.data = {"frame": self._cursor.frame(self._state)}
+            self._feed.data = {"frame": self._cursor.frame(state)}
             self._last = self._cursor.frames
 
     def push_board(self, board: dict[str, Any]) -> None:

@@ -47,6 +47,7 @@ function showState() {
   const verdict = at("verdict");
   verdict.hidden = !board.verdict;
   if (board.verdict) { verdict.textContent = `${{held: "✓", failed: "✕"}[board.verdict] || "○"} ${board.verdict}`; verdict.className = `pill verdict ${board.verdict.replace(" ", "-")}`; }
+  at("seen").textContent = board.seen_from_s > 0 ? `seen from ${number(board.seen_from_s, 2)} s on` : "";
   at("factor").textContent = finite(run.real_time_factor) ? `${number(run.real_time_factor, 1)} × real time` : "–";
   at("leader_speed").textContent = finite(run.leader_speed_m_s) ? `${number(run.leader_speed_m_s, 2)} m/s` : "–";
   document.title = `${state === "running" ? "" : `${state} · `}${facts.scenario} · fleetloop live`;

@@ -86,13 +86,15 @@ class History:
         capacity: the most rows; even.
     """
 
-    __slots__ = ("_count", "_number", "_peaks", "_rows", "end")
+    __slots__ = ("_count", "_number", "_peaks", "_rows", "begin", "end")
 
     def __init__(self, peaks: Sequence[bool], capacity: int = CAPACITY) -> None:
         self._peaks = np.array(peaks, dtype=bool)
         self._rows = np.empty((capacity, len(peaks)))
         self._number = np.empty(capacity, dtype=np.int64)
         self._count = 0
+        self.begin = 0
+        """Number of the first bin that was appended."""
         self.end = 0
         """Behind the number of the last bin."""
 
@@ -102,6 +104,8 @@ class History:
     def append(self, first: int, rows: np.ndarray) -> None:
         """Append bins of consecutive numbers, behind those that are there."""
         capacity = len(self._rows)
+        if not self._count:
+            self.begin = first
         for begin in range(0, len(rows), capacity // 4):
             block = rows[begin : begin + capacity // 4]
             while self._count + len(block) > capacity:

@@ -124,8 +124,19 @@ class LiveState:
         self.events_known = True
         self.events += list(events)[: 8 * MAX_EVENTS - len(self.events)]
 
+    def take_over(self, other: "LiveState") -> None:
+        """Know of the run, but for its rows, what another picture of it knows."""
+        self.status, self.faults = other.status, other.faults
+        self.events, self.events_known = other.events, other.events_known
+        self.ended, self.verdict = other.ended, other.verdict
+
     def settle(self) -> None:
-        """Decode what waits."""
+        """Decode what waits, and go on with the series."""
+        self.decode()
+        self._fill_history()
+
+    def decode(self) -> None:
+        """Decode what waits; the series stay as they are."""
         self._room = MOST_WAITING_BYTES
         for (robot, source), held in self._sources.items():
             for first, block in held.waiting:
@@ -137,7 +148,6 @@ class LiveState:
                         if edge.edge[1] == robot:
                             edge.add(first + len(rows) - 1, rows)
             held.waiting.clear()
-        self._fill_history()
 
     def judge(self) -> None:
         """Judge the expectations on what was heard; costs with the rows in their windows."""
@@ -160,6 +170,11 @@ class LiveState:
     def t_s(self) -> float:
         """Its scenario time."""
         return max(self.tick, 0) * self.schedule.period_s
+
+    @property
+    def seen_from_s(self) -> float:
+        """From this scenario time on there are series."""
+        return self.history.begin * self.stride * self.schedule.period_s
 
     def now(self) -> np.ndarray:
         """The newest value of each of `NOW` (robots, columns); NaN: none yet."""
