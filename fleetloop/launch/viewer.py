@@ -25,8 +25,11 @@ from configs.roles import VIEWER
 from fleetloop import packages
 from fleetloop.door.requests import Request, Respond
 
-NICE = 19
-"""Of all its threads: they are started after it is set."""
+NICE = 10
+"""Of all its threads, which start after it is set: a tenth of the processor of what it competes
+with, which is about what a page needs."""
+PATIENCE = 3.0
+"""Times the deadline of a start: it is waited for so long, as it yields the processor."""
 STOP_S = 2.0
 """From letting go of it until it is killed."""
 
@@ -36,7 +39,7 @@ class Viewer:
 
     Args:
         brief: of its token; None: this run can have no viewer.
-        start_deadline_s: until its page listens [s].
+        start_deadline_s: of the processes of a run [s].
         note: told what is to be said of it at once.
         now_s: seconds on the launcher's clock of awake time.
     """
@@ -49,7 +52,7 @@ class Viewer:
         now_s: Callable[[], float],
     ) -> None:
         self._brief = brief
-        self._start_deadline_s = start_deadline_s
+        self._start_deadline_s = PATIENCE * start_deadline_s
         self._note = note
         self._now_s = now_s
         self._process: subprocess.Popen[bytes] | None = None

@@ -1,7 +1,7 @@
 """The viewer's process: hears the rows of a run, serves its page, and asks its launcher.
 
 Started by the launcher when the run's door is asked for it (`fleetloop.launch.viewer`). It yields
-the processor to everything else (nice 19), and its end is nothing to the run. Asked to stop, it
+the processor to everything else (nice 10), and its end is nothing to the run. Asked to stop, it
 takes the last rows; once the launcher lets go of it, it shows the run's verdict, and goes.
 """
 

@@ -11,7 +11,8 @@ from configs.scenario import Scenario
 from fleetloop.check.torque import limits
 from fleetloop.launch.drawn import ways_m
 
-_POINTS = 400
+_POINTS, _LEAST_POINTS, _MOST_POINTS = 8000, 100, 400
+"""Of all courses, and of each: a browser draws all of them in every frame."""
 _MARGIN_M = 0.5
 """A course goes on so far behind the last s that is planned."""
 _MOST_M = 500.0
@@ -23,12 +24,13 @@ def courses(scenario: Scenario) -> dict[str, np.ndarray]:
     least_m, most_m = ways_m(leader_brief(scenario).speed_changes, scenario.ends_at_s)
     centre = reference_path(scenario.path)
     found = {}
+    count = min(max(_POINTS // len(scenario.robot), _LEAST_POINTS), _MOST_POINTS)
     start_m = min(robot.s_0 for robot in scenario.robot) + max(least_m, -_MOST_M)
     end_m = max(robot.s_0 for robot in scenario.robot) + min(most_m + _MARGIN_M, _MOST_M)
     for robot in scenario.robot:
         path = robot_path(centre, formation_offset(robot.offset))
         points = []
-        for s in np.linspace(start_m, end_m, _POINTS):
+        for s in np.linspace(start_m, end_m, count):
             try:
                 points.append(path(float(s))[:2])
             except Exception:  # a path of the user's own, beyond the end that it has

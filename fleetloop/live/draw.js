@@ -46,8 +46,8 @@ function take(array) {
   drawPlane(now, edges, t_s);
   if (number % view.every === 0) drawCharts(now, t_s, Math.floor(number / view.every) % 2);
   showClock(t_s);
-  // The answer goes when the browser has painted: a slow one is sent less.
-  requestAnimationFrame(() => { models.heard.data = {frame: [number]}; });
+  // The answer goes when the browser has painted: a slow one is sent less. Every other frame will do.
+  if (number % 2 === 0 || board?.ended) requestAnimationFrame(() => { models.heard.data = {frame: [number]}; });
 }
 
 function keep(rows, count, whole) {
@@ -92,9 +92,9 @@ function drawPlane(now, edges, t_s) {
   const pick = (name) => Array.from({length: R}, (_, r) => now[r * N + NOW[name]]);
   models.references.data = {x: pick("x_d"), y: pick("y_d"), colour: colours};
   drawEdges(places, edges, scale);
-  const xs = [], ys = [], label_x = [], label_y = [];
+  const xs = [], ys = [], label_x = [], label_y = [], least = leastSize(places, scale);
   places.forEach(([x, y, theta], r) => {
-    const size = Math.max(facts.lengths_m[r], 20 * scale), c = Math.cos(theta), s = Math.sin(theta);
+    const size = Math.max(facts.lengths_m[r], least), c = Math.cos(theta), s = Math.sin(theta);
     const shape = [[0.62, 0], [0.2, 0.42], [-0.5, 0.42], [-0.5, -0.42], [0.2, -0.42]];
     xs.push(shape.map(([a, l]) => x + size * (a * c - l * s)));
     ys.push(shape.map(([a, l]) => y + size * (a * s + l * c)));
@@ -105,6 +105,12 @@ function drawPlane(now, edges, t_s) {
   const ink = getComputedStyle(document.documentElement).getPropertyValue("--text").trim();
   models.bodies.data = {xs, ys, colour: colours, name: names, x: pick("x"), y: pick("y"), label_x, label_y,
     label_colour: names.map(() => ink)};
+}
+
+function leastSize(places, scale) { // in metres: robots are seen from afar, and don't hide each other
+  const gaps = places.map(([x, y], r) => Math.min(...places.map(([u, v], other) => (other === r ? Infinity : Math.hypot(u - x, v - y)))));
+  const gap = gaps.filter(finite).sort((a, b) => a - b)[gaps.length >> 1] ?? Infinity;
+  return scale * Math.min(20, Math.max(8, (0.8 * gap) / scale));
 }
 
 const label_at = new Map();
@@ -151,7 +157,7 @@ function drawEdges(places, edges, scale) {
     x0.push(ax + ux * gap + ox); y0.push(ay + uy * gap + oy); x1.push(bx - ux * gap + ox); y1.push(by - uy * gap + oy);
     const ink = state === DEAD ? tone("--failed") : lost > 0.05 ? tone("--open") : tone("--muted");
     colour.push(ink); mark_colour.push(ink);
-    width.push(state === DEAD ? 1.5 : 1 + 2 / (1 + 5 * (finite(age) ? age : 0)));
+    width.push((R <= 24 ? 1 : 0.5) * (state === DEAD ? 1.5 : 1 + 2 / (1 + 5 * (finite(age) ? age : 0))));
     dash.push(state === DEAD ? [2, 5] : lost > 0.05 ? [8, 4] : []);
     const at = state === DEAD ? 0.5 : 0.62;
     x.push(ax + (bx - ax) * at + ox); y.push(ay + (by - ay) * at + oy);

@@ -48,7 +48,7 @@ function showState() {
   verdict.hidden = !board.verdict;
   if (board.verdict) { verdict.textContent = `${{held: "✓", failed: "✕"}[board.verdict] || "○"} ${board.verdict}`; verdict.className = `pill verdict ${board.verdict.replace(" ", "-")}`; }
   at("seen").textContent = board.seen_from_s > 0 ? `seen from ${number(board.seen_from_s, 2)} s on` : "";
-  at("factor").textContent = finite(run.real_time_factor) ? `${number(run.real_time_factor, 1)} × real time` : "–";
+  at("factor").textContent = finite(run.real_time_factor) ? `${run.real_time_factor < 0.995 ? brief(run.real_time_factor) : number(run.real_time_factor, 1)} × real time` : "–";
   at("leader_speed").textContent = finite(run.leader_speed_m_s) ? `${number(run.leader_speed_m_s, 2)} m/s` : "–";
   document.title = `${state === "running" ? "" : `${state} · `}${facts.scenario} · fleetloop live`;
 }
@@ -62,8 +62,8 @@ function showExpectations() {
   fill(at("expectations"), rows.length ? rows : [{key: "none", make: () => el("li", {class: "muted"}, "The scenario expects nothing.")}]);
 }
 
-// A drive's state in small letters; its errors as the drive's manual has them.
-const inWords = (drive) => drive.replace(/^[^:]*/, (state) => state.toLowerCase().replaceAll("_", " "));
+// A drive's state in small letters, "control" understood; its errors as the drive's manual has them.
+const inWords = (drive) => drive.replace(/^[^:]*/, (state) => state.toLowerCase().replaceAll("_", " ").replace(/ control$/, ""));
 const share = (value) => (finite(value) ? `${(100 * value).toFixed(0)} %` : "–");
 function showRobots() {
   const table = at("robots"), now = view.last && view.last.now;

@@ -8,6 +8,7 @@ import pytest
 from support.processes import Run, running
 
 from fleetloop.door.client import RefusedError, open_run
+from fleetloop.launch.viewer import NICE
 
 pytestmark = pytest.mark.system
 
@@ -26,7 +27,7 @@ def test_it_is_started_once_its_end_is_noticed_and_the_runs_end_ends_it(tmp_path
         with pytest.raises(RefusedError, match="not this run's viewer"):
             client.ask("live.listening", token="guess", url="http://elsewhere")
         (first,) = viewers(run)
-        assert first.nice() == 19
+        assert first.nice() == NICE
         first.kill()
         run.await_line("live: the viewer has ended: killed by SIGKILL; .*", 10.0)
         client.ask("live.open")
