@@ -1,8 +1,11 @@
 """The viewer of one run: a process that the launcher starts when it is asked for it.
 
-    request          arguments     answer
-    live.open        -             url: of the page, once it listens; the same at the next time
-    live.listening   token, url    -: the viewer itself says where its page is
+    request          arguments                answer
+    live.open        [view]                   url: of the page, once it listens; the same at the
+                                              next time; view "foxglove": the Foxglove WebSocket's
+    live.listening   token, view, url         -: the viewer itself says where it serves a view
+    live.refused     token, view, why         -: or why it can't
+    live.wanted      token                    -: to the viewer, once a Foxglove WebSocket is wanted
 
 It takes no part in the run: its end is a notice, after which it may be asked for again. It outlives
 the run until its summary is written, which it shows.
@@ -25,6 +28,8 @@ from configs.roles import VIEWER
 from fleetloop import packages
 from fleetloop.door.requests import Request, Respond
 
+PAGE, FOXGLOVE = "page", "foxglove"
+"""Views of a run: the page is there from the viewer's start, the other one once it is wanted."""
 NICE = 10
 """Of all its threads, which start after it is set: a tenth of the processor of what it competes
 with, which is about what a page needs."""
@@ -56,13 +61,17 @@ class Viewer:
         self._note = note
         self._now_s = now_s
         self._process: subprocess.Popen[bytes] | None = None
-        self._token = self._url = ""
-        self._listens = False
-        self._asking: list[Respond] = []
+        self._token = ""
+        self._urls: dict[str, str] = {}  # by view, of those that are served
+        self._asking: dict[str, list[Respond]] = {PAGE: [], FOXGLOVE: []}
+        self._awaits_wish: Respond | None = None  # the viewer itself
         self._deadline_s = 0.0
+        said = {"token": str, "view": str}
         self.requests: Mapping[str, Request] = {
-            "live.open": Request({}, self._open),
-            "live.listening": Request({"token": str, "url": str}, self._listening),
+            "live.open": Request({}, self._open, optional={"view": str}),
+            "live.listening": Request({**said, "url": str}, self._listening),
+            "live.refused": Request({**said, "why": str}, self._refused),
+            "live.wanted": Request({"token": str}, self._wanted),
         }
 
     def open(self) -> None:
@@ -81,8 +90,8 @@ class Viewer:
             return
         if process.poll() is not None:
             self._ended(process)
-        elif self._asking and self._now_s() > self._deadline_s:
-            self._answer({"error": f"the viewer: no page within {self._start_deadline_s:g} s"})
+        elif any(self._asking.values()) and self._now_s() > self._deadline_s:
+            self._answer_all({"error": f"the viewer: no page within {self._start_deadline_s:g} s"})
             self.close()
 
     def stop(self) -> None:
@@ -106,22 +115,50 @@ class Viewer:
 
     # --- requests --------------------------------------------------------------------------------
 
-    def _open(self, respond: Respond) -> None:
+    def _open(self, respond: Respond, view: str = PAGE) -> None:
+        if view not in self._asking:
+            known = ", ".join(self._asking)
+            raise ScenarioError(f"live.open: view {view[:40]!r}: must be one of {known}")
         if self._process is None:
             self._start()
-        if self._listens:
-            respond({"url": self._url})
-        else:
-            self._asking.append(respond)
+        if view in self._urls:
+            respond({"url": self._urls[view]})
+            return
+        if not any(self._asking.values()):
+            self._deadline_s = self._now_s() + self._start_deadline_s
+        self._asking[view].append(respond)
+        self._pass_wish_on()
 
-    def _listening(self, respond: Respond, token: str, url: str) -> None:
-        if self._process is None or not secrets.compare_digest(
-            token.encode(), self._token.encode()
-        ):
-            raise ScenarioError("live.listening: not this run's viewer")
-        self._url, self._listens = url, True
+    def _listening(self, respond: Respond, token: str, view: str, url: str) -> None:
+        self._check("live.listening", token, view)
+        self._urls[view] = url
         respond({})
-        self._answer({"url": url})
+        self._answer(view, {"url": url})
+
+    def _refused(self, respond: Respond, token: str, view: str, why: str) -> None:
+        self._check("live.refused", token, view)
+        respond({})
+        self._answer(view, {"error": f"live.open: {why}"})
+
+    def _wanted(self, respond: Respond, token: str) -> None:
+        self._check("live.wanted", token, FOXGLOVE)
+        self._awaits_wish = respond
+        self._pass_wish_on()
+
+    def _pass_wish_on(self) -> None:
+        """Tell the viewer that a Foxglove WebSocket is wanted, if it listens to that."""
+        tell = self._awaits_wish
+        if self._asking[FOXGLOVE] and tell is not None:
+            self._awaits_wish = None
+            tell({})
+
+    def _check(self, request: str, token: str, view: str) -> None:
+        """Refuse all but the viewer itself."""
+        theirs, ours = token.encode(), self._token.encode()
+        if self._process is None or not secrets.compare_digest(theirs, ours):
+            raise ScenarioError(f"{request}: not this run's viewer")
+        if view not in self._asking:
+            raise ScenarioError(f"{request}: no view {view[:40]!r}")
 
     # --- process ---------------------------------------------------------------------------------
 
@@ -145,7 +182,6 @@ class Viewer:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         _yield_processor(process.pid)
         self._process, self._token = process, token
-        self._deadline_s = self._now_s() + self._start_deadline_s
         # It reads once it has imported its libraries; the launcher doesn't wait for that.
         threading.Thread(target=_hand_over, args=(process, brief), daemon=True).start()
 
@@ -155,10 +191,14 @@ class Viewer:
         elif answer["url"]:
             self._note(answer["url"])
 
-    def _answer(self, answer: dict[str, str]) -> None:
-        asking, self._asking = self._asking, []
+    def _answer(self, view: str, answer: dict[str, str]) -> None:
+        asking, self._asking[view] = self._asking[view], []
         for respond in asking:
             respond({**answer})
+
+    def _answer_all(self, answer: dict[str, str]) -> None:
+        for view in self._asking:
+            self._answer(view, answer)
 
     def _ended(self, process: subprocess.Popen[bytes]) -> None:
         """Say that it has ended, and why."""
@@ -168,14 +208,15 @@ class Viewer:
         code = process.returncode
         why = said[-1].error if said else _how(code)
         text = f"the viewer has ended: {why}; the run goes on without it"
-        if self._asking:
-            self._answer({"error": text})
+        if any(self._asking.values()):
+            self._answer_all({"error": text})
         else:
             self._note(text)
         self._forget(process)
 
     def _forget(self, process: subprocess.Popen[bytes]) -> None:
-        self._url, self._token, self._listens = "", "", False
+        self._token, self._awaits_wish = "", None
+        self._urls.clear()
         for end in (process.stdin, process.stdout):
             if end is not None:
                 with contextlib.suppress(OSError):

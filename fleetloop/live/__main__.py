@@ -7,7 +7,7 @@ takes the last rows; once the launcher lets go of it, it shows the run's verdict
 
 import asyncio
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +24,14 @@ from configs.loading import loads
 from configs.resolve import signals_of
 from configs.roles import VIEWER
 from configs.scenario import Scenario
+from fleetloop.launch.viewer import PAGE
 from fleetloop.live.door import RunDoor
 from fleetloop.live.expected import Source
 from fleetloop.live.hub import Hub
 from fleetloop.live.past import Block, Kept, feed, recorded
 from fleetloop.live.server import LiveServer
 from fleetloop.live.state import LiveState
+from fleetloop.live.streaming import Streaming
 from fleetloop.record.scan import RecordError
 from fleetloop.results import run_folder
 
@@ -55,6 +57,7 @@ class Heard:
     def __init__(self, scenario: Scenario, hub: Hub) -> None:
         self._hub = hub
         self.kept = Kept()
+        self.streaming = Streaming()
         self._row_bytes = {
             f"controller/{robot.name}": row_of(signals_of(scenario, robot)).size
             for robot in scenario.robot
@@ -77,6 +80,19 @@ class Heard:
             block = Block(robot, whose, rows.first_tick, rows.rows)
             self.kept.add(block)
             state.hear(*block)
+            self.streaming.hear(block)
+
+    def note_events(self, events: Iterable[Event]) -> None:
+        """Take events that follow those that are there."""
+        state = self._hub.state
+        known = len(state.events)
+        state.note_events(events)
+        self.streaming.note_events(state, known)
+
+    @property
+    def watched(self) -> bool:
+        """Whether anyone looks."""
+        return self._hub.watched or self.streaming.watched
 
 
 async def _hear(link: Link, heard: Heard, hub: Hub) -> None:
@@ -86,7 +102,7 @@ async def _hear(link: Link, heard: Heard, hub: Hub) -> None:
             heard.take(arrival)
         if not hub.watched:
             hub.idle()
-        await asyncio.sleep(_DRAIN_S if hub.watched else _IDLE_S)
+        await asyncio.sleep(_DRAIN_S if heard.watched else _IDLE_S)
 
 
 async def _look_back(heard: Heard, hub: Hub, record: Path) -> None:
@@ -114,7 +130,7 @@ async def _look_back(heard: Heard, hub: Hub, record: Path) -> None:
     heard.kept.end()
 
 
-async def _ask(door: RunDoor, hub: Hub) -> None:
+async def _ask(door: RunDoor, heard: Heard, hub: Hub) -> None:
     """The run's status, its faults and events, several times a second."""
     since, faults_s = 0, 0.0
     loop = asyncio.get_running_loop()
@@ -122,15 +138,14 @@ async def _ask(door: RunDoor, hub: Hub) -> None:
         try:
             status = await door.ask("run.status", within_s=_ASK_S)
             said = await door.ask("run.events", within_s=_ASK_S, since=since)
-            since, state = said["next"], hub.state
-            state.status = status
-            state.note_events(_event(one) for one in said["events"] if one["kind"] in KINDS)
+            since, hub.state.status = said["next"], status
+            heard.note_events(_event(one) for one in said["events"] if one["kind"] in KINDS)
             if loop.time() >= faults_s:
                 faults_s = loop.time() + _FAULTS_S
                 hub.state.faults = (await door.ask("fault.list", within_s=_ASK_S))["faults"]
         except FleetloopError:
             pass  # the run is ending, or stands still; the page goes on with what it has
-        await asyncio.sleep(_STATUS_S if hub.watched else 1.0)
+        await asyncio.sleep(_STATUS_S if heard.watched else 1.0)
 
 
 def _event(said: Mapping[str, Any]) -> Event:
@@ -145,9 +160,14 @@ async def _serve(brief: ViewerBrief, link: Link, stop: Stop) -> str:
     heard = Heard(scenario, hub)
     heard.subscribe(link, brief.network.run)
     link.declare_live(keys.live(brief.network.run, VIEWER.name))
-    await door.ask("live.listening", token=brief.token, url=server.address)
+    await door.ask("live.listening", token=brief.token, view=PAGE, url=server.address)
     record = Path(brief.folder) / run_folder.RECORD
-    going = (_hear(link, heard, hub), _look_back(heard, hub, record), _ask(door, hub))
+    going = (
+        _hear(link, heard, hub),
+        _look_back(heard, hub, record),
+        _ask(door, heard, hub),
+        heard.streaming.serve(door, hub, brief),
+    )
     tasks = [asyncio.create_task(one) for one in going]
     while not stop.requested:
         await asyncio.sleep(_IDLE_S)
@@ -158,11 +178,13 @@ async def _serve(brief: ViewerBrief, link: Link, stop: Stop) -> str:
         heard.take(arrival)
     link.close()
     hub.end()
+    heard.streaming.push_last()
     while not stop.released:
         await asyncio.sleep(_DRAIN_S)
     hub.conclude(_summary(Path(brief.folder)))
     await hub.shown(_LAST_LOOK_S)
     server.stop()
+    heard.streaming.stop()
     await door.close()
     return f"{hub.state.tick + 1} ticks seen"
 

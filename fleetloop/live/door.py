@@ -43,9 +43,9 @@ class RunDoor:
         return cls(*ends)
 
     async def ask(
-        self, request: str, *, within_s: float = ANSWER_S, **arguments: Any
+        self, request: str, *, within_s: float | None = ANSWER_S, **arguments: Any
     ) -> Mapping[str, Any]:
-        """The answer to a request.
+        """The answer to a request; `within_s` None: whenever it comes, or the run's end.
 
         Raises:
             RefusedError: the run says why not.
@@ -64,7 +64,7 @@ class RunDoor:
             async with asyncio.timeout(within_s):
                 said = await answer
         except TimeoutError as error:
-            raise InfrastructureError(f"no answer in {within_s:g} s") from error
+            raise InfrastructureError(f"no answer in {within_s} s") from error
         finally:
             self._asked.pop(number, None)
         if "error" in said:

@@ -66,6 +66,14 @@ def framed(
     return messages
 
 
+def unframed(messages: np.ndarray) -> list[tuple[int, bytes]]:
+    """Log time [ns] and content (CDR, with its header) of each message."""
+    raw, size = messages.tobytes(), messages.itemsize
+    begin = size - messages.dtype["cdr"].itemsize - messages.dtype["payload"].itemsize
+    times_ns = messages["log_time"].tolist()
+    return [(time_ns, raw[n * size + begin : (n + 1) * size]) for n, time_ns in enumerate(times_ns)]
+
+
 def fleet_messages(
     ticks: np.ndarray, s_spread: np.ndarray, s_difference: np.ndarray, period_ns: int
 ) -> np.ndarray:

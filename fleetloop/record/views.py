@@ -117,7 +117,7 @@ class Views:
             for parts, axis in zip(zip(*self._taken, strict=True), (0, 1, 1, 1, 1), strict=True)
         )
         self._taken.clear()
-        if ticks[0] == 0 and (paths := self._paths()):
+        if ticks[0] == 0 and (paths := self.paths()):
             yield View.PATHS, paths
         there = _known(poses)
         yield from self._view(
@@ -201,8 +201,8 @@ class Views:
             case _:
                 return scene.transforms_template([names[n] for n in some])
 
-    def _paths(self) -> list[np.ndarray]:
-        """The message of the paths, without one if none is known."""
+    def paths(self) -> list[np.ndarray]:
+        """The message of the paths, of tick 0; none if no path is known."""
         paths = []
         for name, colour, robot in zip(self._names, self._colours, self._robots, strict=True):
             points = path_points(robot)

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from support.controller_rows import SIGNALS
+from support.record_rows import packed
 
 from fleetloop.launch.run import RunOptions, run_scenario
 from fleetloop.record.reader import Record
@@ -28,12 +28,7 @@ def uneven_run(finished_run: Path, tmp_path_factory: pytest.TempPathFactory) -> 
         folder / "record.mcap", dict.fromkeys(whole.robots, SIGNALS), whole.scenario_toml, 2_000_000
     ) as writer:
         for robot in whole.robots:
-            writer.add(robot, "plant", 0, signals_of(whole.plant[robot]))
-        writer.add("r1", "controller", 0, signals_of(whole.controller["r1"]))
-        writer.add("r2", "controller", 0, signals_of(whole.controller["r2"][:1200]))
+            writer.add(robot, "plant", 0, packed(whole.plant[robot]))
+        writer.add("r1", "controller", 0, packed(whole.controller["r1"]))
+        writer.add("r2", "controller", 0, packed(whole.controller["r2"][:1200]))
     return folder
-
-
-def signals_of(rows: np.ndarray) -> bytes:
-    """Rows of a record as `bridge.network.telemetry` packs them: without the tick."""
-    return np.stack([rows[name] for name in rows.dtype.names[1:]], axis=1).tobytes()

@@ -1,10 +1,13 @@
 """The viewer's process: started when a run is asked for it, and nothing to the run."""
 
+import asyncio
 import signal
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
+from support.foxglove_client import FoxgloveClient
 from support.processes import Run, running
 
 from fleetloop.door.client import RefusedError, open_run
@@ -20,12 +23,32 @@ def viewers(run: Run) -> list[psutil.Process]:
     return [child for child in children if child.cmdline()[:1] == ["fleetloop viewer"]]
 
 
+async def heard_at(address: str) -> dict[str, Any]:
+    """The first messages of two channels at a Foxglove WebSocket."""
+    client = await FoxgloveClient.open(address)
+    found: dict[str, Any] = {}
+    for topic in ("log", "fleet"):
+        await client.subscribe(topic)
+    while len(found) < 2:
+        (said,) = await client.take(1)
+        found.setdefault(said.topic, said.content)
+    await client.close()
+    return found
+
+
 def test_it_is_started_once_its_end_is_noticed_and_the_runs_end_ends_it(tmp_path: Path) -> None:
     with running(tmp_path / "run", *PACED, bus_time_s=0.3) as run, open_run("") as client:
         url = client.ask("live.open")["url"]
         assert client.ask("live.open")["url"] == url
         with pytest.raises(RefusedError, match="not this run's viewer"):
-            client.ask("live.listening", token="guess", url="http://elsewhere")
+            client.ask("live.listening", token="guess", view="page", url="http://elsewhere")
+        with pytest.raises(RefusedError, match="view 'globe': must be one of page, foxglove"):
+            client.ask("live.open", view="globe")
+        stream = client.ask("live.open", view="foxglove")["url"]
+        assert client.ask("live.open", view="foxglove")["url"] == stream
+        said = asyncio.run(heard_at(stream))
+        assert said["fleet"].s_spread < 0.1
+        assert said["log"].message == "armed"
         (first,) = viewers(run)
         assert first.nice() == NICE
         first.kill()
