@@ -13,15 +13,17 @@ that are an instant have no `for_s`. Where it acts depends on its kind:
     agent      messages to a robot's controller
     process    a robot's controller as a process
 
-A new kind is a class in this room, an entry of `CLASSES`, and its effect: in `plant.faults`,
+A new kind is a class in this room, an entry of `GROUPS`, and its effect: in `plant.faults`,
 `agents.faults` or `fleetloop.launch.process_faults`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 from functools import reduce
+from itertools import chain
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, get_args, get_type_hints
 
+from configs.errors import ScenarioError
 from configs.faults.base import Fault
 from configs.faults.bodies import Friction, Payload, Push, WheelRadius, WheelSlip
 from configs.faults.buses import (
@@ -56,51 +58,44 @@ from configs.faults.powertrains import (
 )
 from configs.faults.processes import ProcessRestart, ProcessSlow, ProcessStopped
 from configs.parameters import Tagged
+from configs.wording import guess
 
-CLASSES: tuple[type[Fault], ...] = (
-    DriveEvent,
-    DriveError,
-    MotorTorque,
-    OverTemperature,
-    UnderVoltage,
-    OverVoltage,
-    EncoderState,
-    EncoderJump,
-    EncoderNoise,
-    EncoderSlip,
-    Push,
-    Payload,
-    Friction,
-    WheelRadius,
-    WheelSlip,
-    PoseBias,
-    PoseJump,
-    PoseDrift,
-    PoseOutage,
-    LinkPartition,
-    LinkLoss,
-    LinkDelay,
-    FrameChange,
-    FrameCorruption,
-    FrameDelay,
-    BusCut,
-    NodeSilent,
-    NodeBusOff,
-    NodeBabbling,
-    ProcessStopped,
-    ProcessRestart,
-    ProcessSlow,
-)
+GROUPS: Mapping[str, tuple[type[Fault], ...]] = {
+    "drives": (DriveEvent, DriveError),
+    "motors": (MotorTorque, OverTemperature),
+    "supply": (UnderVoltage, OverVoltage),
+    "encoders": (EncoderState, EncoderJump, EncoderNoise, EncoderSlip),
+    "bodies and ground": (Push, Payload, Friction, WheelRadius, WheelSlip),
+    "localisation": (PoseBias, PoseJump, PoseDrift, PoseOutage),
+    "links between robots": (LinkPartition, LinkLoss, LinkDelay),
+    "CAN frames": (FrameChange, FrameCorruption, FrameDelay),
+    "CAN buses and their nodes": (BusCut, NodeSilent, NodeBusOff, NodeBabbling),
+    "processes of controllers": (ProcessStopped, ProcessRestart, ProcessSlow),
+}
+"""The classes of all kinds, by what they act on."""
+CLASSES: tuple[type[Fault], ...] = tuple(chain.from_iterable(GROUPS.values()))
 
 
-def _kinds() -> Iterator[tuple[str, type[Fault]]]:
-    for cls in CLASSES:
-        for kind in get_args(get_type_hints(cls)["kind"]):
-            yield kind, cls
+def kinds_of(cls: type[Fault]) -> tuple[str, ...]:
+    """The kinds of a class."""
+    return get_args(get_type_hints(cls)["kind"])
 
 
-KINDS: dict[str, type[Fault]] = dict(_kinds())
+KINDS: dict[str, type[Fault]] = {kind: cls for cls in CLASSES for kind in kinds_of(cls)}
 """Every kind and its class."""
+
+
+def class_of(kind: str) -> type[Fault]:
+    """The class of a kind.
+
+    Raises:
+        ScenarioError: there is no such kind; the nearest is named.
+    """
+    if (found := KINDS.get(kind)) is None:
+        known = [*KINDS]
+        raise ScenarioError(f"{kind}: no such kind{guess(kind, known)}; known: {', '.join(known)}")
+    return found
+
 
 if TYPE_CHECKING:
     AnyFault = Fault

@@ -8,10 +8,9 @@ from typing import Any
 import typer
 
 from configs.errors import Complaint, ScenarioError
-from configs.faults.kinds import KINDS
+from configs.faults.kinds import KINDS, class_of
 from configs.overrides import Override
 from configs.scenario import Scenario
-from configs.wording import guess
 from fleetloop import numbers
 from fleetloop.campaign.matrix import Conditions
 
@@ -62,10 +61,10 @@ def kinds_named(text: str) -> tuple[str, ...]:
     if names == (ALL,):
         return tuple(KINDS)
     for name in names:
-        if name not in KINDS:
-            known = ", ".join(KINDS)
-            hint = guess(name, list(KINDS))
-            raise ScenarioError(f"--faults {text}: {name}: no such kind{hint}; known: {known}")
+        try:
+            class_of(name)
+        except ScenarioError as error:
+            raise ScenarioError(f"--faults {text}: {error}") from None
     if not names:
         raise ScenarioError(f"--faults {text!r}: names no kind; all, or for example push,bus_cut")
     return names

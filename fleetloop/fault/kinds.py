@@ -1,15 +1,15 @@
 """`fleetloop fault kinds [KIND]`: the table of kinds, made of their classes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 from rich.table import Table
 
-from configs.errors import ScenarioError
-from configs.faults.kinds import KINDS
+from configs.faults.kinds import GROUPS, KINDS, class_of
 from configs.tables import adapter_of
-from configs.wording import guess
 from fleetloop.terminal import ResultConsole, say, say_json
 
 _COMMON = ("kind", "name", "at_s", "for_s")
@@ -28,31 +28,30 @@ def print_kinds(kind: str | None, *, as_json: bool) -> None:
     Raises:
         ScenarioError: there is no such kind.
     """
-    if kind is not None and kind not in KINDS:
-        known = [*KINDS]
-        raise ScenarioError(f"{kind}: no such kind{guess(kind, known)}; known: {', '.join(known)}")
-    wanted = [kind] if kind is not None else [*KINDS]
-    described = [describe(one) for one in wanted]
+    if kind is not None:
+        described = [describe(kind)]
+    else:
+        described = [describe(one) for one in KINDS]
     if as_json:
         say_json(described)
     elif kind is None:
-        table = Table(box=None, pad_edge=False)
-        for column in ("kind", "what", "parameters"):
-            table.add_column(column, no_wrap=True)
-        for one in described:
-            table.add_row(one["kind"], one["about"], ", ".join(p["key"] for p in one["parameters"]))
-        ResultConsole().print_whole(table)
+        _print_all(described)
     else:
         _print_one(described[0])
 
 
 def describe(kind: str) -> dict[str, Any]:
-    """A kind with its parameters: keys (with units), bounds, defaults and descriptions."""
-    made = KINDS[kind]
+    """A kind with its parameters: keys (with units), bounds, defaults and descriptions.
+
+    Raises:
+        ScenarioError: there is no such kind.
+    """
+    made = class_of(kind)
     schema = adapter_of(made).json_schema()["properties"]
     wanted = [one for one in fields(made) if one.name not in _COMMON]
     return {
         "kind": kind,
+        "group": next(name for name, classes in GROUPS.items() if made in classes),
         "about": " ".join((made.__doc__ or "").split()),
         "acts_on": made.PLACE,
         "instant": made.INSTANT,
@@ -67,6 +66,18 @@ def describe(kind: str) -> dict[str, Any]:
             for one in wanted
         ],
     }
+
+
+def _print_all(described: Sequence[Mapping[str, Any]]) -> None:
+    table = Table(box=None, pad_edge=False)
+    for column in ("kind", "what", "parameters"):
+        table.add_column(column, no_wrap=True)
+    for group, kinds in groupby(described, key=itemgetter("group")):
+        table.add_row(f"[bold]{group}[/bold]")
+        for one in kinds:
+            keys = ", ".join(it["key"] for it in one["parameters"])
+            table.add_row(f"  {one['kind']}", one["about"], keys)
+    ResultConsole().print_whole(table)
 
 
 def _print_one(kind: Mapping[str, Any]) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from support.command_line import fleetloop
 
-from configs.faults.kinds import KINDS
+from configs.faults.kinds import GROUPS, KINDS
 
 
 def test_every_kind_is_listed_with_its_parameters(tmp_path: Path) -> None:
@@ -19,8 +19,13 @@ def test_every_kind_is_listed_with_its_parameters(tmp_path: Path) -> None:
     assert push["force_body_N"]["default"] == 5.0
     assert push["force_body_N"]["values"].startswith("number, ≥ -1e+12")
     assert listed["can_corrupt"]["needs"] == ["bus.timing = 'wire'"]
+    assert (listed["under_voltage"]["group"], listed["push"]["group"]) == (
+        *("supply", "bodies and ground"),
+    )
     text = fleetloop(tmp_path, "fault", "kinds").stdout
-    assert all(kind in text for kind in KINDS)
+    lines = [line.split("  ")[0].strip() or line.split()[0] for line in text.splitlines()[1:]]
+    assert [line for line in lines if line in KINDS] == [*KINDS]
+    assert [line for line in lines if line not in KINDS] == [*GROUPS]
 
 
 @pytest.mark.parametrize(
