@@ -179,11 +179,17 @@ class InProcessRun:
             if agent.network is not None
         }
 
-    def run(self, stop: Stop) -> None:
-        """Run from the first tick of the countdown to the closing tick, or until told to stop."""
+    def run(self, stop: Stop, last_tick: int | None = None) -> None:
+        """Run from the first tick of the countdown until told to stop, or to a last tick.
+
+        Args:
+            stop: ends the run.
+            last_tick: None, or beyond it: the closing tick.
+        """
+        closing = self._schedule.ticks
         with settled_memory():
             self.begin()
-            self.go(self._schedule.ticks + 1, stop)
+            self.go((closing if last_tick is None else min(last_tick, closing)) + 1, stop)
         self.finish()
 
     def begin(self) -> None:

@@ -2,6 +2,7 @@
 
 A lockstep run in one process leaves the same record, so it gives the same inputs. Whether it does,
 its rows tell: they are compared with the record's as they come, and the first other bit ends it.
+An interrupted run is repeated as far as its record goes.
 """
 
 from collections.abc import Sequence
@@ -33,6 +34,8 @@ class _Witness:
             for robot, rows in of_robots.items()
         }
         self._stop = stop
+        self.ticks = max(map(len, self._rows.values()))
+        """Of the record, which ends before its scenario does if the run was interrupted."""
         self.blocks: list[bytes] = []
         self.other = ""
         """Where the run came to differ."""
@@ -67,28 +70,29 @@ def repeated_inputs(
     """Run a recorded scenario again in this process; the input log of one robot's controller.
 
     Raises:
-        ScenarioError: the run doesn't come out as the record has it, or was interrupted.
+        ScenarioError: the run doesn't come out as the record has it, or the repetition was
+            interrupted.
     """
     note(f"{record.path}: has no inputs; a lockstep run can be repeated to have them")
     briefs = [
         replace(brief_of(scenario, name), logs_inputs=name == robot) for name in scenario.names
     ]
     failure = ""
-    with (
-        stop_on_signals() as stop,
-        RunProgress(f"{scenario.name} again", scenario.ends_at_s, quiet=quiet) as progress,
-    ):
+    with stop_on_signals() as stop:
         witness = _Witness(record, stop)
+        ends_at_s = min(witness.ticks * scenario.clock.control_period_s, scenario.ends_at_s)
 
-        def show(state: Progress) -> None:
-            progress.show(state.t_ns * 1e-9, state.wall_ns * 1e-9)
+        with RunProgress(f"{scenario.name} again", ends_at_s, quiet=quiet) as progress:
 
-        try:
-            plant = plant_brief(scenario, network=NOWHERE)
-            run = InProcessRun(plant, briefs, leader_brief(scenario), witness, show)
-            run.run(stop)
-        except FleetloopError as error:
-            failure = str(error)
+            def show(state: Progress) -> None:
+                progress.show(state.t_ns * 1e-9, state.wall_ns * 1e-9)
+
+            try:
+                plant = plant_brief(scenario, network=NOWHERE)
+                run = InProcessRun(plant, briefs, leader_brief(scenario), witness, show)
+                run.run(stop, witness.ticks)
+            except FleetloopError as error:
+                failure = str(error)
     why = f"it differs from {witness.other} on" if witness.other else failure
     if not why and stop.requested:
         why = stop.reason

@@ -11,7 +11,9 @@ from configs.errors import ScenarioError
 from configs.loading import load, to_toml
 from fleetloop.launch.run import RunOptions, run_scenario
 from fleetloop.record.inputs_file import InputsFile, path_of, read_inputs
+from fleetloop.replay.changes import brief_of
 from fleetloop.replay.command import ReplayOptions, replay_run
+from fleetloop.replay.player import play
 from fleetloop.replay.repeat import repeated_inputs
 from fleetloop.results import run_folder
 from fleetloop.results.divergence import Tolerance
@@ -53,6 +55,16 @@ def test_a_lockstep_run_without_inputs_is_repeated_to_have_them(without: Path, c
     said = capsys.readouterr()
     assert "has no inputs; a lockstep run can be repeated" in said.err
     assert json.loads(said.out)["identical"] is True
+
+
+def test_an_interrupted_run_is_repeated_as_far_as_its_record_goes(without: Path) -> None:
+    whole = read_record(without, partial=False)
+    first = {robot: rows[:120] for robot, rows in whole.controller.items()}
+    cut = replace(whole, controller=first, plant={it: r[:120] for it, r in whole.plant.items()})
+    scenario = load("two_robots", SHORT)
+    replayed = play(brief_of(scenario, "r2"), repeated_inputs(cut, scenario, "r2", quiet=True))
+    assert 120 <= len(replayed.rows) <= 121
+    assert replayed.rows["s"][:120].tobytes() == first["r2"]["s"].tobytes()
 
 
 def test_a_run_that_does_not_come_out_again_is_not_repeated(without: Path) -> None:
