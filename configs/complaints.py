@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 
-from configs.errors import Complaint, Problem, ScenarioError
+from configs.errors import Complaint, KeyValueError, Problem, ScenarioError
 from configs.parameters import as_tuples
 from configs.scenario import Scenario
 from configs.wording import MISSING, remedy_of, unknown_key
@@ -166,7 +166,17 @@ def _problem(item: dict[str, Any], data: dict[str, Any], model: type[BaseModel])
         remedy = f"must be one of {tags}" if tags else "must be given"
         return Problem(".".join([*names, "kind"]), tag, remedy)
     value = MISSING if item["type"] == "missing" else item["input"]
+    error = item.get("ctx", {}).get("error")
+    if isinstance(error, KeyValueError):
+        return Problem(".".join([*names, error.key]), _value_of(error.key, value), error.remedy)
     return Problem(".".join(names), value, remedy_of(item))
+
+
+def _value_of(key: str, table: Any) -> object:
+    """The value of a key of a table, of an entry of a list as of `"delays_s.3"`."""
+    for part in key.split("."):
+        table = table[int(part)] if isinstance(table, list | tuple) else table.get(part, MISSING)
+    return table
 
 
 def _unknown(loc: Sequence[int | str], model: type[BaseModel]) -> str:

@@ -42,6 +42,20 @@ class Problem(NamedTuple):
     remedy: str  # the values that are allowed, or what to change
 
 
+class KeyValueError(ValueError):
+    """The value of a key is wrong beside those of the other keys of its table.
+
+    Args:
+        key: of the table; entries of a list by number, as `"delays_s.3"`.
+        remedy: the values that are allowed, or what to change.
+    """
+
+    def __init__(self, key: str, remedy: str) -> None:
+        super().__init__(f"{key}: {remedy}")
+        self.key = key
+        self.remedy = remedy
+
+
 class FleetloopError(Exception):
     """An error that a user can cause or mend; its text is the whole message."""
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Le, Len
 
-from configs.errors import ScenarioError
+from configs.errors import KeyValueError, ScenarioError
 from configs.files import text_of
 from configs.parameters import (
     MOST,
@@ -65,7 +65,7 @@ class UniformDelay(Parameters):
     def __post_init__(self) -> None:
         """Hold the bounds in order."""
         if self.max_s < self.min_s:
-            raise ValueError(f"max_s must not be below min_s = {self.min_s:g}")
+            raise KeyValueError("max_s", f"must not be below min_s = {self.min_s:g}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,7 +155,7 @@ class TraceDelay(Parameters):
         for n, delay_s in enumerate(self.delays_s):
             if LOST_S < delay_s < 0.0:
                 remedy = f"must be a delay of 0 to {MOST_DELAY_S:g} s, or {LOST_S:g}: lost"
-                raise ValueError(f"delays_s.{n} = {delay_s:g}: {remedy}")
+                raise KeyValueError(f"delays_s.{n}", remedy)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -191,7 +191,7 @@ class Partition(Parameters):
     def __post_init__(self) -> None:
         """Hold the times in order."""
         if self.to_s <= self.from_s:
-            raise ValueError(f"to_s must be above from_s = {self.from_s:g}")
+            raise KeyValueError("to_s", f"must be above from_s = {self.from_s:g}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

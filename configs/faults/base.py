@@ -6,6 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from annotated_types import Len
 
+from configs.errors import KeyValueError
 from configs.parameters import Name, Parameters, Seconds, SecondsOrZero, parameter
 
 Place = Literal["plant", "agent", "process"]
@@ -33,10 +34,10 @@ class Fault(Parameters):
     def __post_init__(self) -> None:
         """Refuse a duration where there is none, and what changes nothing."""
         if self.INSTANT and self.for_s is not None:
-            raise ValueError("for_s: happens at an instant, leave it out")
+            raise KeyValueError("for_s", f"{self.kind} happens at an instant: leave it out")
         if self.NOTHING and all(getattr(self, key) == it for key, it in self.NOTHING.items()):
             values = " and ".join(f"{key} = {it:g}" for key, it in self.NOTHING.items())
-            raise ValueError(f"changes nothing with {values}")
+            raise KeyValueError(next(iter(self.NOTHING)), f"changes nothing with {values}")
 
     @property
     def parameters(self) -> dict[str, Any]:

@@ -165,11 +165,19 @@ def test_no_robot_has_the_localisation_systems_name_where_there_are_effects() ->
         loads("here", f"{text}\n[network.default]\n{HALF}\n")
 
 
-def test_bounds_out_of_order_are_named_at_their_table() -> None:
-    with pytest.raises(ScenarioError) as refused:
-        paper("[network.default]\npartitions = [{ from_s = 3.0, to_s = 2.0 }]\n")
-    assert "network.default.partitions.0" in str(refused.value)
-    assert "to_s must be above from_s = 3" in str(refused.value)
+@pytest.mark.parametrize(
+    ("effect", "said"),
+    [
+        ("partitions = [{ from_s = 3.0, to_s = 2.0 }]", "partitions.0.to_s = 2.0: must be above"),
+        (
+            'delay = { kind = "uniform", min_s = 0.2, max_s = 0.1 }',
+            "delay.max_s = 0.1: must not be",
+        ),
+    ],
+)
+def test_bounds_out_of_order_are_named_at_their_keys(effect: str, said: str) -> None:
+    with pytest.raises(ScenarioError, match=said):
+        paper(f"[network.default]\n{effect}\n")
 
 
 @pytest.mark.parametrize("edge", ["leader -> *", "leader->r1", " localisation -> r1"])
