@@ -55,6 +55,22 @@ def limited(seconds: float, what: str) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
+@contextmanager
+def deferred() -> Iterator[list[int]]:
+    """Ctrl-C and SIGTERM only put their numbers into a list while this lasts: for imports."""
+    came: list[int] = []
+    before = {
+        number: signal.signal(number, lambda which, _: came.append(which))
+        for number in (signal.SIGINT, signal.SIGTERM)
+        if signal.getsignal(number) is not signal.SIG_IGN
+    }
+    try:
+        yield came
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def interruptible(verb: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
     """Ctrl-C and SIGTERM raise `KeyboardInterrupt` while this verb runs."""
 

@@ -91,8 +91,8 @@ def create_run_folder(run: str) -> Path:
         folder.mkdir(mode=0o700)
     except OSError as error:
         raise InfrastructureError(
-            f"can't make the run's folder for sockets: {error}; FLEETLOOP_RUNTIME names another"
-            " place for it"
+            f"can't make the run's folder for sockets {folder}: {error.strerror};"
+            " FLEETLOOP_RUNTIME names another place for it"
         ) from error
     return folder
 
@@ -117,6 +117,18 @@ def _sweep(base: Path) -> None:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if not any(_answers(bus) for bus in path.parent.glob(f"*{SUFFIX}")):
                 remove_run_folder(path.parent)
+
+
+def is_held(lock: Path) -> bool:
+    """Whether a launcher holds the lock of its run; one that has gone again isn't."""
+    try:
+        with lock.open() as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        pass
+    return False
 
 
 def socket_path(folder: Path, bus: str) -> Path:

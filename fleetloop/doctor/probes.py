@@ -5,7 +5,6 @@ fails for no file that isn't there.
 """
 
 import contextlib
-import fcntl
 import os
 import platform
 import resource
@@ -110,12 +109,8 @@ def bus_problem() -> str:
 
 def dead_runs() -> list[str]:
     """Folders of sockets whose run is gone."""
-    found = []
-    for path in sockets.trusted(f"*/{sockets.LOCK}"):
-        with contextlib.suppress(OSError), path.open() as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            found.append(path.parent.name)
-    return found
+    locks = sockets.trusted(f"*/{sockets.LOCK}")
+    return [path.parent.name for path in locks if not sockets.is_held(path)]
 
 
 def lone_roles(proc: Path = Path("/proc")) -> list[tuple[int, str]]:
@@ -183,7 +178,10 @@ def package_problem() -> str:
 
 def place_of_runs() -> Path:
     """Where `fleetloop run` puts its folders: the nearest one that is there."""
-    runs = Path("runs").absolute()
+    try:
+        runs = Path("runs").absolute()
+    except FileNotFoundError:  # the folder in which this runs was removed
+        return Path("runs")
     return next(path for path in (runs, *runs.parents) if path.exists())
 
 

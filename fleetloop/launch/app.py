@@ -103,7 +103,10 @@ def run(
     ] = False,
 ) -> None:
     """Run a scenario, record everything, check its expectations, print and save the results."""
-    from fleetloop.launch.run import RunOptions, run_scenario
+    from fleetloop.signals import deferred
+
+    with deferred() as came:
+        from fleetloop.launch.run import RunOptions, run_scenario
 
     refuse_both(as_json, json_lines)
     options = RunOptions(
@@ -123,7 +126,7 @@ def run(
         force=force,
         junit=junit,
     )
-    raise typer.Exit(run_scenario(scenario, options))
+    raise typer.Exit(run_scenario(scenario, options, interrupted=bool(came)))
 
 
 def agent(

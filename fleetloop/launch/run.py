@@ -29,7 +29,7 @@ from fleetloop.results.junit import write_junit
 from fleetloop.results.outcome import Outcome, of_error, of_summary, unbegun
 from fleetloop.results.summary import Summary
 from fleetloop.results.tables import print_report, print_results
-from fleetloop.signals import stop_on_signals
+from fleetloop.signals import interruptible, stop_on_signals
 from fleetloop.terminal import RunProgress, note, say_json
 
 EXIT_STATUS = {
@@ -102,7 +102,7 @@ class _Teller:
     def __init__(self, source: str, options: RunOptions) -> None:
         self._source, self._options = source, options
         self.lines = JsonLines() if options.json_lines else None
-        self.told = False
+        self.begun = self.told = False
 
     def tell(self, outcome: Outcome) -> int:
         """Tell the outcome as the options want it; return the exit status."""
@@ -119,11 +119,17 @@ class _Teller:
         return status
 
 
-def run_scenario(source: str, options: RunOptions) -> int:
+@interruptible
+def run_scenario(source: str, options: RunOptions, *, interrupted: bool = False) -> int:
     """Run a scenario, save and print its results; return the exit status.
 
-    Where standard output is JSON an error, or an early Ctrl-C, is told as an outcome, too, and not
-    raised.
+    Where standard output is JSON an error is told as an outcome, too, and not raised; so is Ctrl-C
+    before or after the run itself, which ends in order.
+
+    Args:
+        source: name or file of the scenario.
+        options: of the command line.
+        interrupted: Ctrl-C came before this.
 
     Raises:
         ScenarioError: the scenario or an option is wrong; nothing was started.
@@ -131,7 +137,7 @@ def run_scenario(source: str, options: RunOptions) -> int:
     """
     teller = _Teller(source, options)
     try:
-        return _run(source, options, teller)
+        return _run(source, options, teller, interrupted=interrupted)
     except FleetloopError as error:
         if teller.told:
             raise
@@ -140,13 +146,16 @@ def run_scenario(source: str, options: RunOptions) -> int:
             return status
         raise
     except KeyboardInterrupt:
-        if teller.told or not options.for_programs:
-            raise
-        reason = "interrupted before it began"
+        if teller.told:
+            return ExitStatus.INTERRUPTED
+        reason = f"interrupted {'before it had results' if teller.begun else 'before it began'}"
+        note(f"{source}: {reason}")
         return teller.tell(unbegun(source, "interrupted", reason, ExitStatus.INTERRUPTED))
 
 
-def _run(source: str, options: RunOptions, teller: _Teller) -> int:
+def _run(source: str, options: RunOptions, teller: _Teller, *, interrupted: bool) -> int:
+    if interrupted:
+        raise KeyboardInterrupt
     scenario = load(source, options.overrides)
     manner = Manner(
         in_process=options.in_process,
@@ -167,6 +176,7 @@ def _run(source: str, options: RunOptions, teller: _Teller) -> int:
     ):
         live = _Live(progress, schedule(scenario).period_ns)
         listener = live.listener if told is None else told.listener
+        teller.begun = True
         carried = carry_out(scenario, options.out, manner, deployment, listener, stop)
     ended, reason = carried.stats.ended, carried.stats.reason
     if not carried.stats.began:

@@ -1,5 +1,11 @@
-"""`fleetloop ps`: the runs of this user that go on on this machine, from their doors."""
+"""`fleetloop ps`: the runs of this user that go on on this machine, from their doors and locks.
 
+A run that is starting has no door yet, and `fleetloop plant` alone has none.
+"""
+
+import contextlib
+import os
+from pathlib import Path
 from typing import NamedTuple
 
 from rich.table import Table
@@ -10,7 +16,7 @@ from configs.errors import InfrastructureError
 from fleetloop.door.client import CONNECT_S, RefusedError, RunClient, doors
 from fleetloop.terminal import ResultConsole, note, say_json
 
-NO_ANSWER = "no answer"
+NO_ANSWER, NO_DOOR = "no answer", "no door"
 
 
 class GoingOn(NamedTuple):
@@ -19,7 +25,7 @@ class GoingOn(NamedTuple):
     run: str
     scenario: str | None
     state: str
-    """What `run.status` says; suspended by Ctrl-Z; or no answer."""
+    """What `run.status` says; suspended by Ctrl-Z; no answer; or no door."""
     t_s: float | None
     pid: int  # of its launcher; 0: in another container
     folder: str | None
@@ -31,7 +37,14 @@ def going_on() -> list[GoingOn]:
     for client in doors():
         with client:
             found.append(_look_at(client))
-    return found
+    known = {one.run for one in found}
+    for lock in sockets.trusted(f"*/{sockets.LOCK}"):
+        run = lock.parent.name
+        if run not in known and sockets.is_held(lock):
+            pid = _holder(lock)
+            state = "suspended" if _suspended(pid) else NO_DOOR
+            found.append(GoingOn(run, None, state, None, pid, None))
+    return sorted(found, key=lambda one: one.run)
 
 
 def _look_at(client: RunClient) -> GoingOn:
@@ -52,6 +65,18 @@ def _state(client: RunClient) -> str:
         return "running"
     except InfrastructureError:
         return NO_ANSWER
+
+
+def _holder(lock: Path, locks: Path = Path("/proc/locks")) -> int:
+    """The process that holds a file's lock, as the kernel says; 0: one of another container."""
+    with contextlib.suppress(OSError):
+        status = lock.stat()
+        device = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}"
+        for line in locks.read_text("ascii").splitlines():
+            _, kind, _, _, pid, place, *_ = line.split()
+            if (kind, place) == ("FLOCK", f"{device}:{status.st_ino}"):
+                return max(int(pid), 0)
+    return 0
 
 
 def _suspended(pid: int) -> bool:

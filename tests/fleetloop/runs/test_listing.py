@@ -11,7 +11,7 @@ from configs.errors import InfrastructureError
 from fleetloop.door.requests import Request
 from fleetloop.door.server import Door
 from fleetloop.runs import listing
-from fleetloop.runs.listing import NO_ANSWER, GoingOn, going_on, list_runs
+from fleetloop.runs.listing import NO_ANSWER, NO_DOOR, GoingOn, going_on, list_runs
 from fleetloop.runs.stopping import stop_run
 
 ABOUT = {"run": "demo-000001", "folder": "/runs/demo", "scenario": "demo", "tick": 5, "t_s": 0.5}
@@ -47,6 +47,15 @@ def served():
 def test_a_run_is_listed_with_its_launcher(served) -> None:
     served(about=ABOUT, run_status={"state": "paused"})
     assert going_on() == [GoingOn("demo-000001", "demo", "paused", 0.5, os.getpid(), "/runs/demo")]
+
+
+def test_a_run_without_a_door_is_listed_with_who_holds_its_lock() -> None:
+    with sockets.run_folder("starting-000002") as folder:
+        assert going_on() == [GoingOn("starting-000002", None, NO_DOOR, None, os.getpid(), None)]
+        (folder / sockets.LOCK).rename(folder.parent / "elsewhere")
+        (folder / sockets.LOCK).touch()  # of a run that was killed
+        assert going_on() == []
+        (folder.parent / "elsewhere").unlink()
 
 
 def test_it_is_a_table_or_json(served, capsys) -> None:
