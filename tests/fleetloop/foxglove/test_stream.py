@@ -1,6 +1,8 @@
 """A run at a Foxglove WebSocket, as a client of the documented protocol has it."""
 
 import asyncio
+import json
+import re
 import sys
 from collections import Counter
 from collections.abc import Awaitable, Callable
@@ -26,6 +28,7 @@ from fleetloop.record.foxglove_schemas import schema_text
 from fleetloop.record.reader import Record
 
 PERIOD_NS = 2_000_000
+EVIL = '{"id": 1, "topic": "evil", "encoding": "json", "schemaName": ""}'
 STOPPED = Event(30, "r2", "stopped", "a drive <b>dropped</b> out")
 
 
@@ -173,6 +176,38 @@ def test_one_that_reads_nothing_loses_the_oldest_and_holds_up_nobody(served) -> 
         assert BACKLOG // 2 < heard < count
         await reader.close()
         await idle.close()
+
+    served(test)
+
+
+@pytest.mark.parametrize(
+    ("sent", "answer"),
+    [
+        ("no JSON", "Invalid message"),
+        ('{"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 999}]}', "Unknown channel"),
+        ('{"op": "advertise", "channels": [' + EVIL + "]}", "not support clientPublish"),
+        (b"\x01\x01\0\0\0fake", "clientPublish|Unknown channel"),
+        (b"\xff" * 1000, "Unknown binary opcode"),
+    ],
+)
+def test_what_a_client_sends_beside_subscriptions_is_refused_and_changes_nothing(
+    served, sent: str | bytes, answer: str
+) -> None:
+    async def test(bench: Bench) -> None:
+        socket = await websocket_connect(bench.stream.address, subprotocols=["foxglove.sdk.v1"])
+        await socket.write_message(sent, binary=isinstance(sent, bytes))
+        texts = [json.loads(await socket.read_message()) for _ in range(3)]
+        assert [text["op"] for text in texts] == ["serverInfo", "advertise", "status"]
+        assert re.search(answer, texts[2]["message"])
+        socket.close()
+        assert await socket.read_message() is None
+        client = await FoxgloveClient.open(bench.stream.address)
+        assert "evil" not in client.channels
+        await client.subscribe("scene/paths")
+        await bench.until_watched()
+        bench.stream.push()
+        assert (await client.take(1))[0].topic == "scene/paths"
+        await client.close()
 
     served(test)
 
