@@ -11,7 +11,9 @@ robot's body is where it is: its law drives it to its place.
 A controller that was started again in a run that goes on takes it likewise, once it knows its pose,
 the leader and a neighbour. One without in-neighbours heard only the leader, whose profile it knows:
 its (38), (40) and (45) are repeated from t = 0, so its path variable goes on as if nothing had
-happened.
+happened. One that is linked to the leader and hears none of its in-neighbours for as long as a
+silent one counts does the same: they may wait for it, as where robots that hear only each other
+were all started again. The others hear it then: the graph has a path from the leader to each.
 """
 
 from collections.abc import Callable
@@ -30,7 +32,16 @@ _NOBODY = Sums(0, 0.0, 0.0, 0.0)
 class Joining:
     """When a robot is part of the formation, and its path variable before that."""
 
-    __slots__ = ("_awaits", "_brief", "_coordinator", "_edges", "_neighbours", "_start", "joins")
+    __slots__ = (
+        "_awaits",
+        "_brief",
+        "_coordinator",
+        "_edges",
+        "_neighbours",
+        "_since_tick",
+        "_start",
+        "joins",
+    )
 
     def __init__(
         self,
@@ -46,6 +57,7 @@ class Joining:
         self._coordinator = coordinator
         self._start = start
         self._awaits = brief.rejoins  # what it needs to know to re-join
+        self._since_tick = FOREVER  # from when on nothing but a neighbour was missing
         self.joins = FOREVER if brief.rejoins else brief.membership.joins_tick
         """The first tick of its membership."""
 
@@ -66,16 +78,19 @@ class Joining:
         return joining(self._neighbours, tick * period_ns, self._edges.h, v_r, self._start)
 
     def _rejoin(self, tick: int, leader: LeaderSpeed | None) -> None:
-        """Join at the next tick, unless there are in-neighbours and none is heard yet."""
+        """Join at the next tick, unless an in-neighbour is to be heard first."""
         period_ns = self._brief.schedule.period_ns
-        if not self._brief.hears:
+        self._since_tick = min(tick, self._since_tick)
+        listened_s = (tick - self._since_tick) * period_ns * 1e-9
+        if not self._neighbours.carried_on(tick * period_ns)[0]:
+            waits = leader is None or listened_s < self._brief.coordination.silence_limit_s
+            if self._brief.hears and waits:
+                return
 
             def v_r(k: int) -> float:
                 return 0.0 if leader is None else speed_at(leader.changes, k * period_ns)
 
             self._start = repeated(self._start, self._coordinator, self._edges.h, v_r, tick)
-        elif not self._neighbours.carried_on(tick * period_ns)[0]:
-            return
         self._awaits = False
         self.joins = max(tick, self._brief.membership.joins_tick)
 

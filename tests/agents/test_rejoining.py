@@ -11,9 +11,9 @@ LATE = 1500
 """Its first tick."""
 
 
-def again(robot: str) -> Bench:
+def again(robot: str, *overrides: str) -> Bench:
     """A controller of two_robots whose predecessor was killed, and drives that were left idle."""
-    bench = Bench(robot, "clock.mode='realtime'", "host.restarts=1", rejoins=True)
+    bench = Bench(robot, "clock.mode='realtime'", "host.restarts=1", *overrides, rejoins=True)
     bench.tick_now = LATE
     return bench
 
@@ -69,6 +69,29 @@ def test_without_in_neighbours_its_path_variable_goes_on_as_if_nothing_had_happe
     before.run(bench.tick_now)
     assert bench.agent.speaks(bench.tick_now)
     assert bench.agent.share(bench.tick_now) == before.agent.share(bench.tick_now)
+
+
+def test_linked_to_the_leader_it_begins_without_neighbours_once_a_silent_one_counts_no_more() -> (
+    None
+):
+    bench = again("r2", "graph.leader=['r1', 'r2']", "coordination.silence_limit_s=0.5")
+    bench.agent.receive_leader_speed(LeaderSpeed((SpeedChange(0, 0.6),)))
+    run(bench, 249)
+    assert not bench.agent.speaks(bench.tick_now)
+    run(bench, 5)
+    assert bench.agent.speaks(bench.tick_now)
+    state = bench.agent.share(bench.tick_now)
+    assert state.s == pytest.approx(0.6 * bench.tick_now * 0.002, abs=0.02)
+    assert state.v_hat == pytest.approx(0.6, abs=1e-3)
+    hear(bench, state.s - 0.1)
+    run(bench, 20)
+    assert bench.agent.share(bench.tick_now).s < state.s + 20 * 0.6 * 0.002  # it agrees with it
+
+
+def test_without_link_to_the_leader_it_waits_for_a_neighbour_however_long() -> None:
+    bench = again("r2", "coordination.silence_limit_s=0.5")
+    run(bench, 600)
+    assert not bench.agent.speaks(bench.tick_now)
 
 
 def test_without_the_leaders_word_it_does_not_begin() -> None:
