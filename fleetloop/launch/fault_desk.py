@@ -92,6 +92,12 @@ class FaultDesk:
         for _, _, respond in due:
             respond()
 
+    def end(self) -> None:
+        """Answer what still waits for a tick: the run ends, perhaps by a fault that was ordered."""
+        for _, _, respond in self._reached:
+            respond()
+        self._reached.clear()
+
     # --- requests --------------------------------------------------------------------------------
 
     def _list(self, respond: Respond) -> None:

@@ -296,7 +296,9 @@ class ProcessRun:
             faults.follow(desk.ledger.absences(self._schedule.ticks))
             status = self._asked.status
             status.is_restarting, status.is_ending = restarts.awaits, lambda: stop.requested
-            return self._follow(link, stop, restarts, faults, door)
+            failure = self._follow(link, stop, restarts, faults, door)
+            self._asked.end()
+            return failure
 
     def _follow(
         self,

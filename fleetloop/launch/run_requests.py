@@ -77,6 +77,10 @@ class RunRequests:
         self.faults.look()
         self._viewer.look()
 
+    def end(self) -> None:
+        """Answer what can still be answered: the run has ended."""
+        self.faults.end()
+
     def of_run(self, run: str, stop: Callable[[str], None]) -> Mapping[str, Request]:
         """The table of requests of one run; `stop` ends it, for a reason."""
         self.steering.on_stop = stop

@@ -98,6 +98,17 @@ def test_a_fault_is_ordered_of_the_plant_and_answered_when_the_run_has_reached_i
     assert bench.faults() == {"push": ("over", 1017, 1267)}
 
 
+def test_an_order_that_ends_the_run_is_answered_all_the_same() -> None:
+    bench = Bench()
+    bench.inject(kind="process_kill", robots=["r2"])
+    bench.answer("plant", 1017)
+    assert bench.answers == []
+    bench.tick = 1019
+    bench.desk.end()
+    (answer,) = bench.answers
+    assert (answer["fault"]["state"], answer["fault"]["from_tick"]) == ("acting", 1017)
+
+
 def test_in_lockstep_the_plant_answers_for_controllers() -> None:
     bench = Bench()
     bench.inject(**CUT, at_s=3.0)
