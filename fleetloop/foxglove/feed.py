@@ -1,8 +1,8 @@
 """Rows of a run that goes on → the messages that are in its record, as far as it has got. Pure.
 
 Rows come in blocks of consecutive ticks, of each source on its own; messages are made of those
-ticks that all sources have, but for sources that have fallen silent. Of a robot's rows those that
-begin a new `ROW_PERIOD_NS` are shown; poses, scenes, frames and differences of s are the record's.
+ticks that all sources have, but for sources that have fallen silent. Of a robot's rows those are
+shown that have a pose in the record; poses, scenes, frames and differences of s are the record's.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -11,12 +11,11 @@ import numpy as np
 
 from configs.brief import Drawing
 from configs.signals import Signal
-from fleetloop.record.messages import pose_messages, row_messages
+from fleetloop.record.messages import POSE_PERIOD_NS, pose_messages, row_messages
 from fleetloop.record.schema import Kind, Layout, View, channel_id, view_of
 from fleetloop.record.views import VIEW_PERIOD_NS, Views
 from fleetloop.record.writer import Source
 
-ROW_PERIOD_NS = 10_000_000
 BEHIND_TICKS = 512
 """A source that is so far behind the farthest one has no rows any more that others wait for."""
 MOST_WAITING_BYTES = 1 << 25
@@ -61,16 +60,22 @@ class Feed:
         robots: in their order, each with the table of its controller's rows.
         drawing: for the views.
         period_ns: of the rows.
+        lifetime_ns: what is drawn vanishes after this scenario time; None: as in the record.
     """
 
     def __init__(
-        self, robots: Mapping[str, Sequence[Signal]], drawing: Drawing, period_ns: int
+        self,
+        robots: Mapping[str, Sequence[Signal]],
+        drawing: Drawing,
+        period_ns: int,
+        *,
+        lifetime_ns: int | None = None,
     ) -> None:
         self.layout = Layout.of(robots)
         self._period_ns = period_ns
-        self._views = Views(self.layout, drawing, period_ns)
+        self._views = Views(self.layout, drawing, period_ns, lifetime_ns)
         self._numbers = {robot: number for number, robot in enumerate(robots)}
-        self._every = max(1, ROW_PERIOD_NS // period_ns)
+        self._every = max(1, POSE_PERIOD_NS // period_ns)
         self._kept_ticks = 2 * max(1, VIEW_PERIOD_NS // period_ns)
         self._room = MOST_WAITING_BYTES
         self._first: int | None = None  # tick from which on there are rows, None: not known yet

@@ -1,6 +1,6 @@
 """A run that goes on at a Foxglove WebSocket: what was heard of it, to those who look."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -12,6 +12,10 @@ from fleetloop.foxglove.server import FoxgloveServer
 from fleetloop.record.events import log_message
 from fleetloop.record.schema import View
 from fleetloop.record.writer import Source
+
+LIFETIME_NS = 2_000_000_000
+"""Of what is drawn. A client takes a message to be as old as the last time that it was told, and in
+a fast run a push is half a second after the one before: it must not vanish in between."""
 
 
 class Stream:
@@ -37,7 +41,7 @@ class Stream:
         drawing: Drawing,
         period_ns: int,
     ) -> None:
-        self._feed = Feed(robots, drawing, period_ns)
+        self._feed = Feed(robots, drawing, period_ns, lifetime_ns=LIFETIME_NS)
         self._server = FoxgloveServer(self._feed.layout, run)
         self._period_ns = period_ns
         self._events: list[np.ndarray] = []
@@ -62,22 +66,28 @@ class Stream:
     def push(self) -> None:
         """Send what is new to those who look."""
         wanted, newcomers = self._server.wanted, self._server.newcomers()
-        for client, channels in newcomers.items():
-            if View.PATHS in channels:
-                self._server.send(self._feed.paths(), client)
-            if View.LOG in channels:
-                self._server.send(((View.LOG, it) for it in self._events[: self._told]), client)
-            self._server.send(self._feed.newest(channels), client)
-        new = self._events[self._told :]
+        missed = {client: self._missed(channels) for client, channels in newcomers.items()}
+        new = [(View.LOG, it) for it in self._events[self._told :]]
         self._told = len(self._events)
         if not wanted:
             self._feed.skip()
             return
-        messages = list(self._feed.messages(wanted))
+        messages = [*new, *self._feed.messages(wanted)]
         if newcomers or self._feed.time_ns > self._time_ns:
             self._time_ns = self._feed.time_ns
             self._server.tell_time(self._time_ns)
-        self._server.send((*((View.LOG, it) for it in new), *messages))
+        for client, said in missed.items():
+            self._server.send(said, client)
+        self._server.send(messages)
+
+    def _missed(self, channels: Collection[int]) -> list[tuple[int, np.ndarray]]:
+        """What was said on these channels before, as far as it is of interest still."""
+        said = [*self._feed.newest(channels)]
+        if View.PATHS in channels:
+            said += self._feed.paths()
+        if View.LOG in channels:
+            said += [(View.LOG, it) for it in self._events[: self._told]]
+        return said
 
     def stop(self) -> None:
         """End it, and all connections."""

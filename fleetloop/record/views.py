@@ -62,9 +62,12 @@ class Views:
         layout: of the record.
         drawing: what is known of the scenario.
         period_ns: of the rows.
+        lifetime_ns: after this time scenes vanish; None: two periods of the views.
     """
 
-    def __init__(self, layout: Layout, drawing: Drawing, period_ns: int) -> None:
+    def __init__(
+        self, layout: Layout, drawing: Drawing, period_ns: int, lifetime_ns: int | None = None
+    ) -> None:
         self._names = layout.robots
         self._robots = drawing.robots or (DrawnRobot(),) * len(layout.robots)
         self._colours = [scene.colour_of(robot.colour) for robot in self._robots]
@@ -72,7 +75,9 @@ class Views:
         self._silence_s = drawing.silence_s
         self._period_ns = period_ns
         self._every = max(1, VIEW_PERIOD_NS // period_ns)
-        self._lifetime_ns = scene.LIFETIME_PERIODS * self._every * period_ns
+        if lifetime_ns is None:
+            lifetime_ns = scene.LIFETIME_PERIODS * self._every * period_ns
+        self._lifetime_ns = lifetime_ns
         self._templates: dict[tuple[View, tuple[int, ...]], Template] = {}
         self._edges = [_edge(layout, *named) for named in drawing.edges]
         self._taken: list[_Taken] = []

@@ -89,16 +89,17 @@ def test_a_client_hears_what_it_subscribes_to_in_the_schemas_of_the_record(serve
         await client.subscribe("scene/robots", "tf", "robot/r1/plant")
         await bench.until_watched(3)
         bench.go_to(100)
-        said = await client.take(4 + 4 + 20)
+        said = await client.take(4 + 4 + 10)
         assert [one.time_ns for one in said] == sorted(one.time_ns for one in said)
-        (truth,) = [it.content for it in said if it[:2] == ("robot/r1/plant", 150_000_000)]
-        (frames,) = [it.content for it in said if it[:2] == ("tf", 150_000_000)]
-        (drawn,) = [it.content for it in said if it[:2] == ("scene/robots", 150_000_000)]
-        assert truth.tick == 75
+        (truth,) = [it.content for it in said if it[:2] == ("robot/r1/plant", 100_000_000)]
+        (frames,) = [it.content for it in said if it[:2] == ("tf", 100_000_000)]
+        (drawn,) = [it.content for it in said if it[:2] == ("scene/robots", 100_000_000)]
+        assert truth.tick == 50
         frame, entity = frames.transforms[0], drawn.entities[0]
         assert (frame.parent_frame_id, frame.child_frame_id) == ("world", "r1")
         assert (frame.translation.x, frame.translation.y) == (truth.x_m, truth.y_m)
         assert (entity.id, entity.frame_id) == ("robot r1", "world")
+        assert entity.lifetime.sec == 2
         assert entity.cubes[0].pose.position.x == truth.x_m
         assert await client.time_ns() == 99 * PERIOD_NS
         await client.close()
