@@ -17,6 +17,8 @@ from fleetloop.results.palette import robot_style
 
 LAYOUT = "layout.json"
 SCENES = (View.PATHS, View.ROBOTS, View.REFERENCES, View.EDGES)
+LOG_PANEL = "RosOut!events"
+"""The type of log panels has kept its first name in layouts of this form."""
 MOST_ROBOTS = 12
 """Of whose rows there are plots, the first ones of the scenario."""
 _TITLES = ("foxglovePanelTitle", "lichtblickPanelTitle")
@@ -40,7 +42,7 @@ def _layout(scenario: Scenario) -> dict[str, Any]:
     panels = {
         "3D!plane": _plane(scenario),
         **plots,
-        "Log!events": {
+        LOG_PANEL: {
             "topicToRender": VIEW_TOPICS[View.LOG],
             "minLogLevel": 1,
             "searchTerms": [],
@@ -54,7 +56,7 @@ def _layout(scenario: Scenario) -> dict[str, Any]:
         "playbackConfig": {"speed": 1},
         "layout": {
             "direction": "row",
-            "first": _split(("3D!plane", "Log!events"), 75),
+            "first": _split(("3D!plane", LOG_PANEL), 75),
             "second": _stack(tuple(plots)),
             "splitPercentage": 50,
         },

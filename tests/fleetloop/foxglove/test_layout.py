@@ -50,7 +50,12 @@ def test_the_plane_shows_all_scenes_and_the_log_panel_the_log(
     messages = first_messages(finished_run / "record.mcap")
     shown = layout["configById"]["3D!plane"]["topics"]
     assert shown == {t: {"visible": True} for t in sorted(messages) if t.startswith("scene/")}
-    assert layout["configById"]["Log!events"]["topicToRender"] in messages
+    assert layout["configById"]["RosOut!events"]["topicToRender"] in messages
+
+
+def test_the_types_of_panels_are_those_of_viewers(layout: dict[str, Any]) -> None:
+    types = {panel.partition("!")[0] for panel in layout["configById"]}
+    assert types == {"3D", "Plot", "RosOut"}  # unknown ones show an error
 
 
 def test_every_panel_has_its_place(layout: dict[str, Any]) -> None:
