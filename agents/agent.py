@@ -213,12 +213,19 @@ class Agent:
         return self.faults.take(order, order.tick(tick, self.last_tick))
 
     def take_leader_order(self, order: LeaderOrder, tick: int) -> int | str:
-        """Take an order of v_r before a tick; the tick from which on it acts, or why it can't."""
+        """Take an order of v_r before a tick; the tick from which on it acts, or why it can't.
+
+        An order that is repeated only brings its reach.
+        """
+        ordered = order.change(order.from_tick, self._schedule.period_ns)
+        if self._reception.knows_leader_speed(ordered):
+            self._reception.admission.reach = order.reach
+            return order.from_tick
         acts = order_tick(order.from_tick, tick, self.last_tick, exact=order.exact)
-        if isinstance(acts, str):
-            return acts
-        change = order.change(acts, self._schedule.period_ns)
-        return self._reception.change_leader_speed(change, order.reach) or acts
+        if not isinstance(acts, str):
+            change = order.change(acts, self._schedule.period_ns)
+            self._reception.change_leader_speed(change, order.reach)
+        return acts
 
     # --- one period --------------------------------------------------------------------------
 

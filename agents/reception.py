@@ -103,20 +103,22 @@ class Reception:
         if self.admission.admits_leader_speed(speed):
             self.leader = speed
 
-    def change_leader_speed(self, change: SpeedChange, reach: Reach) -> str | None:
-        """Take an ordered change of v_r; why it can't be, None if it is taken.
+    def knows_leader_speed(self, change: SpeedChange) -> bool:
+        """Whether an ordered change of v_r, which may act later than ordered, is there already."""
+        known = () if self.leader is None else self.leader.changes
+        wanted = (change.speed_m_s, change.ramp_ns)
+        return any(it.from_ns >= change.from_ns and it[1:] == wanted for it in known)
+
+    def change_leader_speed(self, change: SpeedChange, reach: Reach) -> None:
+        """Take an ordered change of v_r.
 
         Args:
             change: from a tick on that hasn't come.
             reach: of a scenario with this change, in which neighbours' messages are believed.
         """
         if self.leader is not None:
-            changes = with_change(self.leader.changes, change)
-            if isinstance(changes, str):
-                return changes
-            self.leader = LeaderSpeed(tuple(changes))
+            self.leader = LeaderSpeed(tuple(with_change(self.leader.changes, change)))
         self.admission.reach = reach
-        return None
 
     def channel_of(self, source: str, tick: int) -> Channel[Any]:
         """The emulated edge from a source; one without effects is made if there is none.

@@ -1,10 +1,11 @@
 """The virtual leader's speed over time: steps, and ramps between two speeds.
 
-    v_r(t) = v_k−1                                        t < t_k
-           = v_k−1 + (v_k − v_k−1) (t − t_k) / T_k        t_k ≤ t < t_k + T_k
-           = v_k                                          t_k + T_k ≤ t < t_k+1
+    v_r(t) = w_k + (v_k − w_k) (t − t_k) / T_k        t_k ≤ t < t_k + T_k, t < t_k+1
+           = v_k                                      t_k + T_k ≤ t < t_k+1
 
-with T_k = 0 for a step. Before the first change its speed holds. v_r = 0: the formation stands.
+with T_k = 0 for a step, and w_k the speed at which change k−1 is at t_k: v_k−1, or what its ramp
+has reached, which change k ends. Before the first change its speed holds. v_r = 0: the formation
+stands.
 """
 
 from bisect import bisect_right
@@ -28,15 +29,26 @@ class SpeedChange(NamedTuple):
 
 
 def speed_at(changes: Sequence[SpeedChange], t_ns: float) -> float:
-    """v_r at a scenario time [m/s]; `changes`: at least one, in order, none within another."""
+    """v_r at a scenario time [m/s]; `changes`: at least one, in order."""
     last = bisect_right(changes, (t_ns, inf)) - 1  # that has begun
     if last < 0:
         return changes[0].speed_m_s
     from_ns, speed, ramp_ns = changes[last]
     if t_ns >= from_ns + ramp_ns:
         return speed
-    before = changes[max(last - 1, 0)].speed_m_s
+    before = _speed_before(changes, last)
     return before + (speed - before) * ((t_ns - from_ns) / ramp_ns)
+
+
+def _speed_before(changes: Sequence[SpeedChange], number: int) -> float:
+    """The speed from which a change begins."""
+    first = number  # of the ramps that the next one ends
+    while first > 0 and changes[first - 1].to_ns > changes[first].from_ns:
+        first -= 1
+    speed = changes[max(first - 1, 0)].speed_m_s
+    for one, other in pairwise(changes[first : number + 1]):
+        speed += (one.speed_m_s - speed) * ((other.from_ns - one.from_ns) / one.ramp_ns)
+    return speed
 
 
 def corners(changes: Sequence[SpeedChange], until_ns: int) -> list[int]:
@@ -48,8 +60,8 @@ def corners(changes: Sequence[SpeedChange], until_ns: int) -> list[int]:
     return sorted({0, *(t_ns for t_ns in found if 0 < t_ns < until_ns), until_ns})
 
 
-def with_change(changes: Sequence[SpeedChange], change: SpeedChange) -> Sequence[SpeedChange] | str:
-    """The changes with one more, in place of one at its time but the first; why not, if it can't.
+def with_change(changes: Sequence[SpeedChange], change: SpeedChange) -> list[SpeedChange]:
+    """The changes with one more, in place of one at its time but the first.
 
     Args:
         changes: at least one, in order.
@@ -57,17 +69,9 @@ def with_change(changes: Sequence[SpeedChange], change: SpeedChange) -> Sequence
     """
     first, *later = changes
     kept = [one for one in later if one.from_ns != change.from_ns]
-    found = sorted((first, *kept, change), key=lambda one: one.from_ns)
-    for one, other in pairwise(found):
-        if one.to_ns > other.from_ns:
-            since_s, until_s = one.from_ns * 1e-9, one.to_ns * 1e-9
-            return (
-                f"v_r changes at {other.from_ns * 1e-9:g} s, within its ramp from {since_s:g} s to"
-                f" {until_s:g} s"
-            )
-    return found
+    return sorted((first, *kept, change), key=lambda one: one.from_ns)
 
 
 def in_order(changes: Sequence[SpeedChange]) -> bool:
-    """Whether each change begins when the one before it is over."""
-    return all(one.to_ns <= other.from_ns for one, other in pairwise(changes))
+    """Whether no change begins before the one before it."""
+    return all(one.from_ns <= other.from_ns for one, other in pairwise(changes))

@@ -188,7 +188,8 @@ class SpeedStep(Parameters):
     t_s: SecondsOrZero
     speed_m_s: Finite
     ramp_s: SecondsOrZero = parameter(
-        0.0, "the speed changes linearly over this time, from t_s on; 0: at once"
+        0.0,
+        "the speed changes linearly over this time, from t_s on, or to the next step; 0: at once",
     )
 
 

@@ -29,12 +29,12 @@ from configs.scenario import Scenario
 from fleetloop.api.result import Run
 from fleetloop.jobs import pool
 from fleetloop.jobs.job import Tell, Told
+from fleetloop.launch.conclusion import conclude
 from fleetloop.launch.conduct import (
     Listener,
     Manner,
     Words,
     carry_out,
-    conclude,
     deployment_of,
     prepare,
 )

@@ -1,11 +1,11 @@
-"""A run from its scenario to its summary, whoever asks for it: the command, a program, a job.
+"""A run from its scenario to its record, whoever asks for it: the command, a program, a job.
 
 prepare     what is wrong with it, before anything is started
 carry_out   the run: its folder, its processes or none, its statistics
-conclude    its summary and events, from the record
+
+Its summary is made by `fleetloop.launch.conclusion`.
 """
 
-import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,7 @@ from bridge.process.lifecycle import Stop
 from configs.connections import NetworkLink
 from configs.deployment import Deployment, load_deployment
 from configs.errors import InfrastructureError, ScenarioError
-from configs.events import KINDS, Event, in_order
+from configs.events import Event
 from configs.faults.plan import process_fault_problem
 from configs.loading import to_toml
 from configs.overrides import Overrides
@@ -32,13 +32,12 @@ from fleetloop.launch.accounts import stats_of
 from fleetloop.launch.drawn import drawing
 from fleetloop.launch.fault_ledger import FaultLedger
 from fleetloop.launch.process_run import ProcessRun
+from fleetloop.launch.viewer import NO_VIEWER
 from fleetloop.record.background import BackgroundWriter
-from fleetloop.record.events import add_events
-from fleetloop.record.reader import Record
 from fleetloop.record.run_record import RunRecord
 from fleetloop.results import run_folder
 from fleetloop.results.expectations import out_of_reach
-from fleetloop.results.summary import RunStats, Summary, summarise, to_json
+from fleetloop.results.summary import RunStats
 from fleetloop.robot_states import RobotState
 
 
@@ -119,6 +118,34 @@ def prepare(
         ScenarioError: scenario, manner and deployment don't go together, or a necessary condition
             fails.
     """
+    _refuse(source, scenario, manner, words)
+    deployment = deployment_of(scenario, manner)
+    if manner.live and placement.is_external(deployment):
+        raise ScenarioError(
+            f"{words.live} with {words.deployment} {manner.deployment}: {NO_VIEWER}"
+        )
+    placement.check_credentials(scenario, deployment)
+    for user, why in placement.kept_out(deployment).items():
+        note(f"{user}: kept out: {why}")
+    if long := wall_time.warning(scenario, speed=manner.speed, in_process=manner.in_process):
+        note(long)
+    for line in out_of_reach(scenario):
+        note(f"{scenario.name}: {line}")
+    # But for the rehearsal: here is the run.
+    found = [one for one in examine(source, scenario, overrides) if one.level != "ok"]
+    for line in in_words(found):
+        note(line)
+    failed = list(dict.fromkeys(titled(one) for one in found if one.level == "error"))
+    if failed and not manner.force:
+        raise ScenarioError(
+            f"{source}: would not work as it is, by {'; '.join(failed)};"
+            f" {words.force} runs it all the same"
+        )
+    return deployment
+
+
+def _refuse(source: str, scenario: Scenario, manner: Manner, words: Words) -> None:
+    """Refuse options that don't go together."""
     realtime = scenario.clock.mode == "realtime"
     if manner.in_process and realtime:
         raise ScenarioError(
@@ -142,25 +169,6 @@ def prepare(
         raise ScenarioError(
             f"{words.speed} {manner.speed:g}: {words.in_process} runs as fast as it can"
         )
-    deployment = deployment_of(scenario, manner)
-    placement.check_credentials(scenario, deployment)
-    for user, why in placement.kept_out(deployment).items():
-        note(f"{user}: kept out: {why}")
-    if long := wall_time.warning(scenario, speed=manner.speed, in_process=manner.in_process):
-        note(long)
-    for line in out_of_reach(scenario):
-        note(f"{scenario.name}: {line}")
-    # But for the rehearsal: here is the run.
-    found = [one for one in examine(source, scenario, overrides) if one.level != "ok"]
-    for line in in_words(found):
-        note(line)
-    failed = list(dict.fromkeys(titled(one) for one in found if one.level == "error"))
-    if failed and not manner.force:
-        raise ScenarioError(
-            f"{source}: would not work as it is, by {'; '.join(failed)};"
-            f" {words.force} runs it all the same"
-        )
-    return deployment
 
 
 def deployment_of(scenario: Scenario, manner: Manner) -> Deployment:
@@ -313,51 +321,3 @@ def run_in_process(
         remarks=run.remarks,
         messages=run.messages,
     )
-
-
-class Concluded(NamedTuple):
-    """What a run came to."""
-
-    record: Record
-    summary: Summary
-    unsaved: InfrastructureError | None
-    """Why the summary, the scenario, or the events of the record could not be written."""
-
-
-def conclude(scenario: Scenario, carried: Carried) -> Concluded:
-    """Make the summary of a run that began, and write it into its folder, events into its record.
-
-    A scenario whose leader's speed was ordered is written again, with the steps that repeat it.
-
-    Raises:
-        RecordError: the record can't be read.
-        InfrastructureError: the record is gone.
-    """
-    with contextlib.closing(carried):
-        return _concluded(scenario, carried.folder, carried.stats)
-
-
-def _concluded(scenario: Scenario, folder: Path, stats: RunStats) -> Concluded:
-    path = folder / run_folder.RECORD
-    if not path.exists():
-        gone = stats.reason or f"{path} is not there: the run's folder was removed or moved"
-        raise InfrastructureError(gone)
-    record = Record.open(path)
-    if stats.steered is not None:
-        scenario = stats.steered
-    summary = summarise(record, scenario, stats)
-    unsaved: InfrastructureError | None = None
-    try:
-        run_folder.write(folder / run_folder.SUMMARY, to_json(summary))
-        if stats.steered is not None:
-            run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
-        add_events(record, _recorded(scenario, stats.events), schedule(scenario).period_ns)
-    except InfrastructureError as error:
-        unsaved = error
-    return Concluded(record, summary, unsaved)
-
-
-def _recorded(scenario: Scenario, events: Sequence[Event]) -> list[Event]:
-    """The events of a run that its record has: in lockstep those that equal runs have alike."""
-    realtime = scenario.clock.mode == "realtime"
-    return [it for it in in_order(events, scenario.names) if realtime or KINDS[it.kind].exact]

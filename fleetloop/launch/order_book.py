@@ -134,7 +134,8 @@ class OrderBook:
     def repeat(self, process: str) -> None:
         """Tell a process, which may have been started again, what it hasn't answered."""
         for pending in self._pending.values():
-            if process in pending.awaited and process in pending.told:
+            answered = process in pending.ticks or process in pending.refusals
+            if process in pending.told and not answered:
                 self.put(process, pending.told[process])
 
     def look(self) -> None:

@@ -14,13 +14,12 @@ from configs.overrides import Overrides
 from configs.resolve import schedule
 from configs.roles import short_name
 from fleetloop.json_lines import JsonLines
+from fleetloop.launch.conclusion import Concluded, conclude
 from fleetloop.launch.conduct import (
-    Concluded,
     Listener,
     Manner,
     Start,
     carry_out,
-    conclude,
     prepare,
 )
 from fleetloop.launch.run_lines import RunLines

@@ -70,6 +70,7 @@ class RunRequests:
         """Tell a process that is there, or there again, what it doesn't know."""
         self._book.repeat(process)
         self.faults.repeat(process)
+        self.steering.repeat(process)
 
     def look(self) -> None:
         """Answer what is due."""

@@ -61,6 +61,7 @@ class Steering:
         self.steered: Scenario | None = None
         """The scenario with the steps of v_r that were ordered; None: none was."""
         self._latest_s = 0.0  # of these, the latest
+        self._latest: LeaderOrder | None = None
         self._orders = orders
         self._note = note
         self.on_leader: Callable[[], None] = lambda: None
@@ -136,6 +137,7 @@ class Steering:
             t_s = orders.seconds(tick)
             self.scenario = with_step(self.scenario, t_s, speed_m_s, ramp_s)
             self.steered, self._latest_s = self.scenario, t_s
+            self._latest = order._replace(number=0, from_tick=tick)
             how = f" along a ramp of {ramp_s:g} s" if ramp_s else ""
             self._note("leader_speed", f"{speed_m_s:g} m/s{how}, ordered", tick)
             self.on_leader()
@@ -147,12 +149,21 @@ class Steering:
         if all(map(orders.is_absent, controllers)):
             raise ScenarioError("run.leader_speed: no controller is there to follow the leader")
         pending = orders.expect(controllers, done)
-        order = LeaderOrder(
-            pending.number, from_tick, False, speed_m_s, round(ramp_s * 1e9), reach
-        ).encode()
+        ramp_ns = round(ramp_s * 1e9)
+        order = LeaderOrder(pending.number, from_tick, False, speed_m_s, ramp_ns, reach)
         # Who is absent in real time has it once it is awake.
         for process in controllers if orders.schedule.realtime else (PLANT.name,):
-            orders.tell(pending, process, order)
+            orders.tell(pending, process, order.encode())
+
+    def repeat(self, process: str) -> None:
+        """Tell a controller the latest order, if it was started before that and hadn't listened.
+
+        In real time: it has the speeds by its hellos, and needs the reach. In lockstep the plant
+        hands orders on, to all.
+        """
+        role, _, _ = process.partition("/")
+        if self._latest is not None and role == AGENT.name and self._orders.schedule.realtime:
+            self._orders.put(process, self._latest.encode())
 
     def _leader(self, respond: Respond) -> None:
         leader = self.scenario.leader

@@ -30,6 +30,10 @@ from fleetloop.door.requests import Request, Respond
 
 PAGE, FOXGLOVE = "page", "foxglove"
 """Views of a run: the page is there from the viewer's start, the other one once it is wanted."""
+NO_VIEWER = (
+    "a router of its own knows no viewer, so that this run can have no page; one with"
+    ' network.router = "launcher" can'
+)
 NICE = 10
 """Of all its threads, which start after it is set: a tenth of the processor of what it competes
 with, which is about what a page needs."""
@@ -166,7 +170,7 @@ class Viewer:
         token = secrets.token_urlsafe(24)
         brief = self._brief(token)
         if brief is None:
-            raise ScenarioError("live.open: the router of this run is a program of its own")
+            raise ScenarioError(f"live.open: {NO_VIEWER}")
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             process = subprocess.Popen(

@@ -202,6 +202,22 @@ def test_an_ordered_speed_of_the_leader_is_repeated_and_what_was_refused_is_not(
     logged.assert_repeated()
 
 
+def test_an_order_of_the_leaders_speed_that_is_repeated_only_brings_its_reach() -> None:
+    bench = Bench("r1")
+    bench.agent.receive_leader_speed(LeaderSpeed((SpeedChange(0, 0.5),)))
+    bench.drive(1)
+    fast = replace(bench.agent.brief.reach, v_max_m_s=3.0)
+    order = LeaderOrder(1, bench.tick_now + 3, False, 0.1, 10**9, bench.agent.brief.reach)
+    acts = bench.agent.take_leader_order(order, bench.tick_now)
+    assert acts == order.from_tick
+    known = bench.agent._reception.leader
+    bench.drive(10)
+    again = order._replace(number=0, reach=fast)
+    assert bench.agent.take_leader_order(again, bench.tick_now) == acts
+    assert bench.agent._reception.leader == known
+    assert bench.agent.admission.reach == fast
+
+
 def test_with_an_ordered_speed_neighbours_are_believed_what_they_say_then() -> None:
     bench = Bench("r2")
     every, period_ns = bench.schedule.share_every, bench.schedule.period_ns

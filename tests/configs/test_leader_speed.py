@@ -47,19 +47,29 @@ def test_a_ramp_stays_between_its_speeds(before, after, ramp_ns, t_ns) -> None:
     assert min(before, after) - 1e-12 <= v_r <= max(before, after) + 1e-12
 
 
-def test_a_change_may_begin_when_the_ramp_before_it_is_over_and_not_earlier() -> None:
-    assert in_order(PROFILE)
-    assert not in_order((SpeedChange(0, 0.6), SpeedChange(20, 0.0, 8), SpeedChange(27, 0.5)))
+def test_a_change_within_a_ramp_begins_from_the_speed_there() -> None:
+    first = (SpeedChange(0, 0.6), SpeedChange(20, 0.2, 8))
+    second = (*first, SpeedChange(24, 0.0, 16))
+    third = (*second, SpeedChange(32, 1.0, 4))
+    assert in_order(third)
+    for t_ns in range(24):
+        assert speed_at(third, t_ns) == speed_at(first, t_ns)
+    assert speed_at(second, 24) == speed_at(first, 24)
+    assert speed_at(second, 32) == pytest.approx(0.2)  # half way from 0.4 to 0
+    assert speed_at(second, 40) == 0.0
+    assert speed_at(third, 34) == pytest.approx(0.6)
+    assert speed_at(third, 36) == 1.0
+    assert not in_order((SpeedChange(0, 0.6), SpeedChange(20, 0.0), SpeedChange(19, 0.5)))
+
+
+def test_thousands_of_ramps_within_each_other_have_a_speed() -> None:
+    many = [SpeedChange(n, float(n % 2), 1 << 40) for n in range(5000)]
+    assert 0.0 <= speed_at(many, 5000) <= 1.0
 
 
 @given(st.integers(0, 60), st.integers(0, 40))
-def test_one_more_change_is_in_order_or_refused_and_changes_nothing_before(
-    from_ns, ramp_ns
-) -> None:
+def test_one_more_change_is_in_order_and_changes_nothing_before(from_ns, ramp_ns) -> None:
     found = with_change(PROFILE, SpeedChange(from_ns, 0.3, ramp_ns))
-    if isinstance(found, str):
-        assert "within its ramp from" in found
-        return
     assert in_order(found)
     assert found[0] == PROFILE[0]
     assert [one for one in found if one.from_ns == from_ns][-1] == (from_ns, 0.3, ramp_ns)
@@ -67,27 +77,19 @@ def test_one_more_change_is_in_order_or_refused_and_changes_nothing_before(
         assert speed_at(found, t_ns) == speed_at(PROFILE, t_ns)
 
 
-def test_a_change_takes_the_place_of_one_at_its_time_but_not_within_a_ramp() -> None:
+def test_a_change_takes_the_place_of_one_at_its_time() -> None:
     assert with_change(PROFILE, SpeedChange(10, 0.1))[1] == SpeedChange(10, 0.1)
     assert len(with_change(PROFILE, SpeedChange(0, 0.1))) == len(PROFILE) + 1
-    assert isinstance(with_change(PROFILE, SpeedChange(22, 0.1)), str)
-    assert isinstance(with_change(PROFILE, SpeedChange(12, 0.1, 9)), str)
 
 
 @pytest.mark.parametrize(
     ("steps", "key", "remedy"),
     [
         ("{t_s=5.0, speed_m_s=0.2}, {t_s=5.0, speed_m_s=0.3}", "1.t_s", "t_s must increase"),
-        (
-            "{t_s=5.0, speed_m_s=0.2, ramp_s=4.0}, {t_s=8.0, speed_m_s=0.3}",
-            "1.t_s",
-            "within the ramp before it, from 5 s to 9 s: let it begin then, or lower that"
-            " ramp_s = 4 to 3 or less",
-        ),
         ("{t_s=5.0, speed_m_s=0.2, ramp_s=-1.0}", "0.ramp_s", "must be 0 or more"),
     ],
 )
-def test_steps_that_overlap_are_refused_by_key_and_cause(steps, key, remedy) -> None:
+def test_wrong_steps_are_refused_by_key_and_cause(steps, key, remedy) -> None:
     with pytest.raises(ScenarioError) as raised:
         load("paper", [f"leader.steps=[{steps}]"])
     assert f"leader.steps.{key}" in str(raised.value)

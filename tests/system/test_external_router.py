@@ -62,6 +62,15 @@ def test_a_run_at_a_stock_router_is_complete(tmp_path: Path) -> None:
         assert rows["tick"].tolist() == list(range(200))
 
 
+def test_a_page_is_refused_before_anything_is_started(tmp_path: Path) -> None:
+    where = with_passwords(tmp_path)
+    args = (SCENARIO, "--deployment", str(where), "--live")
+    status, out = completed(tmp_path / "run", *args)
+    assert status == 2
+    assert f"--live with --deployment {where}: a router of its own knows no viewer" in out
+    assert not (tmp_path / "run").exists()
+
+
 def test_the_file_has_limits_and_rights_and_its_users_are_for_their_owner(tmp_path: Path) -> None:
     out = written(with_passwords(tmp_path))
     config = zenoh.Config.from_file(str(out))

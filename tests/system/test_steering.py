@@ -37,6 +37,7 @@ def test_however_it_was_paused_and_sped_it_leaves_the_record_of_its_scenario(
         assert [one["to_tick"] for one in cleared] == [paused + 11]  # it never acted
         assert client.ask("run.speed", factor=4)["speed"] == 4.0
         assert client.ask("run.step", ticks=50)["tick"] == paused + 60
+        within = client.ask("run.leader_speed", speed_m_s=0.7, ramp_s=0.2)  # the first ramp
         client.ask("run.speed", factor=0)
         with pytest.raises(RefusedError, match=r"ramp_s = -1\.0: must be 0 or more"):
             client.ask("run.leader_speed", speed_m_s=0.3, ramp_s=-1)
@@ -44,9 +45,12 @@ def test_however_it_was_paused_and_sped_it_leaves_the_record_of_its_scenario(
         status, out = run.end()
     assert status == 0, out
     steps = tomllib.loads((a / SCENARIO).read_text())["leader"]["steps"]
-    assert steps == [{"t_s": ordered["t_s"], "speed_m_s": 0.3, "ramp_s": 1.0}]
+    assert steps == [
+        {"t_s": ordered["t_s"], "speed_m_s": 0.3, "ramp_s": 1.0},
+        {"t_s": within["t_s"], "speed_m_s": 0.7, "ramp_s": 0.2},
+    ]
     events = json.loads((a / SUMMARY).read_text())["events"]
-    assert [one["tick"] for one in events if one["kind"] == "leader_speed"][-1] == ordered["tick"]
+    assert [one["tick"] for one in events if one["kind"] == "leader_speed"][-1] == within["tick"]
     assert completed(b, str(a / SCENARIO), "--in-process")[0] == 0
     assert print_comparison(a, b, as_json=False) == 0, capsys.readouterr().out
     tick = ordered["tick"]

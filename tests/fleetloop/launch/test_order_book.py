@@ -119,6 +119,23 @@ def test_a_controller_that_is_started_again_is_told_again_what_it_has_not_answer
     assert bench.told == [R2]
 
 
+def test_a_controller_that_was_absent_at_an_order_is_told_when_it_is_there() -> None:
+    bench = Bench(REALTIME)
+    bench.absent.add(R1)
+    bench.order()
+    bench.sent.clear()
+    bench.book.repeat(R1)  # it is there before the others have answered
+    assert bench.told == [R1]
+    bench.answer(R2, 1100)
+    bench.sent.clear()
+    bench.book.repeat(R1)  # or afterwards
+    bench.steering.repeat(R1)
+    ((process, order),) = bench.sent
+    assert (process, order.from_tick, order.speed_m_s) == (R1, 1100, 0.3)
+    bench.steering.repeat("plant")
+    assert len(bench.sent) == 1
+
+
 def test_what_nobody_answers_is_refused_after_a_while() -> None:
     bench = Bench()
     bench.order()
