@@ -15,7 +15,6 @@ from fleetloop.record.scene import WORLD
 from fleetloop.record.schema import FLEET_SIGNALS, VIEW_TOPICS, Kind, View, topic
 from fleetloop.results.palette import robot_style
 
-LAYOUT = "layout.json"
 SCENES = (View.PATHS, View.ROBOTS, View.REFERENCES, View.EDGES)
 LOG_PANEL = "RosOut!events"
 """The type of log panels has kept its first name in layouts of this form."""

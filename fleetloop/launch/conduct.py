@@ -25,7 +25,7 @@ from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, si
 from configs.scenario import Scenario
 from fleetloop.check.examine import examine
 from fleetloop.check.finding import in_words, titled
-from fleetloop.foxglove.layout import LAYOUT, layout_of
+from fleetloop.foxglove.layout import layout_of
 from fleetloop.in_process import InProcessRun
 from fleetloop.launch import placement, wall_time
 from fleetloop.launch.accounts import stats_of
@@ -213,7 +213,7 @@ def carry_out(
     folder = created.path
     try:
         run_folder.write(folder / run_folder.SCENARIO, to_toml(scenario))
-        run_folder.write(folder / LAYOUT, layout_of(scenario))
+        run_folder.write(folder / run_folder.LAYOUT, layout_of(scenario))
         if manner.in_process:
             carried = Carried(folder, run_in_process(scenario, folder, listener, stop))
         else:

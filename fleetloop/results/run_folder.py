@@ -14,6 +14,7 @@ from fleetloop.terminal import note
 RECORD = run_record.RECORD
 SCENARIO = "scenario.toml"
 SUMMARY = "summary.json"
+LAYOUT = "layout.json"
 
 
 class IncompleteError(FleetloopError):
@@ -90,7 +91,7 @@ def discard(created: Created) -> None:
     can, inputs = created.path / run_record.CAN_FOLDER, created.path / inputs_file.FOLDER
     logs = (*can.glob("*.[bl][lo][fg]"), *inputs.glob("*.inputs"))
     with contextlib.suppress(OSError):
-        for file in (created.path / SCENARIO, created.path / RECORD, *logs):
+        for file in (*(created.path / name for name in (SCENARIO, RECORD, LAYOUT)), *logs):
             file.unlink(missing_ok=True)
     for folder in (can, inputs, *created.new):
         with contextlib.suppress(OSError):
