@@ -39,6 +39,22 @@ class RunEndedError(InfrastructureError):
     """The run ended before it answered."""
 
 
+def line_of(request: str, **arguments: Any) -> bytes:
+    """The line of a request."""
+    return json.dumps({"request": request, **arguments}).encode() + b"\n"
+
+
+def answered(said: dict[str, Any]) -> dict[str, Any]:
+    """An answer that is no refusal.
+
+    Raises:
+        RefusedError: it is one.
+    """
+    if "error" in said:
+        raise RefusedError(str(said["error"]))
+    return said
+
+
 class RunClient:
     """A connection to the launcher of one run; a context manager that ends it.
 
@@ -73,9 +89,8 @@ class RunClient:
             InfrastructureError: it doesn't answer in time.
         """
         self._socket.settimeout(within_s)
-        line = json.dumps({"request": request, **arguments}).encode() + b"\n"
         try:
-            self._socket.sendall(line)
+            self._socket.sendall(line_of(request, **arguments))
             while b"\n" not in self._unread:
                 if not (more := self._socket.recv(_READ_BYTES)):
                     raise BrokenPipeError
@@ -87,10 +102,7 @@ class RunClient:
         except OSError as error:
             raise InfrastructureError(f"{self.run}: {error.strerror or error}") from error
         answer, _, self._unread = self._unread.partition(b"\n")
-        said: dict[str, Any] = json.loads(answer)
-        if "error" in said:
-            raise RefusedError(said["error"])
-        return said
+        return answered(json.loads(answer))
 
     def about(self) -> About:
         """Which run it is, and how far.

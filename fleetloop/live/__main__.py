@@ -24,8 +24,8 @@ from configs.loading import loads
 from configs.resolve import signals_of
 from configs.roles import VIEWER
 from configs.scenario import Scenario
+from fleetloop.door.async_client import AsyncRunClient
 from fleetloop.launch.viewer import PAGE
-from fleetloop.live.door import RunDoor
 from fleetloop.live.expected import Source
 from fleetloop.live.hub import Hub
 from fleetloop.live.past import Block, Kept, feed, recorded
@@ -130,7 +130,7 @@ async def _look_back(heard: Heard, hub: Hub, record: Path) -> None:
     heard.kept.end()
 
 
-async def _ask(door: RunDoor, heard: Heard, hub: Hub) -> None:
+async def _ask(door: AsyncRunClient, heard: Heard, hub: Hub) -> None:
     """The run's status, its faults and events, several times a second."""
     since, faults_s = 0, 0.0
     loop = asyncio.get_running_loop()
@@ -154,7 +154,7 @@ def _event(said: Mapping[str, Any]) -> Event:
 
 async def _serve(brief: ViewerBrief, link: Link, stop: Stop) -> str:
     scenario = loads(run_folder.SCENARIO, brief.scenario_toml, recorded=True)
-    door = await RunDoor.open(Path(brief.door))
+    door = await AsyncRunClient.open(Path(brief.door))
     hub = Hub(LiveState(scenario), door, brief.network.run)
     server = LiveServer(hub, brief.token)
     heard = Heard(scenario, hub)

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 from configs.brief import ViewerBrief
 from configs.errors import FleetloopError, InfrastructureError
 from configs.resolve import signals_of
+from fleetloop.door.async_client import AsyncRunClient
 from fleetloop.door.client import RunEndedError
 from fleetloop.launch.drawn import drawing
 from fleetloop.launch.viewer import FOXGLOVE
-from fleetloop.live.door import RunDoor
 from fleetloop.live.hub import Hub
 from fleetloop.live.past import Block
 from fleetloop.live.state import LiveState
@@ -43,7 +43,7 @@ class Streaming:
         if self._stream is not None:
             self._stream.note_events(state.events[known:])
 
-    async def serve(self, door: RunDoor, hub: Hub, brief: ViewerBrief) -> None:
+    async def serve(self, door: AsyncRunClient, hub: Hub, brief: ViewerBrief) -> None:
         """Wait until it is wanted, open it, and send what is new until the run ends."""
         said: dict[str, Any] = {"token": brief.token, "view": FOXGLOVE}
         with contextlib.suppress(RunEndedError):

@@ -1,4 +1,4 @@
-"""The viewer's end of a run's door: many requests at once on one connection, none of which blocks.
+"""A client's end of a door in a loop of asyncio: many requests at once on one connection.
 
 One connection, since the run gives its controls to a connection.
 """
@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from configs.errors import InfrastructureError
-from fleetloop.door.client import ANSWER_S, RefusedError, RunEndedError
+from fleetloop.door.client import ANSWER_S, RunEndedError, answered, line_of
 
 _MOST_LINE_BYTES = 1 << 24
 """Of an answer."""
 
 
-class RunDoor:
+class AsyncRunClient:
     """A connection to the launcher of one run; made by `open`."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -30,7 +30,7 @@ class RunDoor:
         """Whether the launcher is there."""
 
     @classmethod
-    async def open(cls, path: Path) -> "RunDoor":
+    async def open(cls, path: Path) -> "AsyncRunClient":
         """Connect to the door at a path.
 
         Raises:
@@ -57,9 +57,7 @@ class RunDoor:
         number = next(self._numbers)
         answer: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
         self._asked[number] = answer
-        self._writer.write(
-            json.dumps({"request": request, "id": number, **arguments}).encode() + b"\n"
-        )
+        self._writer.write(line_of(request, id=number, **arguments))
         try:
             async with asyncio.timeout(within_s):
                 said = await answer
@@ -67,9 +65,7 @@ class RunDoor:
             raise InfrastructureError(f"no answer in {within_s} s") from error
         finally:
             self._asked.pop(number, None)
-        if "error" in said:
-            raise RefusedError(str(said["error"]))
-        return said
+        return answered(said)
 
     async def close(self) -> None:
         """End the connection."""
