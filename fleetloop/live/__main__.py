@@ -16,7 +16,7 @@ from bridge.network.client import StoppedError, open_client
 from bridge.network.link import Arrival, Link, waiting
 from bridge.network.messages import Rows
 from bridge.network.telemetry import PLANT_ROW, row_of
-from bridge.process.lifecycle import Stop, serve
+from bridge.process.lifecycle import Stop, serve, settle_memory
 from configs.brief import ViewerBrief
 from configs.errors import FleetloopError
 from configs.events import KINDS, Event
@@ -37,7 +37,7 @@ from fleetloop.results import run_folder
 
 ROOM_BYTES = 1 << 22
 """Of what waits of one source: a viewer that falls behind misses rows."""
-_DRAIN_S, _IDLE_S = 0.02, 0.1
+_DRAIN_S, _IDLE_S = 0.03, 0.1
 _STATUS_S, _FAULTS_S = 0.1, 0.5
 _ASK_S = 5.0
 _LOOK_BACK_S, _LEAST_OFTEN_S = 0.5, 8.0
@@ -169,6 +169,7 @@ async def _serve(brief: ViewerBrief, link: Link, stop: Stop) -> str:
         heard.streaming.serve(door, hub, brief),
     )
     tasks = [asyncio.create_task(one) for one in going]
+    settle_memory()
     while not stop.requested:
         await asyncio.sleep(_IDLE_S)
     await asyncio.sleep(_LAST_ROWS_S)
