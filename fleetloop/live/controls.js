@@ -144,11 +144,17 @@ function toggleTheme() {
   const root = document.documentElement;
   const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
   root.dataset.theme = dark ? "light" : "dark";
-  redraw();
+  repaint();
+}
+
+// A plot paints half of its outermost pixels over: only another size clears all of it.
+function repaint() {
+  document.body.classList.add("repainting");
+  setTimeout(() => { document.body.classList.remove("repainting"); redraw(); }, 80);
 }
 
 // Plots take their colours from the page's variables whenever they paint.
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => setTimeout(redraw));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
 
 function begin() {
   at("scenario").textContent = facts.scenario; at("run").textContent = facts.run;

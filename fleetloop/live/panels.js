@@ -63,7 +63,7 @@ function showExpectations() {
 }
 
 // A drive's state in small letters, "control" understood; its errors as the drive's manual has them.
-const inWords = (drive) => drive.replace(/^[^:]*/, (state) => state.toLowerCase().replaceAll("_", " ").replace(/ control$/, ""));
+const inWords = (drive) => drive.replace(/^[^:]*/, (state) => state.toLowerCase().replaceAll("_", " ").replace(/ control$/, "")).replaceAll("_", "_\u200b"); // long names break there
 const share = (value) => (finite(value) ? `${(100 * value).toFixed(0)} %` : "–");
 function showRobots() {
   const table = at("robots"), now = view.last && view.last.now;
@@ -100,7 +100,7 @@ function showFaults() {
 function showProcesses() {
   const table = at("processes");
   if (!table.tHead) table.append(el("thead", {}, el("tr", {}, el("th", {}, "process"), el("th", {}, "state"), el("th", {class: "num"}, "tick"), el("th", {class: "num", title: "Processor time of a tick"}, "CPU per tick"), el("th", {class: "num"}, "CPU"))), el("tbody"));
-  const rows = (board.run.processes || []).map((one) => ({key: one, make: () => el("tr", {class: one.state === "up" || one.state === "ended" ? "" : "open"}, el("th", {scope: "row"}, one.name), el("td", {}, one.waited_for ? el("b", {class: "waited"}, "waited for") : one.state),
+  const rows = (board.run.processes || []).map((one) => ({key: one, make: () => el("tr", {class: one.state === "up" || one.state === "ended" ? "" : "open"}, el("th", {scope: "row"}, one.name), el("td", {}, one.waited_for && !board.ended ? el("b", {class: "waited"}, "waited for") : one.state),
     el("td", {class: "num"}, one.tick ?? "–"), el("td", {class: "num"}, finite(one.cpu) && board.run.real_time_factor > 0 ? `${number(1e6 * one.cpu * facts.period_s / board.run.real_time_factor, 0)} µs` : "–"), el("td", {class: "num"}, finite(one.cpu) ? share(one.cpu) : "–"))}));
   fill(table.tBodies[0], rows);
 }

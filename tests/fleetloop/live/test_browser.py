@@ -111,6 +111,8 @@ def test_a_user_looks_pauses_steps_injects_clears_and_stops(browser: Any, tmp_pa
     size = {"width": 1280, "height": 900}
     with page_of(browser, tmp_path / "run", viewport=size, color_scheme="light") as (page, run):
         page.until("document.getElementById('holder').textContent === 'You have the controls.'")
+        page.until("board.seen_from_s === 0 && store.data[0] < 0.05")  # from before it was opened
+        assert page.text("seen") == ""
         assert page.text("scenario") == "two_robots"
         assert "<i>on</i> the path" in page.text("expectations")
         x, y = (page.see(f"field(models.bodies.data, '{it}')[0]") for it in "xy")
