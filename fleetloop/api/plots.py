@@ -12,6 +12,7 @@ from configs.errors import ScenarioError
 from configs.scenario import Scenario
 from fleetloop.record.reader import Record
 from fleetloop.results import figures
+from fleetloop.results.drawing import STYLE
 from fleetloop.results.publication import png
 
 _FIGURES: Mapping[str, figures.Draw] = {
@@ -34,7 +35,7 @@ def draw(name: str, record: Record, scenario: Scenario) -> Figure:
     """
     if name not in _FIGURES:
         raise ScenarioError(f"signal = {name!r}: one of {', '.join(figures.ERRORS)}")
-    with mpl.rc_context(figures.STYLE), np.errstate(all="ignore"):
+    with mpl.rc_context(STYLE), np.errstate(all="ignore"):
         return _shows_itself(_FIGURES[name](record, scenario))
 
 

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from fleetloop.compare.measures import SPREAD, THETA_ERROR, TORQUE, Course
 from fleetloop.compare.results import Row
 from fleetloop.results.decimation import drawable
-from fleetloop.results.drawing import DPI, HEIGHT_IN, WIDTH_IN, style_of
-from fleetloop.results.figures import STYLE, Captioned
+from fleetloop.results.drawing import DPI, HEIGHT_IN, PAGE_IN, STYLE, style_of
+from fleetloop.results.figures import Captioned
 from fleetloop.settling import FINAL_S, SETTLE_BAND
 
 _LEGEND_IN = 0.22
@@ -93,8 +93,8 @@ def all_figures(rows: Sequence[Row], seed: int) -> list[Captioned]:
 def _drawn(
     quantity: _Quantity, lines: Mapping[tuple[int, str], Course], sound: Collection[str]
 ) -> Figure:
-    height_in = HEIGHT_IN + _LEGEND_IN * -(-len(lines) // 2)
-    figure = Figure(figsize=(1.25 * WIDTH_IN, height_in), dpi=DPI, layout="constrained")
+    height_in = 1.15 * HEIGHT_IN + _LEGEND_IN * -(-len(lines) // 2)
+    figure = Figure(figsize=(PAGE_IN, height_in), dpi=DPI, layout="constrained")
     whole, close = figure.subplots(1, 2, width_ratios=(3, 2))
     end_s = max(float(course.t_s[-1]) for course in lines.values())
     from_s = max(end_s - FINAL_S, 0.0)
@@ -109,12 +109,12 @@ def _drawn(
     if quantity.band:
         _mark_band(whole)
     close.set_ylim(0.0, _ceiling(quantity, came_through, from_s))
-    close.set_title(f"final: the last {min(FINAL_S, end_s):.3g} s", fontsize=9)
+    close.set_title(f"final: the last {min(FINAL_S, end_s):.3g} s", fontsize=8)
     close.ticklabel_format(axis="y", style="sci", scilimits=(-3, 3))
     for axes in (whole, close):
         axes.set_xlabel("t [s]")
     whole.set(ylabel=quantity.ylabel)
-    whole.set_title("worst robot, whole run", fontsize=9)
+    whole.set_title("worst robot, whole run", fontsize=8)
     figure.legend(loc="outside lower center", ncols=2, handlelength=3.2, frameon=False)
     return figure
 

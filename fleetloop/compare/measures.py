@@ -17,8 +17,8 @@ from configs.scenario import Scenario
 from fleetloop.check.body import robot_body
 from fleetloop.check.loop import true_theta
 from fleetloop.record.reader import Record
+from fleetloop.results.decimation import decimated
 from fleetloop.results.derived import spread
-from fleetloop.results.drawing import envelope
 from fleetloop.results.summary import ERRORS, Summary
 from fleetloop.settling import FINAL_S
 
@@ -77,7 +77,7 @@ def courses(record: Record, scenario: Scenario) -> dict[str, Course]:
             found[SPREAD] = spread(moving, scenario.members)
         if theta := _theta_errors(robots, scenario):
             found[THETA_ERROR] = _worst(theta)
-        return {name: Course(*envelope(t[: len(v)], v)) for name, v in found.items()}
+        return {name: Course(*decimated(t[: len(v)], v)) for name, v in found.items()}
 
 
 def _moving(record: Record) -> dict[str, np.ndarray]:

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from configs.errors import ScenarioError
 from fleetloop.results import run_folder
+from fleetloop.results.decimation import decimated
 from fleetloop.results.divergence import Divergence, by_size
-from fleetloop.results.drawing import COLOURS, DPI, WIDTH_IN, envelope
-from fleetloop.results.figures import STYLE
+from fleetloop.results.drawing import COLOURS, DPI, PAGE_IN, STYLE
 
 TORQUES = ("tau_right_wheel_N_m", "tau_left_wheel_N_m")
 _PANEL_IN = 1.5
@@ -55,7 +55,7 @@ def write_figure(
 def drawn(signals: Sequence[str], recorded: np.ndarray, replayed: np.ndarray, robot: str) -> Figure:
     """A panel per signal."""
     height_in = 0.7 + _PANEL_IN * len(signals)
-    figure = Figure(figsize=(WIDTH_IN, height_in), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(PAGE_IN, height_in), dpi=DPI, layout="constrained")
     panels = figure.subplots(len(signals), 1, sharex=True, squeeze=False)[:, 0]
     sources = (
         (recorded, "recorded", COLOURS[0], "-", 2.2),
@@ -64,7 +64,7 @@ def drawn(signals: Sequence[str], recorded: np.ndarray, replayed: np.ndarray, ro
     for axes, name in zip(panels, signals, strict=True):
         for rows, label, colour, dash, width in sources:
             if name in (rows.dtype.names or ()):
-                t, values = envelope(rows["t_s"], rows[name])
+                t, values = decimated(rows["t_s"], rows[name])
                 axes.plot(t, values, dash, color=colour, linewidth=width, label=label)
         axes.set_ylabel(name, fontsize=7)
         axes.tick_params(labelsize=7)

@@ -1,51 +1,80 @@
-"""Drawing over time: lines that tell robots apart, few points with every peak, panels, legends.
+"""Drawing over time for papers: lines that tell robots apart, panels in column width, legends.
 
-Robots differ by dash pattern and by lightness, so the figures stay readable in grey.
+Robots differ by dash pattern and by colour, so the figures stay readable in grey. Fonts have 7 to
+9 points in a column of 88 mm or a page of 180 mm.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fleetloop.record.reader import Record
-from fleetloop.results.decimation import drawable
+from fleetloop.results.decimation import decimated
+from fleetloop.results.palette import ROBOTS
+from fleetloop.results.panel import span
 from fleetloop.settling import settled_from
 
-WIDTH_IN, HEIGHT_IN, DPI = 6.4, 3.6, 150
-COLOURS = ("#08306b", "#d95f02", "#1b9e77", "#9e2a8c", "#7f7f7f", "#b8860b")
+WIDTH_IN, PAGE_IN = 88.0 / 25.4, 180.0 / 25.4
+HEIGHT_IN, DPI = 2.2, 300
+COLOURS = ROBOTS
 _DASHES: tuple[object, ...] = ("-", (0, (6, 2)), (0, (2, 1.2)), (0, (7, 2, 1.5, 2)))
-_STRETCHES = 1500
+_POINTS = 1200
+STYLE: Any = {
+    "font.size": 8,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "grid.linewidth": 0.5,
+    "axes.linewidth": 0.6,
+    "axes.titlesize": 8,
+    "axes.labelsize": 8,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "lines.linewidth": 1.0,
+    "legend.fontsize": 7,
+    "legend.framealpha": 0.9,
+    "figure.constrained_layout.h_pad": 0.02,
+    "figure.constrained_layout.w_pad": 0.02,
+    # Text stays text, so that a paper's editor may set it.
+    "svg.fonttype": "none",
+    "svg.hashsalt": "fleetloop",
+    "pdf.fonttype": 42,
+}
 
 
 def over_time(
     record: Record,
     series: Mapping[str, np.ndarray],
-    title: str,
     ylabel: str,
+    unit: str,
     *,
     zoom: bool = False,
 ) -> Figure:
-    """One line per entry; with `zoom`, a second panel from when all are within the settle band."""
+    """One line per entry; with `zoom`, a second panel from when all are within the settle band.
+
+    No axis spans less than the floor of its unit, `fleetloop.results.panel.FLOORS`.
+    """
     t = max((rows["t_s"] for rows in record.controller.values()), key=len)
     settled = _settled(list(series.values())) if zoom else None
     if not settled or t[-1] - t[settled] < 0.1 * t[-1]:
         figure, whole = axes_of()
         panels = [(whole, 0)]
     else:
-        figure = Figure(figsize=(WIDTH_IN, HEIGHT_IN), dpi=DPI, layout="constrained")
-        whole, close = figure.subplots(1, 2, width_ratios=(3, 2))
-        close.set_title(f"from {t[settled]:.1f} s on", fontsize=9)
-        close.set_xlabel("t [s]")
+        figure = Figure(figsize=(WIDTH_IN, 1.6 * HEIGHT_IN), dpi=DPI, layout="constrained")
+        whole, close = figure.subplots(2, 1)
+        close.set_title(f"from {t[settled]:.1f} s on")
+        close.set(xlabel="t [s]", ylabel=ylabel)
         panels = [(whole, 0), (close, settled)]
-    for n, (name, values) in enumerate(series.items()):
-        colour, dash = style_of(n)
-        for axes, first in panels:
-            x, y = envelope(t[first : len(values)], values[first:])
+    for axes, first in panels:
+        for n, (name, values) in enumerate(series.items()):
+            colour, dash = style_of(n)
+            x, y = decimated(t[first : len(values)], values[first:], _POINTS)
             axes.plot(x, y, color=colour, linestyle=dash, label=name)
-    whole.set(xlabel="t [s]", ylabel=ylabel, title=title)
-    legend(panels[-1][0], len(series))
+        axes.set_ylim(span([values[first:] for values in series.values()], unit))
+    whole.set(ylabel=ylabel, xlabel="" if len(panels) > 1 else "t [s]")
+    legend_above(figure, whole, len(series))
     return figure
 
 
@@ -56,41 +85,32 @@ def _settled(series: Sequence[np.ndarray]) -> int | None:
     return last if last < longest - 2 else None
 
 
-def envelope(
-    t: np.ndarray, values: np.ndarray, stretches: int = _STRETCHES
-) -> tuple[np.ndarray, np.ndarray]:
-    """Few enough points to draw, with every peak: smallest and largest value of each stretch."""
-    values = drawable(values)
-    stretch = len(values) // stretches
-    if stretch < 3:
-        return t, values
-    count = len(values) // stretch
-    blocks = values[: count * stretch].reshape(count, stretch)
-    first = np.arange(count) * stretch
-    chosen = np.stack([first + blocks.argmin(axis=1), first + blocks.argmax(axis=1)])
-    index = np.append(np.sort(chosen, axis=0).T.ravel(), len(values) - 1)
-    return t[index], values[index]
-
-
 def style_of(n: int) -> tuple[str, object]:
     """(colour, dash pattern) of the n-th line."""
     return COLOURS[n % len(COLOURS)], _DASHES[(n + n // len(COLOURS)) % len(_DASHES)]
 
 
-def axes_of(height_in: float = HEIGHT_IN) -> tuple[Figure, Axes]:
+def axes_of(height_in: float = HEIGHT_IN, width_in: float = WIDTH_IN) -> tuple[Figure, Axes]:
     """A figure of one panel."""
-    figure = Figure(figsize=(WIDTH_IN, height_in), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(width_in, height_in), dpi=DPI, layout="constrained")
     return figure, figure.subplots()
 
 
-def legend(axes: Axes, entries: int) -> None:
-    """A legend to the right of a panel, in columns if it is long; none of no lines."""
-    if not axes.get_legend_handles_labels()[0]:
-        return
-    axes.legend(
-        loc="center left",
-        bbox_to_anchor=(1.0, 0.5),
-        ncols=1 + (entries - 1) // 14,
-        handlelength=2.8,
-        frameon=False,
-    )
+def legend_above(figure: Figure, axes: Axes, entries: int) -> None:
+    """One legend of a figure above its panels; none of no lines, none of too many."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles and entries <= MOST_LABELS:
+        columns = min(len(labels), 4)
+        figure.legend(
+            handles,
+            labels,
+            loc="outside upper center",
+            ncols=columns,
+            handlelength=2.4,
+            frameon=False,
+            columnspacing=1.2,
+        )
+
+
+MOST_LABELS = 16
+"""Of a legend."""

@@ -1,26 +1,38 @@
-"""A drawing of a directed graph: layers by distance from the leader, weights that aren't 1."""
+"""A drawing of a directed graph: layers by distance from the leader, weights that aren't 1.
+
+No edge runs behind a node: one that would is bowed around it; where bows don't help, the nodes
+stand on a circle, which no straight edge crosses at another node. Lengths are in units of the
+layout: a node has the radius `NODE`, and neighbours in a layer are 1 apart.
+"""
 
 from collections import Counter
-from collections.abc import Mapping
-from math import hypot
+from collections.abc import Iterator, Mapping
+from math import cos, hypot, pi, sin
 from typing import NamedTuple
 
 import networkx as nx
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from configs.edges import LEADER, Edge
 from configs.graph import Graph
+from fleetloop.results.drawing import DPI, PAGE_IN, WIDTH_IN
 
-WIDTH_IN, UNIT_IN, DPI = 6.4, 0.95, 150
-_MOST_IN = 40.0
-_NODE_SIZE, _LEADER_SIZE = 620.0, 1200.0
-"""Area of a node [points²]."""
+NODE, LEADER_NODE = 0.19, 0.27
+"""Radius of a robot, and half the side of the leader's square."""
+CLEAR = 0.05
+"""Between an edge and a node that isn't at its end."""
+_UNIT_IN, _LEAST_UNIT_IN, _MOST_IN = 0.8, 0.5, 40.0
+_POINTS_PER_IN = 72.0
 _LABELLED = 120
 """With more edges their weights find no room."""
-_BEND_BESIDE_OPPOSITE, _BEND_AROUND_NODE = 0.18, 0.4
-"""How far an arrow bows out, in parts of its length."""
-
+_SEARCHED = 1500
+"""With more edges they stay straight: no drawing of them is read."""
+_OPPOSITE = 0.18
+_BENDS = (0.0, 0.18, -0.18, 0.3, -0.3, 0.45, -0.45, 0.6, -0.6, 0.8, -0.8)
+"""How far an arrow bows out, in parts of its length: the first that is clear."""
+_STEPS = np.linspace(0.0, 1.0, 41)
 _SOMETIMES = "0.55"
 """Colour of an edge that comes and goes: a grey."""
 
@@ -34,11 +46,18 @@ class EdgeStyle(NamedTuple):
     label: str
 
 
+class Bow(NamedTuple):
+    """How far an edge bows out, and its least distance from any other node's rim."""
+
+    bend: float
+    clearance: float
+
+
 _NO_STYLES: Mapping[Edge, EdgeStyle] = {}
 
 
 def drawn(graph: Graph, title: str, styles: Mapping[Edge, EdgeStyle] = _NO_STYLES) -> Figure:
-    """The graph as a figure.
+    """The graph as a figure, without a title if that is empty.
 
     Edges without a style are black, or grey if they come and go, with their weight if it isn't 1.
     """
@@ -46,47 +65,75 @@ def drawn(graph: Graph, title: str, styles: Mapping[Edge, EdgeStyle] = _NO_STYLE
     sometimes = {edge for edge, windows in graph.windows.items() if windows is not None}
     if not graph.links:
         digraph.remove_node(LEADER)
-    places = _places(digraph, graph)
+    places, bows = laid_out(digraph, graph)
     across = [x for x, _ in places.values()]
     up = [y for _, y in places.values()]
+    width, height = max(across) - min(across) + 1.0, max(up) - min(up) + 1.0
+    unit_in = _unit_in(width)
     figure = Figure(
-        figsize=(
-            min(max(WIDTH_IN, UNIT_IN * (max(across) - min(across) + 1.2)), _MOST_IN),
-            min(0.4 + UNIT_IN * (max(up) - min(up) + 1.2), _MOST_IN),
-        ),
+        figsize=(max(width * unit_in, WIDTH_IN), height * unit_in + (0.3 if title else 0.0)),
         dpi=DPI,
-        layout="constrained",
     )
-    axes = figure.add_subplot()
-    axes.set_title(f"{title}; grey: not always" if sometimes and not styles else title, fontsize=10)
+    axes = figure.add_axes((0.0, 0.0, 1.0, height * unit_in / figure.get_figheight()))
+    if title:
+        grey = "; grey: not always" if sometimes and not styles else ""
+        axes.set_title(f"{title}{grey}")
     axes.set_axis_off()
     axes.set_aspect("equal")  # so that weights lie on their bowed arrows
-    for kind in ("robots", "leader"):
-        nodes = [node for node in digraph if (node == LEADER) == (kind == "leader")]
-        nx.draw_networkx_nodes(
-            digraph,
-            places,
-            nodelist=nodes,
-            ax=axes,
-            node_size=_LEADER_SIZE if kind == "leader" else _NODE_SIZE,
-            edgecolors="black",
-            node_color="#dddddd" if kind == "leader" else "white",
-            node_shape="s" if kind == "leader" else "o",
-        )
-    nx.draw_networkx_labels(digraph, places, ax=axes, font_size=8)
+    axes.set_xlim(min(across) - 0.5, max(across) + 0.5)
+    axes.set_ylim(min(up) - 0.5, max(up) + 0.5)
+    _nodes(axes, digraph, places, unit_in)
     for edge in digraph.edges:
         weight = digraph.edges[edge]["weight"]
         colour = _SOMETIMES if edge in sometimes else "black"
         plain = EdgeStyle(colour, "" if weight == 1.0 else f"{weight:.3g}")
         colour, label = styles.get(edge, plain)
         style = EdgeStyle(colour, label if digraph.size() <= _LABELLED else "")
-        _arrow(axes, digraph, edge, places, style)
-    axes.set_xlim(min(across) - 0.6, max(across) + 0.6)
-    axes.set_ylim(min(up) - 0.6, max(up) + 0.6)
+        _arrow(axes, edge, places, bows[edge].bend, style, unit_in)
     return figure
 
 
-def _places(digraph: "nx.DiGraph", graph: Graph) -> Places:
+def laid_out(digraph: "nx.DiGraph", graph: Graph) -> tuple[Places, dict[Edge, Bow]]:
+    """Places of the nodes and bows of the edges; in layers, on a circle if that is clearer."""
+    places = _layers(digraph, graph)
+    bows = dict(_bows(digraph, places))
+    if _least(bows) >= 0.0 or digraph.size() > _SEARCHED:
+        return places, bows
+    circle = _circle(digraph)
+    on_circle = dict(_bows(digraph, circle))
+    return (circle, on_circle) if _least(on_circle) > _least(bows) else (places, bows)
+
+
+def _least(bows: Mapping[Edge, Bow]) -> float:
+    return min((bow.clearance for bow in bows.values()), default=0.0)
+
+
+def _unit_in(width: float) -> float:
+    """Inches per unit: a column if that is legible, else a page's width, else what it takes."""
+    for column_in in (WIDTH_IN, PAGE_IN):
+        if width * _LEAST_UNIT_IN <= column_in:
+            return min(_UNIT_IN, column_in / width)
+    return min(_LEAST_UNIT_IN, _MOST_IN / width)
+
+
+def _nodes(axes: Axes, digraph: "nx.DiGraph", places: Places, unit_in: float) -> None:
+    for kind, radius, shape in (("robots", NODE, "o"), ("leader", LEADER_NODE, "s")):
+        nodes = [node for node in digraph if (node == LEADER) == (kind == "leader")]
+        nx.draw_networkx_nodes(
+            digraph,
+            places,
+            nodelist=nodes,
+            ax=axes,
+            node_size=(2.0 * radius * unit_in * _POINTS_PER_IN) ** 2,
+            edgecolors="black",
+            linewidths=0.8,
+            node_color="#dddddd" if kind == "leader" else "white",
+            node_shape=shape,
+        )
+    nx.draw_networkx_labels(digraph, places, ax=axes, font_size=7)
+
+
+def _layers(digraph: "nx.DiGraph", graph: Graph) -> Places:
     """Layers from left to right by hops from the leader; unreached robots in the last."""
     start = [LEADER] if graph.links else list(graph.roots()[:1] or graph.robots[:1])
     hops = nx.multi_source_dijkstra_path_length(digraph, set(start), weight=lambda *_: 1)
@@ -100,28 +147,83 @@ def _places(digraph: "nx.DiGraph", graph: Graph) -> Places:
         layer = layers[node]
         # Every second layer a little lower: an arrow over two layers then misses what is between.
         lower = 0.25 * (layer % 2) * (widest > 1)
-        places[node] = (1.5 * layer, 0.5 * (size[layer] - 1) - row[layer] - lower)
+        places[node] = (1.3 * layer, 0.5 * (size[layer] - 1) - row[layer] - lower)
         row[layer] += 1
     return places
 
 
-def _arrow(axes: Axes, digraph: "nx.DiGraph", edge: Edge, places: Places, style: EdgeStyle) -> None:
-    """One edge; bowed where a straight one would cross a node or lie on its opposite."""
+def _circle(digraph: "nx.DiGraph") -> Places:
+    """All nodes on a circle, the first one on the left; at least 1 apart along it."""
+    count = len(digraph)
+    # A straight edge over one node passes it at about π / count of their distance.
+    apart = max(1.0, (NODE + 2.0 * CLEAR) * count / pi)
+    radius = apart * count / (2.0 * pi)
+    angles = (pi - 2.0 * pi * n / count for n in range(count))
+    return {
+        node: (radius * cos(angle), radius * sin(angle))
+        for node, angle in zip(digraph, angles, strict=True)
+    }
+
+
+def _bows(digraph: "nx.DiGraph", places: Places) -> Iterator[tuple[Edge, Bow]]:
+    nodes = list(places)
+    points = np.array([places[node] for node in nodes])
+    radii = np.array([LEADER_NODE * 1.42 if node == LEADER else NODE for node in nodes])
+    for edge in digraph.edges:
+        speaker, hearer = edge
+        others = np.array([node not in edge for node in nodes])
+        opposite = digraph.has_edge(hearer, speaker)
+        # The bow of an opposite one lies on its own left, so both are apart.
+        bends = [bend for bend in _BENDS if bend >= _OPPOSITE or not opposite]
+        if digraph.size() > _SEARCHED or not others.any():
+            yield edge, Bow(bends[0], np.inf)
+            continue
+        ends = np.array([places[speaker], places[hearer]])
+        found = []
+        for bend in bends:
+            apart = _distances(ends, bend, points[others])
+            found.append(Bow(bend, float((apart - radii[others]).min())))
+            if found[-1].clearance >= CLEAR:
+                break
+        yield edge, found[-1] if found[-1].clearance >= CLEAR else max(found, key=_clearance)
+
+
+def _clearance(bow: Bow) -> float:
+    return bow.clearance
+
+
+def _distances(ends: np.ndarray, bend: float, points: np.ndarray) -> np.ndarray:
+    """Least distance of each point from a bowed edge: matplotlib's arc3, a quadratic Bézier."""
+    (x0, y0), (x1, y1) = ends
+    middle = np.array([0.5 * (x0 + x1) + bend * (y1 - y0), 0.5 * (y0 + y1) - bend * (x1 - x0)])
+    u = _STEPS[:, None]
+    curve = (1.0 - u) ** 2 * ends[0] + 2.0 * u * (1.0 - u) * middle + u**2 * ends[1]
+    apart = np.hypot(*(curve[:, None, :] - points[None, :, :]).transpose(2, 0, 1))
+    least: np.ndarray = apart.min(axis=0)
+    return least
+
+
+def _arrow(
+    axes: Axes, edge: Edge, places: Places, bend: float, style: EdgeStyle, unit_in: float
+) -> None:
+    """One edge."""
     speaker, hearer = edge
-    bend = _BEND_BESIDE_OPPOSITE if digraph.has_edge(hearer, speaker) else 0.0
-    if _crosses(edge, places):
-        bend = _BEND_AROUND_NODE
+    to_points = unit_in * _POINTS_PER_IN
+
+    def rim(node: str) -> float:
+        return (LEADER_NODE if node == LEADER else NODE) * to_points + 1.0
+
     axes.annotate(
         "",
         xy=places[hearer],
         xytext=places[speaker],
         arrowprops={
-            "arrowstyle": "-|>,head_width=0.25,head_length=0.5",
+            "arrowstyle": "-|>,head_width=0.18,head_length=0.36",
             "linestyle": "dashed" if speaker == LEADER else "solid",
             "color": style.colour,
-            "linewidth": 1.1,
-            "shrinkA": 18 if speaker == LEADER else 13,
-            "shrinkB": 13,
+            "linewidth": 0.9,
+            "shrinkA": rim(speaker),
+            "shrinkB": rim(hearer),
             "connectionstyle": f"arc3,rad={bend}",
         },
     )
@@ -132,19 +234,5 @@ def _arrow(axes: Axes, digraph: "nx.DiGraph", edge: Edge, places: Places, style:
         bow = 2.0 * part * (1.0 - part) * bend
         x, y = x0 + part * (x1 - x0) + bow * (y1 - y0), y0 + part * (y1 - y0) - bow * (x1 - x0)
         box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
-        axes.text(x, y, style.label, fontsize=7, ha="center", va="center", bbox=box)
-
-
-def _crosses(edge: Edge, places: Places) -> bool:
-    """Whether another node lies on the straight line of an edge."""
-    (x0, y0), (x1, y1) = places[edge[0]], places[edge[1]]
-    along_x, along_y = x1 - x0, y1 - y0
-    length = hypot(along_x, along_y)
-    for node, (x, y) in places.items():
-        if node in edge or not length:
-            continue
-        part = ((x - x0) * along_x + (y - y0) * along_y) / length**2
-        apart = abs((x - x0) * along_y - (y - y0) * along_x) / length
-        if 0.0 < part < 1.0 and apart < 0.3:
-            return True
-    return False
+        if hypot(x1 - x0, y1 - y0) > 0.0:
+            axes.text(x, y, style.label, fontsize=7, ha="center", va="center", bbox=box)

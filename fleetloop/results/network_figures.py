@@ -9,7 +9,8 @@ from configs.edges import Edge
 from configs.netem import LOCALISATION
 from configs.scenario import Scenario
 from fleetloop.record.reader import Record
-from fleetloop.results.drawing import DPI, WIDTH_IN, envelope, style_of
+from fleetloop.results.decimation import decimated
+from fleetloop.results.drawing import DPI, WIDTH_IN, style_of
 from fleetloop.results.graph_drawing import EdgeStyle, drawn
 from fleetloop.results.network import ages_of
 
@@ -17,7 +18,7 @@ _MAP = colormaps["cividis"]
 COLUMNS = 600
 """Of a strip."""
 _MOST_LABELS, _MOST_IN_LEGEND = 40, 12
-_ROW_IN = 0.22
+_ROW_IN = 0.16
 
 
 def edge_ages(record: Record) -> dict[Edge, np.ndarray]:
@@ -33,19 +34,19 @@ def ages(record: Record, _: Scenario) -> Figure:
     """Differences over the edges, and below them the age of the data that each edge gave."""
     edges = edge_ages(record)
     strip_in = max(_ROW_IN * len(edges), 0.8)
-    figure = Figure(figsize=(WIDTH_IN, 2.6 + strip_in), dpi=DPI, layout="constrained")
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, strip_in))
+    figure = Figure(figsize=(WIDTH_IN, 1.9 + strip_in), dpi=DPI, layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.4, strip_in))
     s = {robot: rows["s"] for robot, rows in record.controller.items()}
     t = max((rows["t_s"] for rows in record.controller.values()), key=len)
     between_robots = [edge for edge in edges if edge[0] in s]
     for n, (speaker, hearer) in enumerate(between_robots):
         both = min(len(s[hearer]), len(s[speaker]))
         colour, dash = style_of(n)
-        x, y = envelope(t[:both], s[hearer][:both] - s[speaker][:both])
+        x, y = decimated(t[:both], s[hearer][:both] - s[speaker][:both])
         upper.plot(x, y, color=colour, linestyle=dash, label=f"{hearer} − {speaker}")
-    upper.set(ylabel="s$_i$ − s$_j$ [m]", title="Path parameter errors, and the age of the data")
+    upper.set(ylabel="s$_i$ − s$_j$ [m]")
     if 0 < len(between_robots) <= _MOST_IN_LEGEND:
-        upper.legend(fontsize=7)
+        upper.legend(fontsize=6 + (len(between_robots) < 6))
     strips = np.array([oldest(ages, len(t)) for ages in edges.values()])
     image = lower.imshow(
         np.ma.masked_invalid(strips),
@@ -95,4 +96,4 @@ def edge_states(record: Record, scenario: Scenario) -> Figure:
         else EdgeStyle("#bbbbbb", "silent")
         for edge, mean in means.items()
     }
-    return drawn(scenario.topology, "Mean age of what came over each edge", styles)
+    return drawn(scenario.topology, "", styles)

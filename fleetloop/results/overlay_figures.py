@@ -12,15 +12,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fleetloop.record.reader import Record
-from fleetloop.results.decimation import drawable, stride
+from fleetloop.results.decimation import decimated, drawable, stride
 from fleetloop.results.derived import spread
-from fleetloop.results.drawing import DPI, WIDTH_IN, envelope, legend, style_of
-from fleetloop.results.figures import STYLE, Captioned
+from fleetloop.results.drawing import DPI, PAGE_IN, STYLE, legend_above, style_of
+from fleetloop.results.figures import Captioned
 from fleetloop.results.known import Known
 
 PANELS = 4
-_WIDTH_IN = 1.5 * WIDTH_IN
-_HEIGHT_IN = 2.3
+_WIDTH_IN = PAGE_IN
+_HEIGHT_IN = 1.8
 _STRETCHES = 600
 _LOGARITHMIC_FROM = 20.0
 
@@ -62,7 +62,7 @@ def robots_of(records: Mapping[str, Record]) -> tuple[str, ...]:
 
 
 def _positions(records: Mapping[str, Record]) -> Figure:
-    figure = Figure(figsize=(_WIDTH_IN, 4.8), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(_WIDTH_IN, 3.6), dpi=DPI, layout="constrained")
     axes = figure.subplots()
     for n, (label, record) in enumerate(records.items()):
         colour, dash = style_of(n)
@@ -75,23 +75,23 @@ def _positions(records: Mapping[str, Record]) -> Figure:
             axes.plot(x[pick], y[pick], color=colour, linestyle=dash, label=shown, alpha=0.9)
             axes.plot(x[0], y[0], "o", color=colour, markersize=4)
             shown = "_"
-    axes.set(xlabel="x [m]", ylabel="y [m]", title="Positions")
+    axes.set(xlabel="x [m]", ylabel="y [m]")
     axes.set_aspect("equal", adjustable="datalim")
-    legend(axes, len(records))
+    legend_above(figure, axes, len(records))
     return figure
 
 
 def _spreads(runs: Mapping[str, Known]) -> Figure:
-    figure = Figure(figsize=(_WIDTH_IN, 2.8), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(_WIDTH_IN, 2.2), dpi=DPI, layout="constrained")
     axes = figure.subplots()
     for n, (label, run) in enumerate(runs.items()):
         colour, dash = style_of(n)
         values = spread(run.record.controller, run.scenario.members)
         t = next(iter(run.record.controller.values()))["t_s"][: len(values)]
-        x, y = envelope(t, np.where(values > 0.0, values, np.nan))
+        x, y = decimated(t, np.where(values > 0.0, values, np.nan))
         axes.plot(x, y, color=colour, linestyle=dash, label=label)
-    axes.set(xlabel="t [s]", ylabel="max s − min s [m]", yscale="log", title="Spread")
-    legend(axes, len(runs))
+    axes.set(xlabel="t [s]", ylabel="max s − min s [m]", yscale="log")
+    legend_above(figure, axes, len(runs))
     return figure
 
 
@@ -137,7 +137,7 @@ def _lines(axes: Axes, name: str, records: Mapping[str, Record], robot: str) -> 
         rows = record.controller.get(robot)
         if rows is not None and len(rows) and name in (rows.dtype.names or ()):
             colour, dash = style_of(n)
-            t, values = envelope(rows["t_s"], rows[name], _STRETCHES)
+            t, values = decimated(rows["t_s"], rows[name], _STRETCHES)
             axes.plot(t, values, color=colour, linestyle=dash, label=label)
 
 

@@ -55,14 +55,25 @@ def test_the_scenario_in_the_folder_repeats_the_run(finished_run: Path, tmp_path
     assert (again / "record.mcap").read_bytes() == (finished_run / "record.mcap").read_bytes()
 
 
-def test_figures_are_there_and_not_empty(finished_run: Path) -> None:
-    names = {path.stem for path in (finished_run / "figures").iterdir()}
-    assert {"fig3_graph", "fig4_positions", "fig5_x_e", "fig6_y_e", "fig7_theta_e"} <= names
-    assert {"fig8_parameter_errors", "path_variables", "speed_estimates", "torques"} <= names
-    for path in (finished_run / "figures").iterdir():
-        image = imread(path)
-        assert image.shape[1] > 800
+def test_every_figure_is_there_for_papers_in_column_width(finished_run: Path) -> None:
+    folder = finished_run / "figures"
+    names = {path.stem for path in folder.iterdir()} - {"captions"}
+    assert {"graph", "positions", "x_e", "y_e", "theta_e", "parameter_errors"} <= names
+    assert {"path_variables", "speed_estimates", "torques"} <= names
+    captions = (folder / "captions.md").read_text("utf-8")
+    for name in names:
+        image = imread(folder / f"{name}.png")
+        width_mm = image.shape[1] / 300 * 25.4
+        assert min(abs(width_mm - 88), abs(width_mm - 180)) < 1, name
         assert image[..., :3].std() > 0.02
+        svg = (folder / f"{name}.svg").read_text("utf-8")
+        assert "<text" in svg  # not outlines
+        pdf = (folder / f"{name}.pdf").read_bytes()
+        assert pdf.startswith(b"%PDF")
+        assert b"/FontFile2" in pdf  # TrueType, embedded
+        assert f"`{name}`: " in captions
+    assert captions.count("scenario two_robots") == len(names)
+    assert "the paper's Figure" not in captions
 
 
 def test_the_page_stands_alone_and_says_the_verdict(finished_run: Path) -> None:

@@ -87,5 +87,7 @@ def test_labels_are_names_as_far_as_they_differ() -> None:
 
 def test_more_runs_than_colours_are_refused(runs: list[Path], tmp_path: Path) -> None:
     many = [runs[0]] * (len(COLOURS) + 1)
-    with pytest.raises(ScenarioError, match="7 runs: at most 6 can be told apart"):
+    with pytest.raises(
+        ScenarioError, match=f"{len(many)} runs: at most {len(COLOURS)} can be told apart"
+    ):
         write_overlay(many, records(many), tmp_path / "out")

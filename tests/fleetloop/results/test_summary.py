@@ -187,7 +187,7 @@ def test_figures_show_every_robot_up_to_its_own_end(uneven_run: Path) -> None:
     lines = {line.get_label(): line for line in figures["path_variables"].axes[0].lines}
     assert lines["r1"].get_xdata()[-1] == record.controller["r1"]["t_s"][-1]
     assert lines["r2"].get_xdata()[-1] == record.controller["r2"]["t_s"][-1]
-    (edge,) = figures["fig8_parameter_errors"].axes[0].lines[:1]
+    (edge,) = figures["parameter_errors"].axes[0].lines[:1]
     assert edge.get_xdata()[-1] == record.controller["r2"]["t_s"][-1]
 
 
