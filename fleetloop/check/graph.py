@@ -18,7 +18,7 @@ from configs.graph import Graph
 from configs.scenario import Scenario
 from fleetloop.check.coordination import Forecast, Matrix, delay_margin_s, radii
 from fleetloop.check.finding import Finding, Level, resting_on
-from fleetloop.check.law import lateral_gain_1_m, reverses
+from fleetloop.law_facts import lateral_gain_1_m, reverses
 from fleetloop.settling import FINAL_S, LOST_M, SETTLE_BAND
 
 SETTLED_PART = 0.1

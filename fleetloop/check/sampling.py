@@ -25,7 +25,7 @@ from configs.sections import Robot
 from fleetloop.check.body import inertias, robot_body
 from fleetloop.check.course import Course
 from fleetloop.check.finding import Finding, Level
-from fleetloop.check.law import ANALYSES, loop_gains, offers, speed_gain, speed_gain_key
+from fleetloop.check.law import ANALYSES
 from fleetloop.check.loop import (
     Loop,
     bisect,
@@ -37,7 +37,8 @@ from fleetloop.check.loop import (
     speed_loop_radius,
     with_gain,
 )
-from fleetloop.check.torque import limits
+from fleetloop.law_facts import loop_gains, offers, speed_gain, speed_gain_key
+from fleetloop.torque_limits import limits
 
 Arc = tuple[float, float, float]
 """v̄_d, ω̄_d and ṡ of steady motion."""

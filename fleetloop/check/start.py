@@ -23,8 +23,8 @@ from fleetloop.check.body import robot_body
 from fleetloop.check.coordination import Forecast
 from fleetloop.check.course import path_of
 from fleetloop.check.finding import Finding
-from fleetloop.check.law import adaptation_limit, saturation
-from fleetloop.check.torque import limits
+from fleetloop.law_facts import adaptation_limit, saturation
+from fleetloop.torque_limits import limits
 from plant.body import State
 from plant.integrate import rk4
 

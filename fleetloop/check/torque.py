@@ -6,12 +6,7 @@ Everything is at the wheel; shaft quantities come there through the gear.
     + friction at the wheel: gear × Coulomb + gear² × viscous × ν      realistic motors          (2)
 
 On a steady curve (1) is d (v̄_d + b |ω̄_d|) v_r / r at the outer wheel. Let through is the least of
-
-    the law's limit, if any       control.torque_limit_wheel_N_m
-    the host's                    host.torque_limit_wheel_N_m
-    gear × k_t × i_max            drive.torque_constant_N_m_A, current_limit_A, and [motor]'s
-    gear × k_v (v_max − gear ν)   the drive's velocity limit, of its torque mode                 (3)
-    gear × k_t × (U − k_t ω_s)/R  supply.voltage_V at the shaft's speed ω_s                      (4)
+`fleetloop.torque_limits`.
 
 Where need exceeds it, only a part f < 1 of the speed is kept up; the robot falls behind by
 ∫ (1 − f) v dt, and catches up at most as fast as k_1 wants or as it has speed to spare.
@@ -19,21 +14,16 @@ Where need exceeds it, only a part f < 1 of the speed is kept up; the robot fall
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import inf, log1p, pi, sqrt
+from math import inf, log1p, sqrt
 
 import numpy as np
 
 from configs.scenario import Scenario
-from configs.sections import Robot
 from fleetloop.check.body import inertias, robot_body
 from fleetloop.check.course import Course, Series
 from fleetloop.check.finding import Finding, Level
-from fleetloop.check.law import (
-    approach_rate_1_s,
-    speed_gain,
-    speed_gain_key,
-    torque_limit_wheel_N_m,
-)
+from fleetloop.law_facts import approach_rate_1_s, speed_gain, speed_gain_key
+from fleetloop.torque_limits import Limit, limits
 from plant.body import RigidBody
 
 START_S = 0.5
@@ -41,19 +31,6 @@ START_S = 0.5
 BEHIND_M = 0.3
 """Falling behind by more than this is an error if it lasts to the end, else a warning."""
 MARGIN = 2.0
-_MODULATION = sqrt(3.0) / 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class Limit:
-    """A bound of a wheel's torque: at standstill, less a slope times the wheel's speed."""
-
-    key: str
-    words: str
-    torque_wheel_N_m: float
-    slope_wheel_N_m_s: float = 0.0
-    speed_m_s: float = inf
-    """Robot's speed straight on at which nothing is left."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,62 +66,6 @@ def needed(scenario: Scenario, course: Course) -> Need:
     push = (course.robot.disturbance or scenario.disturbance).amplitude_wheel_N_m
     whole = motion + rest + _inertial(body, course)
     return Need(np.abs(whole) + push, motion, rest, nu)
-
-
-def limits(scenario: Scenario, robot: Robot) -> list[Limit]:
-    """All that bounds a wheel's torque."""
-    control, host, drive = scenario.control_of(robot), scenario.host, scenario.drive
-    found = []
-    own_N_m = torque_limit_wheel_N_m(control)
-    if own_N_m < inf:
-        found.append(Limit("control.torque_limit_wheel_N_m", "the law's limit", own_N_m))
-    if host.torque_limit_wheel_N_m is not None:
-        found.append(
-            Limit("host.torque_limit_wheel_N_m", "the host's limit", host.torque_limit_wheel_N_m)
-        )
-    if drive.preset != "ideal":
-        found += _drive_limits(scenario, robot)
-    return found
-
-
-def _drive_limits(scenario: Scenario, robot: Robot) -> list[Limit]:
-    drive, motor = scenario.drive, scenario.motor
-    gear = scenario.mounting_of(robot).gear_ratio
-    radius_m = scenario.body_of(robot).wheel_radius_m
-    constant, current = drive.torque_constant_N_m_A, drive.current_limit_A
-    key, limit_A = "drive.current_limit_A", current
-    if drive.preset == "realistic":
-        constant = motor.torque_constant_N_m_A or constant
-        if motor.current_limit_A is not None and motor.current_limit_A < current:
-            key, limit_A = "motor.current_limit_A", motor.current_limit_A
-    words = f"gear {gear:g} × {constant:g} N·m/A × {limit_A:g} A"
-    per_rad = 1.0 / (2.0 * pi)
-    found = [Limit(key, words, gear * constant * limit_A)]
-    velocity = drive.velocity_limit()
-    if velocity is not None:
-        fastest, gain = velocity.limit_shaft_rev_s, velocity.gain_shaft_N_m_s_rev
-        found.append(
-            Limit(
-                velocity.key,
-                f"what the drive's velocity limit of {fastest:g} rev/s leaves",
-                gear * gain * fastest,
-                gear**2 * gain * per_rad,
-                fastest * 2.0 * pi / gear * radius_m,
-            )
-        )
-    if drive.preset == "realistic":
-        resistance = motor.winding_resistance_ohm + motor.fet_resistance_ohm
-        most = _MODULATION * scenario.supply.voltage_V
-        found.append(
-            Limit(
-                "supply.voltage_V",
-                f"what {scenario.supply.voltage_V:g} V leave beside the motor's own voltage",
-                gear * constant * most / resistance,
-                gear**2 * constant**2 / resistance,
-                most / constant / gear * radius_m,
-            )
-        )
-    return found
 
 
 def _inertial(body: RigidBody, course: Course) -> Series:

@@ -19,8 +19,8 @@ from configs.powertrain import Encoder
 from configs.scenario import Scenario
 from fleetloop.check.course import Course
 from fleetloop.check.finding import Finding, Level
-from fleetloop.check.law import speed_gain, speed_gain_key
 from fleetloop.check.torque import needed
+from fleetloop.law_facts import speed_gain, speed_gain_key
 
 SPARE = 0.8
 """Part of the velocity limit up to which a speed leaves torque enough."""

@@ -8,8 +8,8 @@ from agents.paths import robot_path
 from configs.curves import formation_offset, reference_path
 from configs.resolve import leader_brief
 from configs.scenario import Scenario
-from fleetloop.check.torque import limits
 from fleetloop.launch.drawn import ways_m
+from fleetloop.torque_limits import limits
 
 _POINTS, _LEAST_POINTS, _MOST_POINTS = 8000, 100, 400
 """Of all courses, and of each: a browser draws all of them in every frame."""

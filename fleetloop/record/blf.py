@@ -30,15 +30,15 @@ from fleetloop.record.append import AppendedFile
 
 Array = npt.NDArray[Any]
 
-_HEADER_SIZE = 144
+HEADER_SIZE = 144
 _FILE_HEADER = struct.Struct("<4sLBBBBBBBBQQLL8H8H")
-_OBJECT_HEADER = struct.Struct("<4sHHLL")
-_CONTAINER = struct.Struct("<H6xL4x")
+OBJECT_HEADER = struct.Struct("<4sHHLL")
+CONTAINER = struct.Struct("<H6xL4x")
 _APPLICATION = (5, 0, 0, 0)  # as python-can's
 _FORMAT_VERSION = (2, 6, 8, 1)
-_CONTAINER_TYPE, _FRAME_TYPE, _ERROR_TYPE = 10, 1, 73
-_ZLIB, _NANOSECONDS = 2, 2
-_REMOTE, _TRANSMITTED = 0x80, 0x01
+_CONTAINER_TYPE, FRAME_TYPE, _ERROR_TYPE = 10, 1, 73
+ZLIB, _NANOSECONDS = 2, 2
+REMOTE, TRANSMITTED = 0x80, 0x01
 _NO_DATE = (0,) * 8
 CONTAINER_FRAMES = 2048
 """Containers of at most 128 KiB, as tools expect them, even if all are error frames."""
@@ -57,7 +57,7 @@ _HEAD = [
     ("time", "<u8"),
     ("channel", "<u2"),
 ]
-_FRAME_OBJECT = np.dtype(
+FRAME_OBJECT = np.dtype(
     [*_HEAD, ("flags", "u1"), ("length", "u1"), ("id", "<u4"), ("data", "u1", (MAX_DATA,))]
 )
 _ERROR_OBJECT = np.dtype(
@@ -91,7 +91,7 @@ class BlfFile:
         self._pending_frames = 0
         self._flushed_frames = 0  # those of the pending ones that are in the file
         self._objects = 0
-        self._uncompressed = _HEADER_SIZE
+        self._uncompressed = HEADER_SIZE
         try:
             self._file.append(self._header(0, 0, 0))
         except OSError:
@@ -146,30 +146,30 @@ class BlfFile:
         """A container of frames, and its size uncompressed."""
         content = objects(frames, self._channel)
         packed = zlib.compress(content, _FAST)
-        size = _OBJECT_HEADER.size + _CONTAINER.size + len(packed)
+        size = OBJECT_HEADER.size + CONTAINER.size + len(packed)
         container = (
-            _OBJECT_HEADER.pack(b"LOBJ", _OBJECT_HEADER.size, 1, size, _CONTAINER_TYPE)
-            + _CONTAINER.pack(_ZLIB, len(content))
+            OBJECT_HEADER.pack(b"LOBJ", OBJECT_HEADER.size, 1, size, _CONTAINER_TYPE)
+            + CONTAINER.pack(ZLIB, len(content))
             + packed
             + bytes(size % 4)
         )
-        return container, _OBJECT_HEADER.size + _CONTAINER.size + len(content)
+        return container, OBJECT_HEADER.size + CONTAINER.size + len(content)
 
     def _header(self, tail: int, tail_uncompressed: int, tail_objects: int) -> bytes:
         """The file's header, with a tail of so many bytes and objects."""
         packed = _FILE_HEADER.pack(
             b"LOGG",
-            _HEADER_SIZE,
+            HEADER_SIZE,
             *_APPLICATION,
             *_FORMAT_VERSION,
-            max(self._file.size + tail, _HEADER_SIZE),
+            max(self._file.size + tail, HEADER_SIZE),
             self._uncompressed + tail_uncompressed,
             self._objects + tail_objects,
             0,
             *_NO_DATE,
             *_NO_DATE,
         )
-        return packed.ljust(_HEADER_SIZE, b"\0")
+        return packed.ljust(HEADER_SIZE, b"\0")
 
 
 def objects(frames: Array, channel: int) -> bytes:
@@ -186,11 +186,11 @@ def objects(frames: Array, channel: int) -> bytes:
 
 
 def _frame_objects(frames: Array, channel: int) -> Array:
-    made = np.zeros(len(frames), _FRAME_OBJECT)
-    _fill_head(made, frames, channel, _FRAME_TYPE)
+    made = np.zeros(len(frames), FRAME_OBJECT)
+    _fill_head(made, frames, channel, FRAME_TYPE)
     can_id = frames["can_id"]
     remote = can_id & RTR != 0
-    made["flags"] = remote * _REMOTE | (frames["flags"] & _FROM_DRIVE == 0) * _TRANSMITTED
+    made["flags"] = remote * REMOTE | (frames["flags"] & _FROM_DRIVE == 0) * TRANSMITTED
     made["id"] = can_id & (EFF | ID_MASK_29)
     made["data"] = frames["data"]
     made["data"][remote] = 0

@@ -91,8 +91,8 @@ DARK: Final = Theme(
 )
 MARKS: Final = {"held": "✓", "failed": "✕", "open": "○"}
 """Of a state, beside its colour."""
-STATE_LINES: Final = {"held": ROBOTS[2], "failed": ROBOTS[1], "open": ROBOTS[4]}
-"""Of a state's lines in plots, on both grounds."""
+STATE_LINES: Final = {"held": ROBOTS[2], "failed": ROBOTS[1], "open": ROBOTS[4], "limit": "#7d7d7d"}
+"""Of lines in plots, on both grounds: of a state, and of what a limit allows."""
 ROBOT_OUTLINE: Final = ((1.0, 0.0), (-0.8, 0.65), (-0.45, 0.0), (-0.8, -0.65))
 """Corners of a robot as it is drawn in the plane, in body: x forward, y left."""
 

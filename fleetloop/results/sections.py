@@ -1,4 +1,4 @@
-"""The sections of a page: errors, agreement, torques, ages, the clock, and what the laws record."""
+"""The sections of a page: errors, agreement, torques, drives, buses, ages, the clock, the laws."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,9 +9,10 @@ from fleetloop.results.decimation import Points, decimated
 from fleetloop.results.derived import spread
 from fleetloop.results.network import ages_of
 from fleetloop.results.palette import ROBOTS, robot_style
-from fleetloop.results.panel import Line, LineStyle, Panel, Section
+from fleetloop.results.panel import Bound, Line, LineStyle, Panel, Section
 from fleetloop.results.summary import leader_profile
 from fleetloop.results.view import MOST_LINES, View, group_of, line, widest
+from fleetloop.torque_limits import limits
 
 ERRORS = (("x_e_m", "xₑ", "m"), ("y_e_m", "yₑ", "m"), ("theta_e_rad", "θₑ", "rad"))
 _LEADER = LineStyle("#7d7d7d", (4, 3))
@@ -83,7 +84,12 @@ def _speeds(view: View) -> Panel:
 
 
 def _torques(view: View) -> Section:
-    section = Section("torques", "Torques", "A panel per robot, at the wheel.", columns=2)
+    section = Section(
+        "torques",
+        "Torques",
+        "A panel per robot, at the wheel. Dashed: the tightest limit.",
+        columns=2,
+    )
     section.keys = [("right, commanded", _RIGHT), ("left, commanded", _LEFT)]
     felt = False
     for robot in view.robots:
@@ -101,6 +107,7 @@ def _torques(view: View) -> Section:
                 panel.lines.append(line(f"{side}, commanded", (), style, used["t_s"], values))
             for name in (f"tau_{side}_wheel_N_m", f"motor_{side}_wheel_N_m"):
                 view.expect(panel, name)
+        panel.bounds += _torque_bounds(view, robot)
         section.panels.append(panel)
     if felt:
         section.keys = [
@@ -111,6 +118,17 @@ def _torques(view: View) -> Section:
     if not view.few:
         section.panels.insert(0, _all_torques(view))
     return section
+
+
+def _torque_bounds(view: View, robot: str) -> list[Bound]:
+    """The tightest of what limits a wheel's torque at standstill, if anything does."""
+    found = limits(view.scenario, next(one for one in view.scenario.robot if one.name == robot))
+    if not found:
+        return []
+    tightest = min(found, key=lambda one: one.torque_wheel_N_m)
+    level = tightest.torque_wheel_N_m
+    text = f"limit {level:.3g} N·m: {tightest.words} ({tightest.key})"
+    return [Bound(sign * level, 0.0, view.end_s, "limit", text) for sign in (1.0, -1.0)]
 
 
 def _differs(truth: np.ndarray, side: str) -> bool:
@@ -126,6 +144,49 @@ def _all_torques(view: View) -> Panel:
     t = max((r["t_s"] for r in rows), key=len)
     panel.lines.append(Line("greatest of all", (), LineStyle(ROBOTS[0]), widest(t, sides)))
     return panel
+
+
+def _buses(view: View) -> Section:
+    panel = Panel("load [%]", "%")
+    for n, one in enumerate(view.traffic):
+        style = robot_style(n)
+        drawn = LineStyle(style.colour, style.dash)
+        panel.lines.append(line(one.bus, (), drawn, one.t_s, one.load * 100.0))
+    timed = "" if view.scenario.bus.timing == "wire" else ", if frames took their time here"
+    worst = "; ".join(f"{one.bus}: {one.slowest}" for one in view.traffic)
+    note = (
+        f"Load of each bus{timed}. Longest response at worst, from due to the end of its frame, as"
+        f" part of the message's period: {worst}."
+    )
+    keys = [(one.bus, line.style) for one, line in zip(view.traffic, panel.lines, strict=True)]
+    return Section("buses", "Buses", note, [panel], keys=keys)
+
+
+def _drives(view: View) -> Section:
+    """A panel per robot and quantity: its wheels' lines are noisy."""
+    note = "What the drives said of themselves on their buses."
+    section = Section("drives", "Drives", note, columns=3)
+    section.keys = [("right", _RIGHT), ("left", _LEFT)]
+    of_node = {
+        (view.scenario.bus_of(robot), node): (robot, side)
+        for robot in view.robots
+        for node, side in zip(view.scenario.nodes_of(robot), ("right", "left"), strict=True)
+    }
+    panels: dict[tuple[str, str], Panel] = {}
+    for traffic in view.traffic:
+        for one in traffic.measured:
+            robot, side = of_node.get((traffic.bus, one.node), ("", ""))
+            if not robot:
+                continue
+            title = f"{robot}: {one.name.replace('_', ' ')} [{one.unit}]"
+            panel = panels.setdefault(
+                (robot, one.name), Panel(title, one.unit, group=group_of(robot))
+            )
+            style = _RIGHT if side == "right" else _LEFT
+            shown = decimated(one.t_s, one.values, _LAW_POINTS)
+            panel.lines.append(Line(side, (), style, shown))
+    section.panels = [panels[robot, name] for robot, name in sorted(panels)]
+    return section
 
 
 def _ages(view: View) -> Section:
@@ -186,7 +247,9 @@ _SECTIONS: Sequence[Callable[[View], Section]] = (
     _errors,
     _agreement,
     _torques,
+    _drives,
     _laws,
+    _buses,
     _ages,
     _clock,
 )

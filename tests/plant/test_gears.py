@@ -14,7 +14,7 @@ from configs.resolve import plant_brief, robot_briefs
 from configs.scenario import Scenario
 from configs.signals import PLANT_SIGNALS
 from fleetloop.check.bus_load import bus_messages
-from fleetloop.check.torque import Limit, limits
+from fleetloop.torque_limits import Limit, limits
 from plant.robot import EmulatedRobot, emulated_robot
 
 GEARS = [(0.1, 1), (1.0, -1), (9.0, 1), (9.0, -1)]

@@ -12,12 +12,11 @@ from agents.laws.interface import Law
 from configs.loading import load, shipped
 from fleetloop.check.examine import examine
 from fleetloop.check.finding import Finding
-from fleetloop.check.law import (
-    ANALYSES,
+from fleetloop.check.law import ANALYSES, law_findings
+from fleetloop.law_facts import (
     adaptation_limit,
     approach_rate_1_s,
     lateral_gain_1_m,
-    law_findings,
     offers,
     saturation,
     speed_gain,

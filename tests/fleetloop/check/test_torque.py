@@ -10,7 +10,8 @@ from configs.scenario import Scenario
 from fleetloop.check.coordination import forecast
 from fleetloop.check.course import courses
 from fleetloop.check.finding import Finding
-from fleetloop.check.torque import limits, needed, torque_findings
+from fleetloop.check.torque import needed, torque_findings
+from fleetloop.torque_limits import limits
 
 FILE = """schema = 1
 name = "x"
