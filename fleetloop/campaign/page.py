@@ -18,6 +18,7 @@ from fleetloop.campaign.tables import (
     worst,
 )
 from fleetloop.campaign.verdicts import Result, Verdict
+from fleetloop.results import pages
 
 _MEANINGS = {
     Verdict.HELD: "held: never out of bounds",
@@ -32,7 +33,7 @@ _MEANINGS = {
 
 def page(folder: Folder, scenario: Scenario, results: Sequence[Result], wall_s: float) -> str:
     """The page as HTML."""
-    text = resources.files("fleetloop.campaign").joinpath("page.html").read_text("utf-8")
+    room = resources.files("fleetloop.campaign")
     grid = by_kind_and_time(results)
     times_s = folder.plan.times_s
     head = "".join(f'<th scope="col">{at_s:g} s</th>' for at_s in times_s)
@@ -45,9 +46,7 @@ def page(folder: Folder, scenario: Scenario, results: Sequence[Result], wall_s: 
         f'<li><b class="{verdict}">{escape(LETTERS[verdict])}</b> {escape(meaning)}</li>'
         for verdict, meaning in _MEANINGS.items()
     )
-    return Template(text).substitute(
-        title=escape(f"Fleetloop: {title(folder, scenario)}"),
-        subtitle=escape(scenario.description),
+    shown = Template(room.joinpath("page.html").read_text("utf-8")).substitute(
         summary=escape(summary_line(results, wall_s)),
         head=head,
         body="".join(body),
@@ -55,6 +54,10 @@ def page(folder: Folder, scenario: Scenario, results: Sequence[Result], wall_s: 
         notes="".join(f'<p class="note">{escape(line)}</p>' for line in notes(folder, results)),
         details="".join(details),
         scenario=escape(to_toml(scenario)),
+    )
+    style = room.joinpath("page.css").read_text("utf-8")
+    return pages.page(
+        f"Fleetloop: {title(folder, scenario)}", scenario.description, shown, style=style
     )
 
 

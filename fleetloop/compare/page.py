@@ -11,6 +11,7 @@ from fleetloop.compare.claims import Claim, Verdict
 from fleetloop.compare.contenders import gains_in_words
 from fleetloop.compare.results import Row
 from fleetloop.compare.tables import TABLES, notes, trouble_lines
+from fleetloop.results import pages
 from fleetloop.results.figures import Captioned
 from fleetloop.results.pages import figure_tag, table_tag
 
@@ -35,9 +36,7 @@ def page(
         for columns in TABLES
     )
     gains = ((row.label, gains_in_words(row.scenario)) for row in rows)
-    return template.substitute(
-        title=escape(f"Fleetloop: laws compared on {scenario.name}"),
-        subtitle=escape(scenario.description),
+    body = template.substitute(
         troubles=stopped,
         tables=tables,
         notes="".join(f'<p class="note">{escape(text)}</p>' for text in notes(seeds)),
@@ -53,13 +52,15 @@ def page(
         ),
         scenario=escape(to_toml(scenario)),
     )
+    title = f"Fleetloop: laws compared on {scenario.name}"
+    return pages.page(title, scenario.description, body)
 
 
 def _claims(found: Sequence[Claim]) -> str:
     lines = "".join(
         f'<tr><td>{escape(one.claim)}</td><td class="where">{escape(one.where)}</td>'
         f"<td>{escape(one.measured)}</td>"
-        f'<td class="verdict {_COLOUR[one.verdict]}">{escape(one.verdict.value)}</td></tr>'
+        f'<td class="state {_COLOUR[one.verdict]}">{escape(one.verdict.value)}</td></tr>'
         for one in found
     )
     head = "".join(f"<th>{text}</th>" for text in ("claim", "where", "measured", "verdict"))

@@ -6,7 +6,6 @@
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
-from importlib import resources
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -18,7 +17,7 @@ from fleetloop.results import run_folder, tables
 from fleetloop.results.drawing import COLOURS
 from fleetloop.results.known import Known, known_of
 from fleetloop.results.overlay_figures import PANELS, overlay_figures, robots_of
-from fleetloop.results.pages import figure_tag
+from fleetloop.results.pages import figure_tag, page, resource
 from fleetloop.results.publication import write_figures
 from fleetloop.results.report import PAGE
 from fleetloop.results.summary import Summary
@@ -49,9 +48,10 @@ def write_overlay(runs: Sequence[Path], records: Sequence[Record], out: Path | N
     known = dict(zip(labels(runs), map(known_of, records), strict=True))
     folder = run_folder.create("overlay", out, SYSTEM_CLOCK.wall_ns()).path
     figures = write_figures(folder, overlay_figures(known))
-    page = folder / PAGE
-    run_folder.write(page, _page(known, [figure_tag(item.caption, data) for item, data in figures]))
-    return page
+    written = folder / PAGE
+    tags = [figure_tag(item.caption, data) for item, data in figures]
+    run_folder.write(written, _page(known, tags))
+    return written
 
 
 def labels(runs: Sequence[Path]) -> list[str]:
@@ -65,9 +65,6 @@ def labels(runs: Sequence[Path]) -> list[str]:
 
 
 def _page(runs: Mapping[str, Known], figures: Sequence[str]) -> str:
-    template = Template(
-        resources.files("fleetloop.results").joinpath("overlay.html").read_text("utf-8")
-    )
     names = dict.fromkeys(run.scenario.name for run in runs.values())
     lost = (
         f"{label}: the record isn't all there: {run.record.shortage()}"
@@ -80,9 +77,7 @@ def _page(runs: Mapping[str, Known], figures: Sequence[str]) -> str:
         if robots <= PANELS
         else f"A colour per run; a band covers all {robots} robots."
     )
-    return template.substitute(
-        title=escape(f"Fleetloop: {len(runs)} runs"),
-        subtitle=escape(f"Scenarios: {', '.join(names)}"),
+    body = Template(resource("overlay.html")).substitute(
         lost="".join(f'<p class="lost">{escape(text)}</p>' for text in lost),
         results=_results(runs),
         expectations=_expectations(runs),
@@ -90,6 +85,7 @@ def _page(runs: Mapping[str, Known], figures: Sequence[str]) -> str:
         how=escape(how),
         figures="\n".join(figures),
     )
+    return page(f"Fleetloop: {len(runs)} runs", f"Scenarios: {', '.join(names)}", body)
 
 
 def _of_worst(group: str, name: str, spec: str | None) -> Cell:
