@@ -17,7 +17,7 @@ def live(
         typer.Option(
             "--foxglove",
             help="The address of a Foxglove WebSocket instead, for Foxglove or Lichtblick: the"
-            " channels of the record as they come (pip install fleetloop[foxglove]).",
+            " channels of the record as they come (needs the extra foxglove).",
         ),
     ] = False,
     as_json: JsonOption = False,
