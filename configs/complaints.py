@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from configs.errors import Complaint, KeyValueError, Problem, ScenarioError
 from configs.parameters import as_tuples
 from configs.scenario import Scenario
-from configs.wording import MISSING, remedy_of, unknown_key
+from configs.wording import MISSING, guess, remedy_of, unknown_key
 
 _NOTHING = object()
 _KEY = "[key]"  # pydantic's mark of an error in a key rather than in its value
@@ -163,7 +163,8 @@ def _problem(item: dict[str, Any], data: dict[str, Any], model: type[BaseModel])
     if item["type"].startswith("union_tag"):
         tag = holder.get("kind", MISSING)
         tags = item["ctx"].get("expected_tags", "")
-        remedy = f"must be one of {tags}" if tags else "must be given"
+        known = [tag.strip(" '") for tag in tags.split(",")]
+        remedy = f"must be one of {tags}{guess(str(tag), known)}" if tags else "must be given"
         return Problem(".".join([*names, "kind"]), tag, remedy)
     value = MISSING if item["type"] == "missing" else item["input"]
     error = item.get("ctx", {}).get("error")

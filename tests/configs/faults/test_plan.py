@@ -79,6 +79,11 @@ def test_each_process_is_told_the_faults_that_act_in_it() -> None:
         ('{kind="push", at_s=1.0, robots=["r9"]}', "fault.0.robots", "known: r1, r2"),
         ('{kind="push", at_s=1.0, robots=["r1", "r1"]}', "fault.0.robots", "is named twice"),
         ('{kind="drive_estop", at_s=1.0, for_s=1.0}', "fault.0.for_s = 1.0", "leave it out"),
+        (
+            '{kind="pusch", at_s=1.0}',
+            'fault.0.kind = "pusch"',
+            "'process_slow'; did you mean push?",
+        ),
         ('{kind="torque_half", at_s=1.0, wheel="front"}', "fault.0.wheel", "'right'"),
         ('{kind="link_loss", at_s=1.0, edges=["r1 > r2"]}', "fault.0.edges", "r1 -> r2"),
         ('{kind="link_loss", at_s=1.0, edges=["r2 -> r1"]}', "fault.0.edges", "no such edge"),
