@@ -4,7 +4,7 @@ Load counts the bits of a sample of each identifier's frames, exactly. Response 
 `bridge.wire.response_time` for what was sent periodically, its period the mean of the usual gaps.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from bridge.drives import protocol
-from bridge.drives.interface import DriveProtocol, MessageFormat
+from bridge.drives.interface import MessageFormat
 from bridge.frame import EFF, ID_MASK_29, RTR, Frame
 from bridge.wire.bits import frame_bits
 from bridge.wire.response_time import Analysis, Message, analyse
+from configs.errors import ScenarioError
 from configs.resolve import schedule
 from configs.scenario import Scenario
 from fleetloop.record.blf import REMOTE, TRANSMITTED, Array
@@ -29,6 +30,8 @@ _SAMPLE = 200
 _PERIODIC, _JITTER = 20, 0.5
 """A message is periodic if it was sent so often, and most gaps differ by less than this part."""
 _UNITS = ("A", "V", "°C")
+Formats = Callable[[int], Sequence[MessageFormat]]
+"""Of a drive protocol: the messages of a node."""
 
 
 class Measured(NamedTuple):
@@ -68,7 +71,10 @@ class Traffic:
 
 def traffic_of(run: Path, scenario: Scenario) -> list[Traffic]:
     """Of every bus whose BLF file the run left; of many the first ones."""
-    drives = protocol(scenario.drive_choice.plugin)
+    try:
+        formats = protocol(scenario.drive_choice.plugin).formats
+    except ScenarioError:  # a run is shown where the files of its protocol aren't, too
+        formats = None
     found = []
     for bus in scenario.buses[:MOST_BUSES]:
         try:
@@ -82,12 +88,12 @@ def traffic_of(run: Path, scenario: Scenario) -> list[Traffic]:
                 if scenario.bus_of(robot) == bus
                 for node in scenario.nodes_of(robot)
             ]
-            found.append(_traffic(bus, frames, scenario, drives, nodes))
+            found.append(_traffic(bus, frames, scenario, formats, nodes))
     return found
 
 
 def _traffic(
-    bus: str, frames: Array, scenario: Scenario, drives: DriveProtocol, nodes: Sequence[int]
+    bus: str, frames: Array, scenario: Scenario, formats: Formats | None, nodes: Sequence[int]
 ) -> Traffic:
     start_ns, bitrate_bit_s = _start_ns(scenario), scenario.bus.bitrate_bit_s
     stamps_s = _seconds(frames, start_ns)
@@ -105,7 +111,7 @@ def _traffic(
     measured = [
         one
         for node in nodes
-        for form in (drives.formats(node) if drives.formats is not None else ())
+        for form in (formats(node) if formats is not None else ())
         if form.can_id in by_identifier
         for one in _measured(node, form, frames[by_identifier[form.can_id]], start_ns)
     ]
