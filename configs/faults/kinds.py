@@ -93,7 +93,7 @@ def class_of(kind: str) -> type[Fault]:
     """
     if (found := KINDS.get(kind)) is None:
         known = [*KINDS]
-        raise ScenarioError(f"{kind}: no such kind{guess(kind, known)}; known: {', '.join(known)}")
+        raise ScenarioError(f"{kind}: no such kind{guess(kind, known)} (known: {', '.join(known)})")
     return found
 
 

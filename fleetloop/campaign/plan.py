@@ -64,7 +64,7 @@ def kinds_named(text: str) -> tuple[str, ...]:
         try:
             class_of(name)
         except ScenarioError as error:
-            raise ScenarioError(f"--faults {text}: {error}") from None
+            raise ScenarioError(f"--faults: {error}") from None
     if not names:
         raise ScenarioError(f"--faults {text!r}: names no kind; all, or for example push,bus_cut")
     return names
@@ -78,12 +78,12 @@ def times_named(text: str, scenario: Scenario) -> tuple[float, ...]:
     """
     found = _times(text)
     if not found or len(found) > MOST_CELLS:
-        remedy = "must read FROM:TO:STEP, as 5:25:5, or a list, as 5,10.5"
-        raise typer.BadParameter(f"{text}: {remedy} [s].")
+        remedy = "must read FROM:TO:STEP with FROM up to TO, as 5:25:5, or a list, as 5,10.5"
+        raise typer.BadParameter(f"--at {text}: {remedy} [s].")
     for t_s in found:
         if not 0 <= t_s < scenario.duration_s:
-            remedy = f"{scenario.name} goes from 0 to {scenario.duration_s:g} s"
-            raise typer.BadParameter(f"{text}: {t_s:g} s: {remedy}.")
+            remedy = f"must be below its duration_s = {scenario.duration_s:g}"
+            raise typer.BadParameter(f"--at {text}: {scenario.name} at {t_s:g} s: {remedy}.")
     return tuple(dict.fromkeys(found))
 
 
@@ -115,7 +115,7 @@ def seeds_named(text: str | None, first: int) -> tuple[int, ...]:
     if len(texts) > 1:
         return seeds
     if not 1 <= seeds[0] <= MOST_CELLS:
-        raise typer.BadParameter(f"{text}: so many seeds, 1 or more, or a list, as 3,7.")
+        raise typer.BadParameter(f"--seeds {text}: so many seeds, 1 or more, or a list, as 3,7.")
     return tuple(range(first, first + seeds[0]))
 
 

@@ -88,8 +88,10 @@ def judge(
     for series in _series(expect, record, scenario):
         first = max(window.first, series.member.joins_tick)
         behind = min(window.last + 1, series.member.leaves_tick)
-        if first < behind:
+        # A window that begins after the end of the run counts a robot that is a member then.
+        if first < min(max(window.last, window.first) + 1, series.member.leaves_tick):
             seen.append(len(series.values))
+        if first < behind:
             parts.append(_Part(series, first, _find(expect, series, first, behind, period_s)))
     held = _all_held([part.finding.held for part in parts])
     judged |= {"held": held, **_worst(expect, parts, record, period_s)}

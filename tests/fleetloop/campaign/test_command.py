@@ -124,7 +124,7 @@ def test_a_fault_of_a_process_is_a_whole_run_over_processes(tmp_path: Path) -> N
     ("words", "told"),
     [
         (("two_robots", "--faults", "psuh"), "no such kind"),
-        (("two_robots", "--at", "9"), "0 to 4 s"),
+        (("two_robots", "--at", "9"), "below its duration_s"),
         (("two_robots", "--robots", "r9"), "no such robot"),
         (("two_robots", "--allow", "fine"), "no such verdict"),
         (("two_robots", "--set", "expect=[]"), "expects nothing"),

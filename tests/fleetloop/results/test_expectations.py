@@ -149,6 +149,10 @@ def test_a_window_that_was_not_seen_to_its_end_is_decided_by_what_can_not_change
         assert found["held"] is held, expect
         assert ("seen_to_s" in found) == (held is None)
     assert judged(short, signal="mu", max=9.0)["seen_to_s"] == 1.998
+    # A window that begins after the end of the run: what was seen of the run is told.
+    for whole in (record(r1={"mu": T}, r2={"mu": T}), record(r1={"mu": T})):
+        late = judged(whole, signal="mu", max=9.0, from_s=1e6)
+        assert (late["held"], late["seen_to_s"]) == (None, pytest.approx(T[-1]))
 
 
 EVENTS = (
