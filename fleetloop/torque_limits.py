@@ -3,8 +3,8 @@
 the law's limit, if any       control.torque_limit_wheel_N_m
 the host's                    host.torque_limit_wheel_N_m
 gear × k_t × i_max            drive.torque_constant_N_m_A, current_limit_A, and [motor]'s
-gear × k_v (v_max − gear ν)   the drive's velocity limit, of its torque mode                 (3)
-gear × k_t × (U − k_t ω_s)/R  supply.voltage_V at the shaft's speed ω_s                      (4)
+gear × k_v (v_max − gear ν)   the drive's velocity limit, of its torque mode                 (1)
+gear × k_t × (U − k_t ω_s)/R  supply.voltage_V at the shaft's speed ω_s                      (2)
 """
 
 from dataclasses import dataclass
@@ -43,6 +43,12 @@ def limits(scenario: Scenario, robot: Robot) -> list[Limit]:
     if drive.preset != "ideal":
         found += _drive_limits(scenario, robot)
     return found
+
+
+def tightest(scenario: Scenario, robot: Robot) -> Limit | None:
+    """The least bound of a wheel's torque at standstill; None: nothing bounds it."""
+    found = limits(scenario, robot)
+    return min(found, key=lambda one: one.torque_wheel_N_m) if found else None
 
 
 def _drive_limits(scenario: Scenario, robot: Robot) -> list[Limit]:

@@ -175,7 +175,7 @@ class FaultDesk:
         from_tick = entry.from_tick if exact else orders.soonest()
         told = self._receivers(fault, entry.targets)
         by_launcher = ends and orders.schedule.realtime and _has_stopped(entry, from_tick)
-        pending = orders.expect(() if by_launcher else told.keys() - self._absent(), done)
+        pending = orders.expect(() if by_launcher else told, done)
         for process, targets in told.items():
             order = FaultOrder(
                 pending.number, ends, entry.name, targets, fault, from_tick, lasts, exact
@@ -199,19 +199,11 @@ class FaultDesk:
         Raises:
             ScenarioError: the text says why.
         """
-        absent = self._absent()
         for target in targets:
-            process = AGENT.process(target)
             if (problem := self._fault_problem(fault, target)) is not None:
                 raise ScenarioError(f"{target}: {problem}")
-            if fault.PLACE == "process" and (process in absent or self._orders.is_absent(process)):
+            if fault.PLACE == "process" and self._orders.is_absent(AGENT.process(target)):
                 raise ScenarioError(f"{target}: its controller is absent: {fault.kind} can't act")
-
-    def _absent(self) -> set[str]:
-        """The controllers that are absent by faults now; the launcher may not have seen it yet."""
-        tick = self._orders.tick()
-        absent = self.ledger.absences(self._orders.schedule.ticks)
-        return {AGENT.process(one.robot) for one in absent if one.lasts_at(tick)}
 
     def _no_return(self, entry: Entry) -> str | None:
         """Why a controller that is absent by a fault couldn't be there again."""

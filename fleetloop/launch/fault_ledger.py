@@ -114,6 +114,10 @@ class FaultLedger:
         """The absences of controllers by all faults, in a run of so many ticks."""
         return absences(self.planned(), ticks)
 
+    def absent(self, tick: int, ticks: int) -> set[str]:
+        """The processes of controllers that are absent by faults at a tick, in a run of `ticks`."""
+        return {AGENT.process(it.robot) for it in self.absences(ticks) if it.lasts_at(tick)}
+
     def rows(self, tick: int) -> list[dict[str, Any]]:
         """All faults as they are at a tick, for people and programs."""
         return [self.row(one, tick) for one in self._entries.values()]

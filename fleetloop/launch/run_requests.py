@@ -40,12 +40,16 @@ class RunRequests:
         self._orders = orders
         self._viewer = viewer
         self.controls = Controls()
-        self._book = book = OrderBook(
-            schedule,
-            lambda process: process in plane.absent,
-            lambda: plane.outcome.ticks,
-            plane.now,
-        )
+
+        def tick() -> int:
+            return plane.outcome.ticks
+
+        def is_absent(process: str) -> bool:
+            """What a fault has ended or frozen is absent before that is seen."""
+            by_faults = self.faults.ledger.absent(tick(), schedule.ticks)
+            return process in plane.absent or process in by_faults
+
+        self._book = book = OrderBook(schedule, is_absent, tick, plane.now)
         self.steering = Steering(
             orders.scenario,
             orders.speed,

@@ -1,7 +1,5 @@
 """The planned course of each robot in the plane, and what bounds its wheels' torque. Pure."""
 
-from math import inf
-
 import numpy as np
 
 from agents.paths import robot_path
@@ -9,7 +7,7 @@ from configs.curves import formation_offset, reference_path
 from configs.resolve import leader_brief
 from configs.scenario import Scenario
 from fleetloop.launch.drawn import ways_m
-from fleetloop.torque_limits import limits
+from fleetloop.torque_limits import tightest
 
 _POINTS, _LEAST_POINTS, _MOST_POINTS = 8000, 100, 400
 """Of all courses, and of each: a browser draws all of them in every frame."""
@@ -41,8 +39,5 @@ def courses(scenario: Scenario) -> dict[str, np.ndarray]:
 
 def torque_limits_wheel_N_m(scenario: Scenario) -> dict[str, float | None]:
     """Of each robot, the least bound of a wheel's torque at standstill; None: nothing bounds it."""
-    found = {}
-    for robot in scenario.robot:
-        least = min((one.torque_wheel_N_m for one in limits(scenario, robot)), default=inf)
-        found[robot.name] = None if least == inf else least
-    return found
+    found = {robot.name: tightest(scenario, robot) for robot in scenario.robot}
+    return {name: None if one is None else one.torque_wheel_N_m for name, one in found.items()}

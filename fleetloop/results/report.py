@@ -31,6 +31,7 @@ from fleetloop.results.tables import (
     trouble_lines,
     worst_place,
 )
+from fleetloop.results.traffic import traffic_of
 from fleetloop.results.view import View
 
 PAGE = "report.html"
@@ -64,7 +65,7 @@ def write_report(run: Path, record: Record | None = None) -> Path:
 def page_of(known: Known, figures: Sequence[Drawn]) -> str:
     """The page of a run."""
     scenario = known.scenario
-    plots = plots_of(View(*known))
+    plots = plots_of(View(*known, traffic_of(known.record.path.parent, scenario)))
     static = "\n".join(figure_tag(item.caption, data) for item, data in figures)
     above, below = words_of_run(known)
     body = "\n".join(

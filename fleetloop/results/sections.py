@@ -13,7 +13,7 @@ from fleetloop.results.palette import ROBOTS, robot_style
 from fleetloop.results.panel import Bound, Line, LineStyle, Panel, Section
 from fleetloop.results.summary import leader_profile
 from fleetloop.results.view import MOST_LINES, View, group_of, line, widest
-from fleetloop.torque_limits import limits
+from fleetloop.torque_limits import tightest
 
 ERRORS = (("x_e_m", "xₑ", "m"), ("y_e_m", "yₑ", "m"), ("theta_e_rad", "θₑ", "rad"))
 _LEADER = LineStyle("#7d7d7d", (4, 3))
@@ -125,14 +125,13 @@ def _torque_bounds(view: View, robot: str) -> list[Bound]:
     """The tightest of what limits a wheel's torque at standstill, if anything is known to."""
     own = next(one for one in view.scenario.robot if one.name == robot)
     try:
-        found = limits(view.scenario, own)
+        limit = tightest(view.scenario, own)
     except ScenarioError:  # a record is shown where the files of its law aren't, too
-        found = []
-    if not found:
+        limit = None
+    if limit is None:
         return []
-    tightest = min(found, key=lambda one: one.torque_wheel_N_m)
-    level = tightest.torque_wheel_N_m
-    text = f"limit {level:.3g} N·m: {tightest.words} ({tightest.key})"
+    level = limit.torque_wheel_N_m
+    text = f"limit {level:.3g} N·m: {limit.words} ({limit.key})"
     return [Bound(sign * level, 0.0, view.end_s, "limit", text) for sign in (1.0, -1.0)]
 
 

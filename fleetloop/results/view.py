@@ -14,7 +14,7 @@ from fleetloop.results.palette import robot_style
 from fleetloop.results.panel import Band, Bound, Line, LineStyle, Panel, Spot
 from fleetloop.results.summary import ERRORS, Summary
 from fleetloop.results.tables import marked_claim
-from fleetloop.results.traffic import Traffic, traffic_of
+from fleetloop.results.traffic import Traffic
 
 MOST_LINES = 12
 """More robots, and a band is drawn of all and lines of a few."""
@@ -33,19 +33,17 @@ class View:
     record: Record
     scenario: Scenario
     summary: Summary
+    traffic: Sequence[Traffic] = ()
+    """Of the buses that were recorded."""
     robots: tuple[str, ...] = field(init=False)
     """Those with lines of their own."""
     end_s: float = field(init=False)
     marks: Marks = field(init=False)
-    traffic: Sequence[Traffic] = field(init=False)
-    """Of the buses that were recorded."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "robots", _chosen(self.record, self.summary))
         ends = [float(rows["t_s"][-1]) for rows in self._rows() if len(rows)]
         object.__setattr__(self, "end_s", max(ends, default=0.0))
-        found = traffic_of(self.record.path.parent, self.scenario)
-        object.__setattr__(self, "traffic", found)
         object.__setattr__(self, "marks", marks_of(self.summary, self.scenario, self.end_s))
 
     @property

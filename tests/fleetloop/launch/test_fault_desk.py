@@ -34,7 +34,7 @@ class Bench:
         self.answers: list[dict[str, Any]] = []
         self.book = OrderBook(
             schedule(self.scenario),
-            lambda process: process in self.absent,
+            self.is_absent,
             lambda: self.tick,
             lambda: self.now_s,
         )
@@ -50,6 +50,10 @@ class Bench:
         self.desk.on_absences = self._absences
         link = SimpleNamespace(subscribe=lambda *_: None, publisher=self._publisher)
         self.book.open(link, "run", processes_of(self.scenario.names))
+
+    def is_absent(self, process: str) -> bool:
+        by_faults = self.desk.ledger.absent(self.tick, self.book.schedule.ticks)
+        return process in self.absent or process in by_faults
 
     def _absences(self, absent: Iterable[Absence]) -> None:
         self.absences = [one[:4] for one in absent]

@@ -92,7 +92,7 @@ def test_drives_say_currents_temperatures_and_voltages(run: Path, scenario: Scen
 def test_a_page_has_them_and_the_tightest_limit_of_torques(run: Path, scenario: Scenario) -> None:
     record = read_record(run, partial=False)
     known = Known(record, scenario, summarise(record, scenario, RunStats("lockstep")))
-    shown = {one.key: one for one in sections(View(*known))}
+    shown = {one.key: one for one in sections(View(*known, traffic_of(run, scenario)))}
     assert [line.label for line in shown["buses"].panels[0].lines] == ["r1", "r2", "r3", "r4"]
     assert "r1: 0x0" in shown["buses"].note
     titles = [panel.title for panel in shown["drives"].panels]
