@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from configs.events import KINDS, Gravity
+from configs.faults.kinds import KINDS as FAULT_KINDS
 from configs.faults.plan import planned_faults
 from configs.scenario import Scenario
 from fleetloop.results.summary import Summary
@@ -55,7 +56,7 @@ def _faults(summary: Summary, end_s: float) -> Iterator[FaultMark]:
     for row in summary.get("faults", []):
         how = f"fault {row['name']}: {row['kind']} on {_listed(row['targets'])}"
         how += ", ordered" if row.get("ordered") else ""
-        yield _fault(row["name"], how, row["from_s"], row["to_s"], end_s)
+        yield _fault(row["name"], row["kind"], how, row["from_s"], row["to_s"], end_s)
 
 
 def _planned(scenario: Scenario, end_s: float) -> Iterator[FaultMark]:
@@ -68,7 +69,7 @@ def _planned(scenario: Scenario, end_s: float) -> Iterator[FaultMark]:
         found[name] = fault.kind, first * period_s, None if last is None else last * period_s
     for name, (kind, from_s, to_s) in found.items():
         how = f"fault {name}: {kind} on {_listed(targets[name])}"
-        yield _fault(name, how, from_s, to_s, end_s)
+        yield _fault(name, kind, how, from_s, to_s, end_s)
 
 
 def _listed(targets: Sequence[str]) -> str:
@@ -76,7 +77,12 @@ def _listed(targets: Sequence[str]) -> str:
     return ", ".join(targets[:MOST_TARGETS]) + (f" and {more} more" if more > 0 else "")
 
 
-def _fault(name: str, how: str, from_s: float, to_s: float | None, end_s: float) -> FaultMark:
+def _fault(
+    name: str, kind: str, how: str, from_s: float, to_s: float | None, end_s: float
+) -> FaultMark:
+    known = FAULT_KINDS.get(kind)  # None: of another version
+    if known is not None and known.INSTANT:
+        to_s = from_s
     until_s = end_s if to_s is None else to_s
     until = "to the end" if to_s is None else f"to {until_s:.6g} s"
     when = f"from {from_s:.6g} s {until}" if until_s > from_s else f"at {from_s:.6g} s"
