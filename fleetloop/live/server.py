@@ -6,8 +6,10 @@ A gate before everything looks at each request:
     Origin    if it is given, likewise: a page from elsewhere opens no websocket
     path      the page, its websocket, and the files of Bokeh's own package, nothing else
     token     of the address, of the page and its websocket; the files are the same everywhere
+    session   of a websocket: one that this server has signed, which only comes with a page
 
-Behind it a websocket needs a session that this server has signed, which only comes with a page.
+What is wrong with a request or a message is told to its sender alone: nothing of it, nor the token,
+gets into a log.
 """
 
 import hmac
@@ -22,6 +24,7 @@ from bokeh.application.handlers.function import FunctionHandler
 from bokeh.server.server import BaseServer
 from bokeh.server.tornado import BokehTornado
 from bokeh.server.util import bind_sockets
+from bokeh.util.token import check_token_signature
 from tornado.httpserver import HTTPServer
 from tornado.httputil import HTTPHeaders, HTTPMessageDelegate, HTTPServerRequest
 from tornado.ioloop import IOLoop, PeriodicCallback
@@ -37,6 +40,9 @@ _MOST_MESSAGE_BYTES = 1 << 16
 """Of what a browser sends."""
 _PAGE, _SOCKET, _FILES = "/", "/ws", "/static/"
 _LOOK_EVERY_MS = 250
+_ARGUMENTS = {_PAGE: {"token"}, _SOCKET: {"token", "bokeh-protocol-version"}}
+_OF_OTHERS = "bokeh.server", "tornado.access", "tornado.general"
+"""Loggers of what came from outside."""
 _UNUSED_MS = 10_000
 """A session without a browser ends after this time."""
 
@@ -95,12 +101,18 @@ class _Gate(Router):
     """Looks at each request before the application does."""
 
     def __init__(
-        self, inside: TornadoApplication, hub: Hub, token: str, hosts: Collection[str]
+        self,
+        inside: TornadoApplication,
+        hub: Hub,
+        token: str,
+        hosts: Collection[str],
+        signed_with: bytes,
     ) -> None:
         self._inside = inside
         self._hub = hub
         self._token = token
         self._hosts = hosts
+        self._signed_with = signed_with
         self._refusals = TornadoApplication([], transforms=[_Headers])
 
     def find_handler(self, request: HTTPServerRequest, **kwargs: Any) -> HTTPMessageDelegate | None:
@@ -129,9 +141,24 @@ class _Gate(Router):
         given = request.query_arguments.get("token", [])
         if len(given) != 1 or not hmac.compare_digest(given[0], self._token.encode()):
             return 403, "the address lacks its token, or has a wrong one"
+        if unknown := set(request.query_arguments) - _ARGUMENTS[path]:
+            return 400, f"the address has more than its token: {min(unknown)[:40]!r}"
+        if path == _SOCKET and not self._has_session(request.headers):
+            return 403, "a websocket needs the session of a page"
         if path == _PAGE and len(self._hub.viewers) >= MOST_VIEWERS:
             return 503, f"{MOST_VIEWERS} viewers are there already"
         return None
+
+    def _has_session(self, headers: HTTPHeaders) -> bool:
+        """Whether a websocket comes with a session that was signed here."""
+        protocol, _, session = headers.get("Sec-WebSocket-Protocol", "").partition(",")
+        try:
+            signed = check_token_signature(
+                session.strip(), secret_key=self._signed_with, signed=True
+            )
+        except (ValueError, KeyError, TypeError):  # of what is no token at all
+            return False
+        return bool(signed) and protocol.strip() == "bokeh"
 
 
 class LiveServer:
@@ -149,6 +176,8 @@ class LiveServer:
     def __init__(self, hub: Hub, token: str, port: int = 0) -> None:
         logging.getLogger("bokeh").setLevel(logging.ERROR)
         logging.getLogger("tornado").setLevel(logging.ERROR)
+        for name in _OF_OTHERS:
+            logging.getLogger(name).setLevel(logging.CRITICAL)
         self._hub = hub
         try:
             sockets, self.port = bind_sockets(ADDRESS, port)
@@ -156,11 +185,12 @@ class LiveServer:
             why = error.strerror or error
             raise InfrastructureError(f"{ADDRESS}:{port}: can't serve there: {why}") from error
         hosts = [f"{name}:{self.port}" for name in (ADDRESS, "localhost")]
+        signed_with = secrets.token_bytes(32)
         inside = BokehTornado(
             {_PAGE: Application(FunctionHandler(hub.open))},
             extra_websocket_origins=hosts,
             sign_sessions=True,
-            secret_key=secrets.token_bytes(32),
+            secret_key=signed_with,
             websocket_max_message_size_bytes=_MOST_MESSAGE_BYTES,
             check_unused_sessions_milliseconds=1000,
             unused_session_lifetime_milliseconds=_UNUSED_MS,
@@ -168,7 +198,7 @@ class LiveServer:
             include_cookies=[],
         )
         inside.add_transform(_Headers)
-        gate = _Gate(inside, hub, token, hosts)
+        gate = _Gate(inside, hub, token, hosts, signed_with)
         http = HTTPServer(gate, max_header_size=1 << 14, max_body_size=1 << 10)
         http.add_sockets(sockets)
         self._bokeh = BaseServer(IOLoop.current(), inside, http)

@@ -1,6 +1,7 @@
 """The server of a live page: whoever lacks the token, has another origin or not the controls."""
 
 import asyncio
+import base64
 from collections.abc import Coroutine
 from secrets import token_urlsafe
 from typing import Any
@@ -91,18 +92,38 @@ def test_only_the_right_token_opens_the_page(scenario: Scenario) -> None:
     served(scenario, test)
 
 
-def test_a_websocket_needs_the_token_and_a_session_of_a_page(scenario: Scenario) -> None:
+def test_a_websocket_needs_the_token_and_a_session_of_a_page(
+    scenario: Scenario, caplog: pytest.LogCaptureFixture
+) -> None:
     async def test(bench: Bench) -> None:
         good = socket_address(bench.address)
         session = await session_token(bench.address)
         lacking = good.replace(f"token={bench.token}", "token=guess")
         assert await refused(websocket_connect(lacking, subprotocols=["bokeh", session])) == 403
         forged = session[:-4] + ("AAAA" if session[-4:] != "AAAA" else "BBBB")
-        connection = await websocket_connect(good, subprotocols=["bokeh", forged])
-        assert await connection.read_message() is None, "it must be closed at once"
+        no_object = base64.urlsafe_b64encode(b"[]").decode().rstrip("=")
+        for protocols in (
+            ["bokeh", forged],
+            ["bokeh", f"{no_object}.{no_object}"],
+            ["bokeh", "x.y"],
+            ["bokeh", "x"],
+            ["bokeh"],
+            [session],
+            [],
+            ["other", session],
+        ):
+            assert await refused(websocket_connect(good, subprotocols=protocols)) == 403
+        assert (await answer(f"{bench.address}&bokeh-session-id=mine")).code == 400
+        connection = await websocket_connect(good, subprotocols=["bokeh", session])
+        assert await connection.read_message() is not None
+        for part in ("header", "metadata", "content"):
+            await connection.write_message(f"no {part}")
+        while await connection.read_message() is not None:
+            pass  # until it is closed
         connection.close()
 
     served(scenario, test)
+    assert not caplog.records, "what is wrong with a request is told to its sender alone"
 
 
 def test_another_origin_and_another_name_of_this_machine_are_refused(scenario: Scenario) -> None:
