@@ -9,26 +9,34 @@ until_s=None                            None takes a key, or a member of a list,
 """
 
 import copy
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import PurePath
 from typing import Any
 
 from pydantic import BaseModel
 from pydantic_core import to_jsonable_python
 
+from configs.errors import ScenarioError
 from configs.overrides import Override, find
 from configs.parameters import Parameters
 
 KIND = "kind"
 
 
-def overrides_of(changes: Mapping[str, object], data: Mapping[str, Any]) -> list[Override]:
-    """Changes as overrides of the parsed file `data`, a key each."""
-    return [
-        one
-        for key, value in changes.items()
-        for one in _flat(key, value, _inside(data, key.split(".")))
-    ]
+def overrides_of(changes: Iterable[tuple[str, object]], data: Mapping[str, Any]) -> list[Override]:
+    """Changes, keys with values, as overrides of the parsed file `data`, a key each.
+
+    Raises:
+        ScenarioError: a key is changed twice.
+    """
+    made: dict[str, Override] = {}
+    for key, value in changes:
+        for one in _flat(key, value, _inside(data, key.split("."))):
+            if one.key in made:
+                both = f"{made[one.key].value!r} and {one.value!r}"
+                raise ScenarioError(f"{one.key}: changed twice, to {both}: name it once")
+            made[one.key] = one
+    return list(made.values())
 
 
 def _flat(key: str, value: object, there: object) -> Iterator[Override]:

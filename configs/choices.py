@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 
 _P = TypeVar("_P", bound=Parameters)
+_NAMES = {"name", "kind"}
+"""Keys that are mistaken for that which holds the name."""
 
 
 class Chooser(NamedTuple):
@@ -65,10 +67,15 @@ class Chooser(NamedTuple):
             if recorded:
                 return Choice(Plugin(self.kind, name, name), Recorded(tuple(rest.items())))
             raise stated(self.key, name, str(error)) from error
-        return Choice(plugin, validated(parameters, rest, lambda key: self._of_another(key, name)))
+        beside = (self.key,)
+        return Choice(
+            plugin, validated(parameters, rest, beside, lambda key: self._of_another(key, name))
+        )
 
     def _of_another(self, key: str, name: str) -> str:
         """What to do about a key that shipped classes have and the class `name` hasn't."""
+        if key in _NAMES:
+            return f"; did you mean {self.key}?"
         owners = [
             other
             for other in self.shipped

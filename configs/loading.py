@@ -7,7 +7,7 @@ file come at once, a line each: file, key, value, remedy.
 import copy
 import difflib
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -41,6 +41,8 @@ def load(source: str | Path, overrides: Sequence[str | Override] = ()) -> Scenar
     Raises:
         ScenarioError: no such scenario, or all that is wrong with it, a line each.
     """
+    if not isinstance(source, str | Path):
+        raise TypeError(f"load({source!r}): the path of a scenario file, or a shipped name")
     name, text = _read(str(source))
     return loads(name, text, overrides, folder=folder_of(source))
 
@@ -77,7 +79,7 @@ def loads(
     return _of_data(name, data, overrides, folder, recorded=recorded)
 
 
-def changed(scenario: Scenario, changes: Mapping[str, object]) -> Scenario:
+def changed(scenario: Scenario, changes: Iterable[tuple[str, object]]) -> Scenario:
     """A scenario with these changes of its file (`configs.changes`); checked as a file is.
 
     Raises:
@@ -131,6 +133,10 @@ def _read(source: str) -> tuple[str, str]:
             "utf-8"
         )
     path = Path(source)
+    if path.is_dir():
+        files = ", ".join(str(file) for file in sorted(path.glob("*.toml"))[:3])
+        has = f"; there is {files}" if files else ""
+        raise ScenarioError(f"{path}: a folder, not the file of a scenario{has}")
     try:
         return str(path), path.read_text("utf-8")
     except FileNotFoundError as error:

@@ -131,7 +131,7 @@ class Scenario(BaseModel):
 
         if not isinstance(changes, Mapping | None):
             raise TypeError(f"with_({changes!r}): keys and values, as {{'control.k1': 3.0}}")
-        return changed_scenario(self, {**(changes or {}), **sections})
+        return changed_scenario(self, [*(changes or {}).items(), *sections.items()])
 
     def to_toml(self) -> str:
         """The text of a scenario file that says all of this, defaults too."""

@@ -1,6 +1,6 @@
 """A table of a file as the parameters of a class: pydantic's part, its complaints in our words."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
@@ -32,9 +32,16 @@ def origin_of(info: "core_schema.ValidationInfo") -> tuple[str, bool]:
 def validated(
     parameters: type[Parameters],
     table: Mapping[str, Any],
+    beside: Sequence[str] = (),
     hint: Callable[[str], str] = lambda _: "",
 ) -> Parameters:
-    """The parameters that a table's keys make; `hint`: what to do about an unknown key.
+    """The parameters that a table's keys make.
+
+    Args:
+        parameters: their class.
+        table: without the keys `beside`, which are known as well.
+        beside: keys of the table in the file that are no parameters.
+        hint: what to do about an unknown key.
 
     Raises:
         ValidationError: of the keys; an unknown one is told with those that are known.
@@ -43,7 +50,7 @@ def validated(
 
     known = sorted(one.name for one in fields(parameters))
     wrong = [
-        _detail(key, value, unknown_key(key, known, hint(key)))
+        _detail(key, value, unknown_key(key, [*beside, *known], hint(key)))
         for key, value in table.items()
         if key not in known
     ]

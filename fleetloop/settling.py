@@ -20,8 +20,8 @@ def settled_from(values: np.ndarray, band: float = SETTLE_BAND) -> int:
 
 
 def settle_s(t: np.ndarray, values: np.ndarray, band: float = SETTLE_BAND) -> float | None:
-    """Last time outside the band [s]; 0 if never outside, None if outside at the end."""
+    """Time from which on it is within the band [s]; 0: always, None: it ends outside."""
     first = settled_from(values, band)
     if first == 0:
         return 0.0
-    return round(float(t[first - 1]), 9) if first < len(values) else None
+    return round(float(t[first]), 9) if first < len(values) else None

@@ -47,6 +47,7 @@ WORDS = Words(
     speed="speed =",
     deployment="deployment =",
     force="force=True",
+    notes_are_told=False,
 )
 
 
@@ -91,7 +92,7 @@ def run(
             machine allows.
         deployment: file that says where roles and buses are; over processes.
         force: run it despite errors that `fleetloop check` finds.
-        on_progress: called about ten times a second, in this thread.
+        on_progress: called about ten times a second and at the end, in this thread.
         on_event: called when something happens, in this thread.
 
     Raises:
@@ -125,6 +126,8 @@ def run(
         if stop.requested:
             raise KeyboardInterrupt(stop.reason)
         made = Run(job.out, partial=True, notes=notes)
+    done_s = made.summary.ticks * loaded.clock.control_period_s
+    far(Progress(done_s, loaded.ends_at_s, made.summary.wall_s))
     if out is None:
         weakref.finalize(made, shutil.rmtree, job.out, ignore_errors=True)
     return made

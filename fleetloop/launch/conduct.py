@@ -87,6 +87,8 @@ class Words(NamedTuple):
     speed: str = "--speed"
     deployment: str = "--deployment"
     force: str = "--force"
+    notes_are_told: bool = True
+    """Notes come before an error."""
 
 
 OF_OPTIONS = Words()
@@ -135,12 +137,11 @@ def prepare(
     found = [one for one in examine(source, scenario, overrides) if one.level != "ok"]
     for line in in_words(found):
         note(line)
-    failed = list(dict.fromkeys(titled(one) for one in found if one.level == "error"))
-    if failed and not manner.force:
-        raise ScenarioError(
-            f"{source}: would not work as it is, by {'; '.join(failed)};"
-            f" {words.force} runs it all the same"
-        )
+    errors = [one for one in found if one.level == "error"]
+    if errors and not manner.force:
+        failed = "; ".join(dict.fromkeys(map(titled, errors)))
+        text = f"{source}: would not work as it is, by {failed}; {words.force} runs it all the same"
+        raise ScenarioError(text if words.notes_are_told else "\n".join([text, *in_words(errors)]))
     return deployment
 
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from fleetloop.record.reader import Record
 from fleetloop.results.decimation import decimated
 from fleetloop.results.palette import ROBOTS
-from fleetloop.results.panel import span
+from fleetloop.results.panel import FLOORS, span
 from fleetloop.settling import settled_from
 
 WIDTH_IN, PAGE_IN = 88.0 / 25.4, 180.0 / 25.4
@@ -22,6 +22,9 @@ HEIGHT_IN, DPI = 2.2, 300
 COLOURS = ROBOTS
 _DASHES: tuple[object, ...] = ("-", (0, (6, 2)), (0, (2, 1.2)), (0, (7, 2, 1.5, 2)))
 _POINTS = 1200
+_CLOSER = 2.0
+"""A second panel spans less than the first by this at least."""
+_LOGARITHMIC_FROM = 20.0
 STYLE: Any = {
     "font.size": 8,
     "axes.grid": True,
@@ -58,7 +61,7 @@ def over_time(
     """
     t = max((rows["t_s"] for rows in record.controller.values()), key=len)
     settled = _settled(list(series.values())) if zoom else None
-    if not settled or t[-1] - t[settled] < 0.1 * t[-1]:
+    if not settled or not _closer(list(series.values()), unit, settled):
         figure, whole = axes_of()
         panels = [(whole, 0)]
     else:
@@ -83,6 +86,28 @@ def _settled(series: Sequence[np.ndarray]) -> int | None:
     last = max(map(settled_from, series), default=0)
     longest = max((len(values) for values in series), default=0)
     return last if last < longest - 2 else None
+
+
+def _closer(series: Sequence[np.ndarray], unit: str, settled: int) -> bool:
+    """Whether the rest from an index on is long enough, and shows more on an axis of its own."""
+    longest = max(map(len, series))
+    if longest - settled < 0.1 * longest:
+        return False
+    whole, rest = (span([values[first:] for values in series], unit) for first in (0, settled))
+    return whole.high - whole.low > _CLOSER * (rest.high - rest.low)
+
+
+def widen(axes: Axes, unit: str) -> None:
+    """Let the axis of values span the floor of its unit at least."""
+    low, high = axes.get_ylim()
+    missing = max(0.0, FLOORS.get(unit, 0.0) - (high - low)) / 2.0
+    axes.set_ylim(low - missing, high + missing)
+
+
+def torque_scale(axes: Axes) -> None:
+    """Linear, or beyond 1 N·m logarithmic if the values get far beyond."""
+    if max(map(abs, axes.get_ylim())) > _LOGARITHMIC_FROM:
+        axes.set_yscale("symlog", linthresh=1.0, linscale=2.0)
 
 
 def style_of(n: int) -> tuple[str, object]:

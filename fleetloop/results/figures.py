@@ -34,6 +34,8 @@ from fleetloop.results.drawing import (
     legend_above,
     over_time,
     style_of,
+    torque_scale,
+    widen,
 )
 from fleetloop.results.graph_drawing import drawn
 from fleetloop.results.network import ages_of
@@ -174,7 +176,7 @@ def speed_estimates(record: Record, scenario: Scenario) -> Figure:
 
 
 def torques(record: Record, _: Scenario) -> Figure:
-    """Commanded wheel torques; linear near zero, logarithmic beyond 1 N·m."""
+    """Commanded wheel torques; large ones logarithmic beyond 1 N·m."""
     figure = Figure(figsize=(WIDTH_IN, 1.6 * HEIGHT_IN), dpi=DPI, layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     for axes, side in ((upper, "right"), (lower, "left")):
@@ -183,10 +185,8 @@ def torques(record: Record, _: Scenario) -> Figure:
             colour, dash = style_of(n)
             t, values = decimated(rows["t_s"], rows[f"tau_{side}_wheel_N_m"])
             axes.plot(t, values, color=colour, linestyle=dash, linewidth=0.8, label=robot)
-        commanded = (np.abs(rows[f"tau_{side}_wheel_N_m"]) for rows in record.controller.values())
-        peak = max(float(values.max(initial=0.0)) for values in commanded)
-        if peak > 1.0:
-            axes.set_yscale("symlog", linthresh=1.0, linscale=2.0)
+        widen(axes, "N·m")
+        torque_scale(axes)
         axes.set(ylabel=f"τ {side} [N·m]")
     lower.set_xlabel("t [s]")
     legend_above(figure, upper, len(record.robots))

@@ -10,7 +10,7 @@ from configs.netem import LOCALISATION
 from configs.scenario import Scenario
 from fleetloop.record.reader import Record
 from fleetloop.results.decimation import decimated
-from fleetloop.results.drawing import DPI, WIDTH_IN, style_of
+from fleetloop.results.drawing import DPI, WIDTH_IN, style_of, widen
 from fleetloop.results.graph_drawing import EdgeStyle, drawn
 from fleetloop.results.network import ages_of
 
@@ -44,6 +44,7 @@ def ages(record: Record, _: Scenario) -> Figure:
         colour, dash = style_of(n)
         x, y = decimated(t[:both], s[hearer][:both] - s[speaker][:both])
         upper.plot(x, y, color=colour, linestyle=dash, label=f"{hearer} − {speaker}")
+    widen(upper, "m")
     upper.set(ylabel="s$_i$ − s$_j$ [m]")
     if 0 < len(between_robots) <= _MOST_IN_LEGEND:
         upper.legend(fontsize=6 + (len(between_robots) < 6))

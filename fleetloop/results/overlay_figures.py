@@ -14,15 +14,23 @@ from matplotlib.figure import Figure
 from fleetloop.record.reader import Record
 from fleetloop.results.decimation import decimated, drawable, stride
 from fleetloop.results.derived import spread
-from fleetloop.results.drawing import DPI, PAGE_IN, STYLE, legend_above, style_of
+from fleetloop.results.drawing import (
+    DPI,
+    PAGE_IN,
+    STYLE,
+    legend_above,
+    style_of,
+    torque_scale,
+    widen,
+)
 from fleetloop.results.figures import Captioned
 from fleetloop.results.known import Known
+from fleetloop.results.panel import logarithmic_span
 
 PANELS = 4
 _WIDTH_IN = PAGE_IN
 _HEIGHT_IN = 1.8
 _STRETCHES = 600
-_LOGARITHMIC_FROM = 20.0
 
 
 class Signal(NamedTuple):
@@ -30,18 +38,17 @@ class Signal(NamedTuple):
 
     name: str
     symbol: str
+    unit: str
     caption: str
-    symlog: bool = False
-    """Logarithmic beyond 1 if it gets far beyond."""
 
 
 SIGNALS = (
-    Signal("x_e_m", "x$_e$ [m]", "Path following errors x_e."),
-    Signal("y_e_m", "y$_e$ [m]", "Path following errors y_e."),
-    Signal("theta_e_rad", "θ$_e$ [rad]", "Path following errors θ_e."),
-    Signal("v_r_hat", "v̂$_r$ [m/s]", "Estimates of the reference speed."),
-    Signal("tau_right_wheel_N_m", "τ right [N·m]", "Commanded torques, right wheels.", True),
-    Signal("tau_left_wheel_N_m", "τ left [N·m]", "Commanded torques, left wheels.", True),
+    Signal("x_e_m", "x$_e$", "m", "Path following errors x_e."),
+    Signal("y_e_m", "y$_e$", "m", "Path following errors y_e."),
+    Signal("theta_e_rad", "θ$_e$", "rad", "Path following errors θ_e."),
+    Signal("v_r_hat", "v̂$_r$", "m/s", "Estimates of the reference speed."),
+    Signal("tau_right_wheel_N_m", "τ right", "N·m", "Commanded torques, right wheels."),
+    Signal("tau_left_wheel_N_m", "τ left", "N·m", "Commanded torques, left wheels."),
 )
 
 
@@ -84,13 +91,16 @@ def _positions(records: Mapping[str, Record]) -> Figure:
 def _spreads(runs: Mapping[str, Known]) -> Figure:
     figure = Figure(figsize=(_WIDTH_IN, 2.2), dpi=DPI, layout="constrained")
     axes = figure.subplots()
+    drawn: list[np.ndarray] = []
     for n, (label, run) in enumerate(runs.items()):
         colour, dash = style_of(n)
         values = spread(run.record.controller, run.scenario.members)
         t = next(iter(run.record.controller.values()))["t_s"][: len(values)]
         x, y = decimated(t, np.where(values > 0.0, values, np.nan))
         axes.plot(x, y, color=colour, linestyle=dash, label=label)
+        drawn.append(y)
     axes.set(xlabel="t [s]", ylabel="max s − min s [m]", yscale="log")
+    axes.set_ylim(logarithmic_span(drawn, "m"))
     legend_above(figure, axes, len(runs))
     return figure
 
@@ -116,13 +126,14 @@ def _signal(signal: Signal, records: Mapping[str, Record]) -> Figure:
             _lines(axes, signal.name, records, robot)
         for axes in panels[len(robots) :]:
             axes.set_axis_off()
-        for axes in grid[-1]:
+        for axes in panels[: len(robots)][-columns:]:  # the lowest of its column
             axes.set_xlabel("t [s]")
+            axes.tick_params(labelbottom=True)
     for axes in panels:
-        axes.set_ylabel(signal.symbol)
-        peak = max((abs(limit) for limit in axes.get_ylim()), default=0.0)
-        if signal.symlog and peak > _LOGARITHMIC_FROM:
-            axes.set_yscale("symlog", linthresh=1.0, linscale=2.0)
+        axes.set_ylabel(f"{signal.symbol} [{signal.unit}]")
+        widen(axes, signal.unit)
+        if signal.unit == "N·m":
+            torque_scale(axes)
     handles = {
         str(item.get_label()): item
         for axes in panels

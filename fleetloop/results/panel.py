@@ -113,7 +113,7 @@ class Panel:
         """Of the axis for the whole run."""
         levels = [one.level for one in self.bounds]
         if self.logarithmic:
-            return logarithmic_span(self._values())
+            return logarithmic_span(self._values(), self.unit)
         return span(self._values(), self.unit, levels)
 
     @property
@@ -180,13 +180,13 @@ def span(series: Sequence[np.ndarray], unit: str, levels: Sequence[float] = ()) 
     return Span(low - missing - pad, high + missing + pad)
 
 
-def logarithmic_span(series: Sequence[np.ndarray]) -> Span:
-    """The axis of values above 0, whole decades, one at least."""
+def logarithmic_span(series: Sequence[np.ndarray], unit: str) -> Span:
+    """The axis of values above 0: whole decades, up to the floor of its unit at least."""
     values = np.concatenate([v[np.isfinite(drawable(v)) & (v > 0.0)] for v in series] or [[]])
     if not len(values):
         return Span(1e-3, 1.0)
     low = 10.0 ** np.floor(np.log10(max(float(np.quantile(values, _RARE)), 1e-9)))
-    high = 10.0 ** np.ceil(np.log10(float(values.max())))
+    high = 10.0 ** np.ceil(np.log10(max(float(values.max()), FLOORS.get(unit, 0.0))))
     return Span(float(low), float(max(high, 10.0 * low)))
 
 

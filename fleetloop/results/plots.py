@@ -13,6 +13,7 @@ from bokeh.models import (
     CrosshairTool,
     CustomJS,
     FactorRange,
+    FixedTicker,
     HoverTool,
     Range1d,
     UnionRenderers,
@@ -33,6 +34,9 @@ _TOOLS = "xpan,xbox_zoom,xwheel_zoom,reset,save"
 _FAULT, _EVENT, _BAD = ROBOTS[4], ROBOTS[6], ROBOTS[1]
 _MOST_ROWS = 24
 """Of the timeline."""
+_DECADES = [10.0**n for n in range(-12, 10)]
+_WITHIN_DECADES = [n * decade for decade in _DECADES for n in range(2, 10)]
+"""Of a logarithmic axis: only decades have labels, others would be printed over each other."""
 SEEK = "window.fleetloop?.seek(cb_obj.x)"
 
 
@@ -83,6 +87,8 @@ class TimePlots:
             y_axis_type="log" if panel.logarithmic else "linear",
         )
         plot.tags = ["follow", panel.floor, panel.logarithmic, low, high]
+        if panel.logarithmic:
+            plot.yaxis.ticker = FixedTicker(ticks=_DECADES, minor_ticks=_WITHIN_DECADES)
         self._mark(plot)
         _bands(plot, panel)
         lines = self._lines(plot, panel)

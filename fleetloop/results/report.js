@@ -66,7 +66,9 @@
       let [low, high] = full && !off.size ? [lowest, highest] : extent(plot, from, to, log);
       if (!(low <= high)) continue;
       if (!full || off.size) {
-        if (log) { low /= 1.3; high *= 1.3; }
+        if (log) {  // whole decades, which have the labels
+          low = 10 ** Math.floor(Math.log10(low)); high = 10 ** Math.ceil(Math.log10(Math.max(high, 2 * low, floor)));
+        }
         else {
           const lack = Math.max(0, floor - (high - low)) / 2, pad = 0.06 * Math.max(high - low, floor);
           low -= lack + pad; high += lack + pad;

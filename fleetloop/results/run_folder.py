@@ -44,7 +44,7 @@ def create(scenario_name: str, out: Path | None, started_ns: int) -> Created:
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise ScenarioError(
-                f"--out {folder}: exists and is not an empty folder; name a new one"
+                f"the run's folder {folder}: exists and is not an empty folder; name a new one"
             )
         new = tuple(path for path in (folder, *folder.parents) if not path.exists())
         folder.mkdir(parents=True, exist_ok=True)

@@ -107,7 +107,7 @@ def _torques(view: View) -> Section:
                 values = used[f"tau_{side}_wheel_N_m"]
                 panel.lines.append(line(f"{side}, commanded", (), style, used["t_s"], values))
             for name in (f"tau_{side}_wheel_N_m", f"motor_{side}_wheel_N_m"):
-                view.expect(panel, name)
+                view.expect(panel, name, robot)
         panel.bounds += _torque_bounds(view, robot)
         section.panels.append(panel)
     if felt:
@@ -206,7 +206,8 @@ def _ages(view: View) -> Section:
                 style = LineStyle(ROBOTS[6], robot_style(4 * n).dash)
             shown = decimated(rows["t_s"], ages, view.points(6))
             panel.lines.append(Line(f"{source} → {robot}", (), style, shown))
-        section.panels.append(panel)
+        if panel.lines:
+            section.panels.append(panel)
     return section
 
 

@@ -65,8 +65,7 @@ def print_results(summary: Summary, folder: Path) -> None:
         console.print_whole(_profile(summary["profile_us_per_tick"]))
     for text in (*network_lines(summary), *realtime_lines(summary)):
         line(text)
-    reason = f": {summary['reason']}" if summary["reason"] else ""
-    line(f"verdict  {summary['verdict']}{reason}", "bold")
+    line(f"verdict  {_with_reason(summary['verdict'], summary['reason'])}", "bold")
     line(f"run      {folder}")
 
 
@@ -161,12 +160,19 @@ def wrong_lines(outcome: dict[str, Any]) -> list[str]:
     """What is wrong with the outcome of a run: why there is no verdict, what did not hold, why."""
     lines = []
     if outcome["verdict"] not in ("held", "failed"):
-        lines.append(f"{outcome['verdict']}: {outcome['reason']}")
+        lines.append(_with_reason(outcome["verdict"], outcome["reason"]))
     broken = [expect for expect in outcome["expectations"] if expect["held"] is not True]
     lines += [f"{mark(expect):<11}  {claim(expect)}" for expect in broken]
     if "stopped_robots" in outcome:
         lines += trouble_lines(outcome)
     return lines
+
+
+def _with_reason(verdict: str, reason: str) -> str:
+    """A verdict and why; said once of a run that was "interrupted by SIGINT"."""
+    if reason.startswith(verdict):
+        return reason
+    return f"{verdict}: {reason}" if reason else verdict
 
 
 def machine_lines(summary: Summary) -> Iterator[str]:

@@ -86,11 +86,13 @@ class View:
         found = banded(series.values(), longest["t_s"], _STRETCHES)
         return [Band(f"all {len(series)}", _BAND_COLOUR, *found)] if len(found[0]) else []
 
-    def expect(self, panel: Panel, name: str) -> None:
-        """Add what is expected of a signal to its panel."""
+    def expect(self, panel: Panel, name: str, robot: str | None = None) -> None:
+        """Add what is expected of a signal to its panel; of one robot, if the panel is its own."""
         for one in self.summary["expectations"]:
             window = one.get("window")
             if one.get("signal") != name or not window:
+                continue
+            if robot is not None and robot not in (one.get("robots") or (robot,)):
                 continue
             state, text = state_of(one), marked_claim(one)
             from_s, to_s = window["from_s"], min(window["to_s"], self.end_s)
@@ -103,6 +105,8 @@ class View:
             ]
             worst, value = one["worst"], one["value"]
             in_panel = one.get("settle_within_s") is None
+            if worst and robot is not None and robot not in worst["robots"]:
+                continue
             if in_panel and worst and worst["t_s"] is not None and _finite(value):
                 panel.spots.append(Spot(worst["t_s"], value, state, text))
 

@@ -72,6 +72,10 @@ def test_sections_and_numbers_of_numpy_are_taken_as_what_they_are(small: Scenari
         ({"robot": {"r9": None}}, "robot.r9 = None: r9 names nothing there; known: r1, r2"),
         ({"name.x": 1}, "name.x = 1: x names nothing there"),
         ({"path": CIRCLE | {"r": 1}}, "unknown key"),
+        (
+            {"control": {"name": "fixed_dsc"}},
+            "control.name = 'fixed_dsc': unknown key; did you mean law? (known here: law, eta,",
+        ),
         ({"contrl": {"k1": 3.0}}, 'small.toml: contrl = {"k1": 3.0}: unknown key; did you mean'),
         ({"graph": {"edges": ["r1 -> r7"]}}, "graph.edges = ['r1 -> r7']: r7: no such robot"),
     ],
@@ -82,6 +86,25 @@ def test_what_is_wrong_is_named_with_its_value_and_what_would_be_right(
     with pytest.raises(ScenarioError) as caught:
         small.with_(changes)
     assert line in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sections", "line"),
+    [
+        ({"seed": 3}, {"seed": 4}, "seed: changed twice, to 3 and 4: name it once"),
+        (
+            {"control.k1": 1.0, "control": {"k1": 2.0}},
+            {},
+            "control.k1: changed twice, to 1.0 and 2.0: name it once",
+        ),
+    ],
+)
+def test_a_key_is_changed_once(
+    small: Scenario, changes: dict[str, object], sections: dict[str, object], line: str
+) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        small.with_(changes, **sections)
+    assert str(caught.value) == line
 
 
 def test_all_that_is_wrong_comes_at_once(small: Scenario) -> None:

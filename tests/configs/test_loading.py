@@ -181,9 +181,15 @@ def test_bounds_are_told_to_the_last_digit() -> None:
 
 
 def test_what_is_no_scenario_is_named_for_what_it_is(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="can't be read: Is a directory"):
+    with pytest.raises(ScenarioError, match=r"a folder, not the file of a scenario$"):
         load(tmp_path)
     file = tmp_path / "file.toml"
+    file.touch()
+    with pytest.raises(ScenarioError, match=f"not the file of a scenario; there is {file}$"):
+        load(tmp_path)
+    for no_path in (3, None, b"two_robots"):
+        with pytest.raises(TypeError, match="the path of a scenario file, or a shipped name"):
+            load(no_path)
     file.write_bytes(b"\xff\x00")
     with pytest.raises(ScenarioError, match="no text in UTF-8"):
         load(file)

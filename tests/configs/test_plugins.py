@@ -80,7 +80,7 @@ def test_keys_of_installed_classes_are_refused_as_any_others(installed: Path) ->
         load(str(installed), changes)
     said = str(refused.value)
     assert "control.k_x_1_s=-1.0: must be greater than 0" in said
-    assert "path.c_m=1.0: unknown key; did you mean b_m? (known here: a_m, b_m)" in said
+    assert "path.c_m=1.0: unknown key; did you mean b_m? (known here: kind, a_m, b_m)" in said
     assert "robot.r2.offset.left_m='x': must be a number" in said
 
 

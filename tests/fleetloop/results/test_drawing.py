@@ -5,7 +5,7 @@ import pytest
 
 from configs.graph import Graph, generated
 from configs.loading import load
-from fleetloop.results.drawing import axes_of, legend_above
+from fleetloop.results.drawing import axes_of, legend_above, torque_scale, widen
 from fleetloop.results.figures import is_papers
 from fleetloop.results.graph_drawing import CLEAR, drawn, laid_out
 from fleetloop.results.panel import FLOORS, span
@@ -26,6 +26,23 @@ def test_noise_is_not_drawn_at_full_height() -> None:
     low, high = span([noise], "m")
     assert high - low >= FLOORS["m"]
     assert low < noise.min() < noise.max() < high
+
+
+def test_an_axis_is_widened_about_its_middle_to_the_floor_of_its_unit() -> None:
+    _, axes = axes_of()
+    axes.plot([0.0, 1.0], [1.0, 1.0 + 1e-7])
+    widen(axes, "m")
+    low, high = axes.get_ylim()
+    assert high - low == pytest.approx(FLOORS["m"])
+    assert 0.5 * (low + high) == pytest.approx(1.0)
+
+
+def test_torques_are_logarithmic_only_where_they_get_far() -> None:
+    for peak_N_m, scale in ((5.0, "linear"), (500.0, "symlog")):
+        _, axes = axes_of()
+        axes.plot([0.0, 1.0], [0.0, peak_N_m])
+        torque_scale(axes)
+        assert axes.get_yscale() == scale
 
 
 def test_a_rare_spike_does_not_squeeze_the_rest_and_a_transient_is_all_seen() -> None:

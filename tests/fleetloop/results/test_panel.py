@@ -47,12 +47,19 @@ def test_a_bound_is_on_the_axis_unless_it_is_far_away() -> None:
 @pytest.mark.parametrize("values", [np.empty(0), np.full(5, np.nan), np.full(5, 1e31)])
 def test_nothing_that_can_be_drawn_gives_an_axis_all_the_same(values: np.ndarray) -> None:
     assert span([values], "m") == (-0.5 * FLOORS["m"], 0.5 * FLOORS["m"])
-    assert logarithmic_span([values]) == (1e-3, 1.0)
+    assert logarithmic_span([values], "m") == (1e-3, 1.0)
 
 
 def test_a_logarithmic_axis_has_whole_decades_and_no_value_below_zero() -> None:
-    assert logarithmic_span([np.array([0.02, 3.0, -1e6, 0.0, np.nan])]) == (0.01, 10.0)
-    assert logarithmic_span([np.full(5, 1.0)]) == (1.0, 10.0)
+    assert logarithmic_span([np.array([0.02, 3.0, -1e6, 0.0, np.nan])], "m") == (0.01, 10.0)
+    assert logarithmic_span([np.full(5, 1.0)], "m") == (1.0, 10.0)
+
+
+def test_a_logarithmic_axis_reaches_the_least_span_of_its_unit() -> None:
+    noise = np.geomspace(2e-8, 9e-8, 100)
+    low, high = logarithmic_span([noise], "m")
+    assert low == pytest.approx(1e-8)
+    assert FLOORS["m"] <= high == pytest.approx(1e-2)
 
 
 def test_a_band_has_the_extremes_of_all_series_in_each_stretch() -> None:

@@ -18,7 +18,9 @@ from fleetloop.results.figures import law_signals
 from fleetloop.results.known import Known
 from fleetloop.results.publication import png
 from fleetloop.results.report import page_of
+from fleetloop.results.sections import sections
 from fleetloop.results.summary import RunStats, summarise
+from fleetloop.results.view import View
 
 HOSTILE = r"""</script><img src=x onerror=alert(1)>'"`${1}<!-- &lt; \u003c \b"""
 PUSH = {"kind": "push", "name": "shove", "at_s": 1.0, "for_s": 0.5}
@@ -93,6 +95,23 @@ def test_words_of_users_reach_the_plots_as_data(page: str) -> None:
     (said,) = re.findall(r"const docs_json = '(.*)';", page)
     found = list(texts(json.loads(unescape(said.replace(r"\\", "\\")))))  # as Bokeh undoes it
     assert any(f"[{HOSTILE}]" in one for one in found)
+
+
+def test_a_panel_of_one_robot_has_what_is_expected_of_it_and_where_it_was_worst(
+    finished_run: Path,
+) -> None:
+    both = {"signal": "tau_right_wheel_N_m", "max_abs": 1e-3}
+    expect = [both, both | {"robots": ["r2"], "max_abs": 2e-3}]
+    scenario = load("two_robots").with_(expect=expect)
+    record = Record.open(finished_run / "record.mcap")
+    summary = summarise(record, scenario, RunStats("lockstep"))
+    (torques,) = (one for one in sections(View(record, scenario, summary)) if one.key == "torques")
+    worst = [one["worst"]["robots"] for one in summary["expectations"]]
+    for robot, panel in zip(("r1", "r2"), torques.panels, strict=True):
+        levels = {bound.level for bound in panel.bounds}
+        assert levels >= {1e-3, -1e-3}
+        assert (2e-3 in levels) == (robot == "r2")
+        assert len(panel.spots) == worst.count([robot])
 
 
 def test_a_unit_is_no_formula(finished_run: Path) -> None:
