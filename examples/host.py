@@ -17,6 +17,7 @@ Exit status: 0 all well, 1 a drive failed, 128 + its number after a signal.
 """
 
 import argparse
+import math
 import signal
 import struct
 import sys
@@ -161,6 +162,8 @@ def main() -> int:
     parser.add_argument("--torque", type=float, default=0.3, help="peak, at the shafts [N·m]")
     parser.add_argument("--seconds", type=float, default=1.0, help="at the peak")
     options = parser.parse_args()
+    if not math.isfinite(options.torque) or not 0.0 <= options.seconds < math.inf:
+        parser.error("--torque and --seconds are finite numbers, --seconds 0 or more")
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     settings = {} if options.bitrate is None else {"bitrate": options.bitrate}
     with can.Bus(interface=options.interface, channel=options.channel, **settings) as bus:
@@ -176,7 +179,7 @@ def main() -> int:
 if __name__ == "__main__":
     try:
         sys.exit(main())
-    except DriveError as error:
+    except (DriveError, can.CanError) as error:  # no such bus, as well
         sys.exit(f"host.py: {error}")
     except KeyboardInterrupt:
         sys.exit(128 + signal.SIGINT)

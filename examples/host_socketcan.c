@@ -16,6 +16,7 @@
 #include <errno.h>
 #include <linux/can.h>
 #include <linux/can/raw.h>
+#include <math.h>
 #include <net/if.h>
 #include <poll.h>
 #include <signal.h>
@@ -284,10 +285,17 @@ int main(int count, char **arguments)
 {
     struct host host = {.axes = {{.node = 0}, {.node = 1}}};
     struct sigaction action = {.sa_handler = on_signal};
+    double torque_N_m;
+    char *end;
     bool well;
 
     if (count != 3) {
         fprintf(stderr, "usage: host_socketcan INTERFACE TORQUE_N_M\n");
+        return 2;
+    }
+    torque_N_m = strtod(arguments[2], &end);
+    if (end == arguments[2] || *end || !isfinite(torque_N_m)) {
+        fprintf(stderr, "%s: not a torque in N m\n", arguments[2]);
         return 2;
     }
     host.socket = open_bus(arguments[1]);
@@ -297,7 +305,7 @@ int main(int count, char **arguments)
     }
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
-    well = arm(&host) && drive(&host, atof(arguments[2]));
+    well = arm(&host) && drive(&host, torque_N_m);
     well = stop(&host) && well;
     close(host.socket);
     return interrupted ? 128 + interrupted : well ? 0 : 1;

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-pytest_plugins = ("support.wall_clock", "support.workers")
+pytest_plugins = ("support.browser", "support.wall_clock", "support.workers")
 
 # In the background of a script, or under nohup, these are ignored, and all children inherit that.
 # A handler, even one that does nothing, is theirs no longer: they begin with the default.

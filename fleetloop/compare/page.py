@@ -64,4 +64,7 @@ def _claims(found: Sequence[Claim]) -> str:
         for one in found
     )
     head = "".join(f"<th>{text}</th>" for text in ("claim", "where", "measured", "verdict"))
-    return f'<table class="text"><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>'
+    return (
+        f'<div class="wide"><table class="text"><thead><tr>{head}</tr></thead>'
+        f"<tbody>{lines}</tbody></table></div>"
+    )

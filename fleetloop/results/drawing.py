@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import SymmetricalLogLocator
 
 from fleetloop.record.reader import Record
 from fleetloop.results.decimation import decimated
@@ -24,7 +25,8 @@ _DASHES: tuple[object, ...] = ("-", (0, (6, 2)), (0, (2, 1.2)), (0, (7, 2, 1.5, 
 _POINTS = 1200
 _CLOSER = 2.0
 """A second panel spans less than the first by this at least."""
-_LOGARITHMIC_FROM = 20.0
+_LOGARITHMIC_FROM, _FEW_DECADES = 4.0, 30.0
+"""Of torques [N·m]."""
 STYLE: Any = {
     "font.size": 8,
     "axes.grid": True,
@@ -106,8 +108,14 @@ def widen(axes: Axes, unit: str) -> None:
 
 def torque_scale(axes: Axes) -> None:
     """Linear, or beyond 1 N·m logarithmic if the values get far beyond."""
-    if max(map(abs, axes.get_ylim())) > _LOGARITHMIC_FROM:
-        axes.set_yscale("symlog", linthresh=1.0, linscale=2.0)
+    peak_N_m = max(map(abs, axes.get_ylim()))
+    if peak_N_m > _LOGARITHMIC_FROM:
+        axes.set_yscale("symlog", linthresh=1.0, linscale=2.0, subs=[2, 5])
+        ticks = SymmetricalLogLocator(
+            base=10.0, linthresh=1.0, subs=[1.0, 2.0, 5.0] if peak_N_m < _FEW_DECADES else [1.0]
+        )
+        axes.yaxis.set_major_locator(ticks)
+        axes.yaxis.set_major_formatter("{x:g}")
 
 
 def style_of(n: int) -> tuple[str, object]:

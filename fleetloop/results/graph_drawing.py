@@ -7,7 +7,7 @@ layout: a node has the radius `NODE`, and neighbours in a layer are 1 apart.
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from math import cos, hypot, pi, sin
+from math import copysign, cos, hypot, pi, sin
 from typing import NamedTuple
 
 import networkx as nx
@@ -27,6 +27,9 @@ _UNIT_IN, _LEAST_UNIT_IN, _MOST_IN = 0.8, 0.5, 40.0
 _POINTS_PER_IN = 72.0
 _LABELLED = 120
 """With more edges their weights find no room."""
+_LABEL_PT = 7.0
+_PARTS = (0.4, 0.5, 0.6, 0.3, 0.7)
+"""Of an edge, where its label may be; not the middle first, where crossing ones meet."""
 _SEARCHED = 1500
 """With more edges they stay straight: no drawing of them is read."""
 _OPPOSITE = 0.18
@@ -36,7 +39,8 @@ _STEPS = np.linspace(0.0, 1.0, 41)
 _SOMETIMES = "0.55"
 """Colour of an edge that comes and goes: a grey."""
 
-Places = dict[str, tuple[float, float]]
+Place = tuple[float, float]
+Places = dict[str, Place]
 
 
 class EdgeStyle(NamedTuple):
@@ -83,13 +87,18 @@ def drawn(graph: Graph, title: str, styles: Mapping[Edge, EdgeStyle] = _NO_STYLE
     axes.set_xlim(min(across) - 0.5, max(across) + 0.5)
     axes.set_ylim(min(up) - 0.5, max(up) + 0.5)
     _nodes(axes, digraph, places, unit_in)
-    for edge in digraph.edges:
+    placed: list[Place] = []
+    # Opposite ones first: their labels have less choice.
+    for edge in sorted(digraph.edges, key=lambda edge: edge[::-1] not in digraph.edges):
         weight = digraph.edges[edge]["weight"]
         colour = _SOMETIMES if edge in sometimes else "black"
         plain = EdgeStyle(colour, "" if weight == 1.0 else f"{weight:.3g}")
         colour, label = styles.get(edge, plain)
-        style = EdgeStyle(colour, label if digraph.size() <= _LABELLED else "")
-        _arrow(axes, edge, places, bows[edge].bend, style, unit_in)
+        bend = bows[edge].bend
+        _arrow(axes, edge, places, bend, colour, unit_in)
+        if label and digraph.size() <= _LABELLED:
+            beside = edge[::-1] in digraph.edges
+            _label(axes, edge, places, bend, label, unit_in, placed, beside=beside)
     return figure
 
 
@@ -204,7 +213,7 @@ def _distances(ends: np.ndarray, bend: float, points: np.ndarray) -> np.ndarray:
 
 
 def _arrow(
-    axes: Axes, edge: Edge, places: Places, bend: float, style: EdgeStyle, unit_in: float
+    axes: Axes, edge: Edge, places: Places, bend: float, colour: str, unit_in: float
 ) -> None:
     """One edge."""
     speaker, hearer = edge
@@ -220,19 +229,52 @@ def _arrow(
         arrowprops={
             "arrowstyle": "-|>,head_width=0.18,head_length=0.36",
             "linestyle": "dashed" if speaker == LEADER else "solid",
-            "color": style.colour,
+            "color": colour,
             "linewidth": 0.9,
             "shrinkA": rim(speaker),
             "shrinkB": rim(hearer),
             "connectionstyle": f"arc3,rad={bend}",
         },
     )
-    if style.label:
-        (x0, y0), (x1, y1) = places[speaker], places[hearer]
-        # A third of the way, on the bow: where opposite arrows or crossing ones are apart.
-        part = 0.4
+
+
+def _label(
+    axes: Axes,
+    edge: Edge,
+    places: Places,
+    bend: float,
+    text: str,
+    unit_in: float,
+    placed: list[Place],
+    *,
+    beside: bool,
+) -> None:
+    """The label of an edge, where it covers no other: on the bow, of opposite ones outside it."""
+    (x0, y0), (x1, y1) = places[edge[0]], places[edge[1]]
+    along_x, along_y = x1 - x0, y1 - y0
+    length = hypot(along_x, along_y)
+    if not length:
+        return
+    to_points = unit_in * _POINTS_PER_IN
+    half = (
+        (0.26 * _LABEL_PT * len(text) + 1.0) / to_points,
+        (0.5 * _LABEL_PT + 1.0) / to_points,
+    )
+    out_x, out_y = along_y / length, -along_x / length
+    away = copysign(hypot(out_x * half[0], out_y * half[1]), bend) if beside else 0.0
+
+    def at(part: float) -> Place:
         bow = 2.0 * part * (1.0 - part) * bend
-        x, y = x0 + part * (x1 - x0) + bow * (y1 - y0), y0 + part * (y1 - y0) - bow * (x1 - x0)
-        box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
-        if hypot(x1 - x0, y1 - y0) > 0.0:
-            axes.text(x, y, style.label, fontsize=7, ha="center", va="center", bbox=box)
+        return (
+            x0 + part * along_x + bow * along_y + away * out_x,
+            y0 + part * along_y - bow * along_x + away * out_y,
+        )
+
+    def is_free(x: float, y: float) -> bool:
+        return all(abs(x - u) > 2.0 * half[0] or abs(y - v) > 2.0 * half[1] for u, v in placed)
+
+    candidates = [at(part) for part in _PARTS]
+    x, y = next((one for one in candidates if is_free(*one)), candidates[0])
+    placed.append((x, y))
+    box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
+    axes.text(x, y, text, fontsize=_LABEL_PT, ha="center", va="center", bbox=box)

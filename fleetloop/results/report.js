@@ -138,7 +138,7 @@
   /* --- the beginning ----------------------------------------------------------------------- */
 
   function repaint() {
-    for (const view of Bokeh.index.query(() => true)) if (view.model?.type === "Figure") { view.invalidate_painters?.(true); view.request_repaint?.() ?? view.request_paint?.(); }
+    for (const view of Bokeh.index.query(() => true)) if (view.model?.type === "Figure") { view.invalidate_painters?.(); view.request_repaint?.(); }
   }
 
   function begin() {

@@ -131,6 +131,32 @@ def test_no_drives_is_said() -> None:
     )
 
 
+@pytest.mark.parametrize("options", [("--torque", "nan"), ("--torque", "inf"), ("--seconds", "-5")])
+def test_what_is_no_torque_and_no_time_is_refused_before_the_bus_is_opened(
+    options: tuple[str, str],
+) -> None:
+    done = run_alone(*options)
+    assert done.returncode == 2
+    assert done.stderr.endswith("--torque and --seconds are finite numbers, --seconds 0 or more\n")
+
+
+def test_a_bus_that_is_not_there_is_named_in_one_line() -> None:
+    done = run_alone("--channel", "r9")
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("host.py: ") and "r9" in line
+
+
+def run_alone(*options: str) -> "subprocess.CompletedProcess[str]":
+    """The host without any plant."""
+    return subprocess.run(
+        [sys.executable, str(HERE / "host.py"), *options],
+        capture_output=True,
+        text=True,
+        timeout=END_S,
+    )
+
+
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 def test_the_host_in_c_compiles_without_a_warning_and_says_what_it_needs(tmp_path: Path) -> None:
     program = tmp_path / "host_socketcan"

@@ -5,7 +5,6 @@ The browser is Debian's Chromium, without a screen.
 
 import os
 import re
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,11 +17,6 @@ from fleetloop.door.client import open_run
 
 pytestmark = pytest.mark.system
 
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-if CHROMIUM is None:
-    pytest.skip("no chromium on this machine (apt install chromium)", allow_module_level=True)
-
 SCENARIO = (
     "two_robots",
     *("--speed", "1", "--duration", "100", "--allow-unchecked"),
@@ -31,14 +25,6 @@ SCENARIO = (
 WAIT_MS, LOOK_MS = 20_000, 40
 SHOTS = os.environ.get("FLEETLOOP_SHOTS")
 """A folder: screenshots of the page go there, to be looked at."""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as driver:
-        arguments = ["--no-sandbox", "--disable-gpu"]
-        with driver.chromium.launch(executable_path=CHROMIUM, args=arguments) as made:
-            yield made
 
 
 class Page:

@@ -38,7 +38,7 @@ def test_an_axis_is_widened_about_its_middle_to_the_floor_of_its_unit() -> None:
 
 
 def test_torques_are_logarithmic_only_where_they_get_far() -> None:
-    for peak_N_m, scale in ((5.0, "linear"), (500.0, "symlog")):
+    for peak_N_m, scale in ((3.0, "linear"), (500.0, "symlog")):
         _, axes = axes_of()
         axes.plot([0.0, 1.0], [0.0, peak_N_m])
         torque_scale(axes)
