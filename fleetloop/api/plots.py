@@ -14,6 +14,7 @@ from fleetloop.record.reader import Record
 from fleetloop.results import figures
 from fleetloop.results.drawing import STYLE
 from fleetloop.results.publication import png
+from fleetloop.results.summary import Summary
 
 _FIGURES: Mapping[str, figures.Draw] = {
     "graph": figures.graph,
@@ -39,9 +40,9 @@ def draw(name: str, record: Record, scenario: Scenario) -> Figure:
         return _shows_itself(_FIGURES[name](record, scenario))
 
 
-def all_of(record: Record, scenario: Scenario) -> Mapping[str, Figure]:
+def all_of(record: Record, scenario: Scenario, summary: Summary) -> Mapping[str, Figure]:
     """Every figure of the report, by name."""
-    made = figures.all_figures(record, scenario)
+    made = figures.all_figures(record, scenario, summary)
     return {one.name: _shows_itself(one.figure) for one in made}
 
 

@@ -249,7 +249,7 @@ class Run:
         """Every figure of the report, by name."""
         from fleetloop.api import plots
 
-        return plots.all_of(self._record, self._scenario)
+        return plots.all_of(self._record, self._scenario, self._summary)
 
     def plot_graph(self) -> "Figure":
         """The directed graph."""

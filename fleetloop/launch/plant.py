@@ -301,4 +301,4 @@ def _poses(robots: Sequence[EmulatedRobot], loop: RealtimeLoop) -> dict[str, Any
             "torque_right_wheel_N_m": row["motor_right_wheel_N_m"],
             "torque_left_wheel_N_m": row["motor_left_wheel_N_m"],
         }
-    return {"t_s": loop.progress().t_ns * 1e-9, "robots": poses}
+    return {"t_s": round(loop.progress().t_ns * 1e-9, 9), "robots": poses}

@@ -37,11 +37,13 @@ from fleetloop.results.drawing import (
     torque_scale,
     widen,
 )
+from fleetloop.results.figure_marks import mark
 from fleetloop.results.graph_drawing import drawn
 from fleetloop.results.network import ages_of
 from fleetloop.results.network_figures import ages, edge_states
 from fleetloop.results.panel import FLOORS, span
-from fleetloop.results.summary import leader_profile
+from fleetloop.results.summary import Summary, leader_profile
+from fleetloop.results.view import View
 
 _COLUMNS, _PANEL_IN, _TITLE_IN, _POINTS = 4, 1.05, 0.3, 300
 """Of the figure of the laws' signals."""
@@ -59,11 +61,16 @@ class Captioned:
     figure: Figure
 
 
-def all_figures(record: Record, scenario: Scenario) -> list[Captioned]:
+def all_figures(
+    record: Record, scenario: Scenario, summary: Summary | None = None
+) -> list[Captioned]:
     """Every figure of a run; the record holds at least one tick of a controller.
 
-    Each robot is drawn up to its own end; an edge's difference while both its ends are there.
+    Each robot is drawn up to its own end; an edge's difference while both its ends are there. With
+    the run's summary, faults and events are marked on axes of time, and what was expected of errors
+    is drawn.
     """
+    view = None if summary is None else View(record, scenario, summary)
     with mpl.rc_context(STYLE), np.errstate(all="ignore"):
         chosen = list(_FIGURES)
         if any(map(law_table, record.signals.values())):
@@ -73,10 +80,13 @@ def all_figures(record: Record, scenario: Scenario) -> list[Captioned]:
         if scenario.clock.mode == "realtime":
             chosen.append(_CLOCK)
         papers = is_papers(scenario)
-        return [
-            Captioned(one.name, one.caption_of(scenario, papers=papers), one.draw(record, scenario))
-            for one in chosen
-        ]
+        made = []
+        for one in chosen:
+            figure, caption = one.draw(record, scenario), one.caption_of(scenario, papers=papers)
+            if view is not None and one.over_time and (words := mark(figure, view, one.signal)):
+                caption = f"{caption} {words}"
+            made.append(Captioned(one.name, caption, figure))
+        return made
 
 
 def is_papers(scenario: Scenario) -> bool:
@@ -269,6 +279,9 @@ class Drawing(NamedTuple):
     draw: Draw
     number: int | None = None
     """Of the paper's figure."""
+    over_time: bool = True
+    signal: str = ""
+    """What is expected of it is drawn."""
 
     def caption_of(self, scenario: Scenario, *, papers: bool) -> str:
         """The caption, which names the scenario, and the paper's figure if it is its experiment."""
@@ -277,13 +290,19 @@ class Drawing(NamedTuple):
 
 
 _FIGURES: Sequence[Drawing] = (
-    Drawing("graph", "The directed graph: arrows from sender to receiver", graph, 3),
     Drawing(
-        "positions", "Robot positions and orientations; dots: start; grey: reference", positions, 4
+        "graph", "The directed graph: arrows from sender to receiver", graph, 3, over_time=False
     ),
-    Drawing("x_e", "Path following errors x_e", ERRORS["x_e_m"], 5),
-    Drawing("y_e", "Path following errors y_e", ERRORS["y_e_m"], 6),
-    Drawing("theta_e", "Path following errors θ_e", ERRORS["theta_e_rad"], 7),
+    Drawing(
+        "positions",
+        "Robot positions and orientations; dots: start; grey: reference",
+        positions,
+        4,
+        over_time=False,
+    ),
+    Drawing("x_e", "Path following errors x_e", ERRORS["x_e_m"], 5, signal="x_e_m"),
+    Drawing("y_e", "Path following errors y_e", ERRORS["y_e_m"], 6, signal="y_e_m"),
+    Drawing("theta_e", "Path following errors θ_e", ERRORS["theta_e_rad"], 7, signal="theta_e_rad"),
     Drawing(
         "parameter_errors", "Path parameter errors s_i − s_j over the edges", parameter_errors, 8
     ),
@@ -294,8 +313,11 @@ _FIGURES: Sequence[Drawing] = (
 _LAW = Drawing("law_signals", "What the robots' laws record of themselves", law_signals)
 _NETWORK = (
     Drawing("ages", "Age of the data that each edge gave, below the errors over the edges", ages),
-    Drawing("edge_states", "Mean age of what came over each edge", edge_states),
+    Drawing("edge_states", "Mean age of what came over each edge", edge_states, over_time=False),
 )
 _CLOCK = Drawing(
-    "clock", "How the wall clock was kept: all ticks of all controllers", clock_figures
+    "clock",
+    "How the wall clock was kept: all ticks of all controllers",
+    clock_figures,
+    over_time=False,
 )

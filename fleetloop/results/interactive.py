@@ -99,8 +99,9 @@ def _bar(view: View) -> str:
     return (
         f'<div class="bar"><div class="chips">{"".join(chips)}'
         f'<span class="windows">{windows}</span></div></div>'
-        '<p class="note">Drag over a plot: that time, in all of them. A tap: that instant in the'
-        " plane. A robot's button hides it, with shift all others.</p>"
+        '<p class="note"><span class="with-mouse">Drag over a plot: that time, in all of them.'
+        "</span> A tap: that instant in the plane. A robot's button hides it, with shift all"
+        " others.</p>"
     )
 
 

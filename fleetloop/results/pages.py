@@ -68,11 +68,12 @@ def table_tag(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
-def figure_tag(caption: str, png: bytes) -> str:
-    """A picture with its caption."""
+def figure_tag(caption: str, png: bytes, *, across: bool = False) -> str:
+    """A picture with its caption; on paper one `across` is as wide as the page."""
     text = escape(caption)
     source = f"data:image/png;base64,{base64.b64encode(png).decode()}"
-    return f'<figure><img alt="{text}" src="{source}"><figcaption>{text}</figcaption></figure>'
+    css = ' class="across"' if across else ""
+    return f'<figure{css}><img alt="{text}" src="{source}"><figcaption>{text}</figcaption></figure>'
 
 
 def list_tag(lines: Iterable[str], css: str = "") -> str:

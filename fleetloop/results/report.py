@@ -9,6 +9,7 @@ from pathlib import Path
 
 from fleetloop.record.reader import Record
 from fleetloop.results import run_folder
+from fleetloop.results.drawing import WIDTH_IN
 from fleetloop.results.figures import all_figures
 from fleetloop.results.interactive import plots_of
 from fleetloop.results.known import Known, known_of
@@ -56,7 +57,7 @@ def write_report(run: Path, record: Record | None = None) -> Path:
         record = Record.open(run_folder.record_of(run))
     known = known_of(record)
     folder = record.path.parent
-    figures = write_figures(folder, all_figures(record, known.scenario))
+    figures = write_figures(folder, all_figures(*known))
     target = folder / PAGE
     run_folder.write(target, page_of(known, figures))
     return target
@@ -66,7 +67,10 @@ def page_of(known: Known, figures: Sequence[Drawn]) -> str:
     """The page of a run."""
     scenario = known.scenario
     plots = plots_of(View(*known, traffic_of(known.record.path.parent, scenario)))
-    static = "\n".join(figure_tag(item.caption, data) for item, data in figures)
+    static = "\n".join(
+        figure_tag(item.caption, data, across=item.figure.get_figwidth() > WIDTH_IN)
+        for item, data in figures
+    )
     above, below = words_of_run(known)
     body = "\n".join(
         (
@@ -173,8 +177,9 @@ def _facts(summary: Summary) -> Iterable[tuple[str, str]]:
         yield "network", text
     for text in realtime_lines(summary):
         yield "clock", text
-    cpu = (f"{process} {seconds:g} s" for process, seconds in summary["cpu_s"].items())
-    yield "processor time", ", ".join(cpu)
+    if summary["cpu_s"]:
+        cpu = (f"{process} {seconds:g} s" for process, seconds in summary["cpu_s"].items())
+        yield "processor time", ", ".join(cpu)
     yield "seed", f"{summary['seed']}"
     versions = (f"{name} {number}" for name, number in summary["versions"].items())
     yield "versions", ", ".join(versions)
