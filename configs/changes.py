@@ -14,11 +14,11 @@ from pathlib import PurePath
 from typing import Any
 
 from pydantic import BaseModel
-from pydantic_core import to_jsonable_python
 
 from configs.errors import ScenarioError
 from configs.overrides import Override, find
 from configs.parameters import Parameters
+from configs.tables import adapter_of
 
 KIND = "kind"
 
@@ -31,6 +31,8 @@ def overrides_of(changes: Iterable[tuple[str, object]], data: Mapping[str, Any])
     """
     made: dict[str, Override] = {}
     for key, value in changes:
+        if not isinstance(key, str):
+            raise TypeError(f"with_({{{key!r}: ...}}): a key is a text, as 'control.k1'")
         for one in _flat(key, value, _inside(data, key.split("."))):
             if one.key in made:
                 both = f"{made[one.key].value!r} and {one.value!r}"
@@ -68,8 +70,11 @@ def _inside(holder: object, path: list[str]) -> object:
 
 def plain(value: object) -> Any:
     """A value as parsed TOML has it: a section's object as a table, numpy's numbers as Python's."""
-    if isinstance(value, Parameters | BaseModel):
-        return to_jsonable_python(value, by_alias=True, exclude_none=True)
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json", by_alias=True, exclude_none=True)
+    if isinstance(value, Parameters):
+        adapter = adapter_of(type(value))
+        return adapter.dump_python(value, mode="json", by_alias=True, exclude_none=True)
     if isinstance(value, Mapping):
         return {str(key): plain(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):

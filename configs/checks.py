@@ -13,9 +13,13 @@ from configs.errors import Problem
 from configs.expect_checks import expect_problems
 from configs.faults.plan import fault_problems
 from configs.graph_checks import edge_problems, graph_problems
+from configs.netem import LOCALISATION
 from configs.paths import Spline, Varying
 from configs.scenario import ETSRO, Scenario
 from configs.wording import MISSING, remedy_of
+
+_OTHERS = {LEADER: "the virtual leader", LOCALISATION: "the localisation system"}
+"""Ends of edges that are no robots."""
 
 
 def cross_problems(scenario: Scenario) -> list[Problem]:
@@ -44,8 +48,8 @@ def _names(scenario: Scenario) -> Iterator[Problem]:
         if robot.name in seen:
             yield Problem("robot.name", robot.name, "two robots have this name; make it unique")
         seen.add(robot.name)
-        if robot.name == LEADER:
-            remedy = "edges have the virtual leader by this name; give the robot another"
+        if robot.name in _OTHERS:
+            remedy = f"edges have {_OTHERS[robot.name]} by this name; give the robot another"
             yield Problem("robot.name", robot.name, remedy)
         known = {ETSRO, *scenario.robot_types}
         if robot.type not in known:

@@ -79,10 +79,7 @@ def named(text: str, edge: EmulatedEdge) -> bool:
 
 
 def emulation_problems(network: Network, graph: Graph) -> Iterator[Problem]:
-    """Entries of [[network.edge]] that name no edge of the graph, and names with two meanings."""
-    if LOCALISATION in graph.robots and (network.edge or network.default != Effects()):
-        remedy = "[network] has the localisation system by this name; rename the robot"
-        yield Problem("robot.name", LOCALISATION, remedy)
+    """Entries of [[network.edge]] that name no edge of the graph."""
     edges = edges_of(graph)
     for n, entry in enumerate(network.edge):
         for text in entry.edges:

@@ -125,10 +125,23 @@ class RunClient:
             RefusedError: another client has them.
             InfrastructureError: no answer.
         """
-        self.ask("controls.take", who=who, force=force)
+        self.take_controls(who, force=force)
         yield
         with contextlib.suppress(RunEndedError):  # it has none any more
             self.ask("controls.release")
+
+    def take_controls(self, who: str, *, force: bool = False) -> None:
+        """Take the controls of the run; `controlled` gives them back.
+
+        Raises:
+            RefusedError: another client has them; the text says what to do in a command's words.
+            InfrastructureError: no answer.
+        """
+        try:
+            self.ask("controls.take", who=who, force=force)
+        except RefusedError as error:
+            _, _, why = str(error).rpartition("controls.take: ")
+            raise RefusedError(f"{why}; --force borrows them") from error
 
     def close(self) -> None:
         """End the connection."""

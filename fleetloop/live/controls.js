@@ -103,7 +103,7 @@ function faultOfForm() {
 
 const act = {
   pause: () => order(paused() ? "run.resume" : "run.pause"),
-  step: () => { if (paused()) order("run.step", {ticks: Math.max(1, Math.round(Number(at("ticks").value)) || 1)}); },
+  step: () => { if (paused() && at("ticks").reportValidity()) order("run.step", {ticks: Number(at("ticks").value)}); },
   faster: () => nextSpeed(1),
   slower: () => nextSpeed(-1),
   clear: () => { if (!at("clear").hidden) order("fault.clear", {names: []}); },

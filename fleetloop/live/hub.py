@@ -21,6 +21,8 @@ from fleetloop.live.page import FRAME_MS, Page
 from fleetloop.live.state import LiveState
 
 MOST_VIEWERS = 8
+MOST_PAGES = 40
+"""That are loaded, with those whose browser isn't there yet, or no longer."""
 MOST_ORDERS = 4
 """Of one viewer that are on their way."""
 _JUDGE_EVERY_S = 1.0
@@ -105,10 +107,14 @@ class Hub:
                 self.controls.release(viewer.name)
             viewer.there = there
 
+    def count_there(self) -> int:
+        """How many browsers are there."""
+        return sum(viewer.there for viewer in self.viewers.values())
+
     @property
     def watched(self) -> bool:
         """Whether a browser is there."""
-        return any(viewer.there for viewer in self.viewers.values())
+        return self.count_there() > 0
 
     def _push(self, viewer: Viewer) -> None:
         if not viewer.there:

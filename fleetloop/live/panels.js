@@ -27,7 +27,7 @@ const brief = (value) => (!finite(value) ? "–" : value !== 0 && Math.abs(value
 const chip = (r) => { const made = el("span", {class: "chip", "aria-hidden": "true"}); made.style.background = facts.styles[r].colour; return made; };
 
 function showClock(t_s) {
-  at("time").textContent = `${t_s.toFixed(2)} s`;
+  at("time").textContent = `${t_s.toFixed(facts.period_s < 0.01 ? 3 : 2)} s`;
   at("progress").value = Math.min(1, t_s / facts.ends_at_s);
 }
 

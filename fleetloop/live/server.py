@@ -33,7 +33,7 @@ from tornado.web import Application as TornadoApplication
 from tornado.web import OutputTransform, RequestHandler
 
 from configs.errors import InfrastructureError
-from fleetloop.live.hub import MOST_VIEWERS, Hub
+from fleetloop.live.hub import MOST_PAGES, MOST_VIEWERS, Hub
 
 ADDRESS = "127.0.0.1"
 _MOST_MESSAGE_BYTES = 1 << 16
@@ -134,7 +134,7 @@ class _Gate(Router):
         path = request.path
         if path not in (_PAGE, _SOCKET) and not path.startswith(_FILES):
             return 404, "there is nothing here"
-        if request.method not in ("GET", "HEAD"):
+        if request.method != "GET":
             return 405, "there is nothing to change here"
         if path.startswith(_FILES):
             return None
@@ -145,8 +145,10 @@ class _Gate(Router):
             return 400, f"the address has more than its token: {min(unknown)[:40]!r}"
         if path == _SOCKET and not self._has_session(request.headers):
             return 403, "a websocket needs the session of a page"
-        if path == _PAGE and len(self._hub.viewers) >= MOST_VIEWERS:
-            return 503, f"{MOST_VIEWERS} viewers are there already"
+        if path == _PAGE and self._hub.count_there() >= MOST_VIEWERS:
+            return 503, f"{MOST_VIEWERS} viewers are there already: close one, and load this again"
+        if path == _PAGE and len(self._hub.viewers) >= MOST_PAGES:
+            return 503, f"loaded too often: load this again in {_UNUSED_MS // 1000} s"
         return None
 
     def _has_session(self, headers: HTTPHeaders) -> bool:

@@ -54,6 +54,7 @@ SIGNALS = (
 
 def overlay_figures(runs: Mapping[str, Known]) -> list[Captioned]:
     """The figures of runs by their labels."""
+    runs = {_plain(label): run for label, run in runs.items()}
     records = {label: run.record for label, run in runs.items()}
     with mpl.rc_context(STYLE), np.errstate(all="ignore"):
         return [
@@ -61,6 +62,12 @@ def overlay_figures(runs: Mapping[str, Known]) -> list[Captioned]:
             Captioned("spread", "Spread of the path variables, max s − min s.", _spreads(runs)),
             *(Captioned(one.name, one.caption, _signal(one, records)) for one in SIGNALS),
         ]
+
+
+def _plain(label: str) -> str:
+    """A name of a user's as a label that is drawn as it stands: no formula, and never left out."""
+    text = label.replace("$", r"\$")
+    return f" {text}" if text.startswith("_") else text
 
 
 def robots_of(records: Mapping[str, Record]) -> tuple[str, ...]:

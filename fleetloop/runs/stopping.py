@@ -88,7 +88,7 @@ def _watched(pid: int, run: str) -> Iterator[int]:
 
 def _ask(client: RunClient, *, force: bool) -> None:
     with contextlib.suppress(RunEndedError):  # just now
-        client.ask("controls.take", who="fleetloop stop", force=force)
+        client.take_controls("fleetloop stop", force=force)
         client.ask("run.stop")
 
 

@@ -107,6 +107,30 @@ def test_a_key_is_changed_once(
     assert str(caught.value) == line
 
 
+@pytest.mark.parametrize(
+    "name", ["paper", "realistic", "switching", "moving_leader", "lossy_chain"]
+)
+def test_sections_may_be_given_back_as_they_are(name: str) -> None:
+    scenario = load(name)
+    for key, field in type(scenario).model_fields.items():
+        again = scenario.with_({field.alias or key: getattr(scenario, key)})
+        assert again == scenario, key
+
+
+def test_a_robot_is_added_to_those_that_are_there(small: Scenario) -> None:
+    first = small.robot[0]
+    third = {"name": "r3", "pose": first.pose, "offset": first.offset}
+    grown = small.with_({"graph.edges": ["r1 -> r2", "r2 -> r3"]}, robot=[*small.robot, third])
+    assert grown.names == ("r1", "r2", "r3")
+    assert grown.robot[:2] == small.robot
+    assert grown.robot[2].pose == first.pose
+
+
+def test_a_key_is_a_text(small: Scenario) -> None:
+    with pytest.raises(TypeError, match=r"a key is a text, as 'control\.k1'"):
+        small.with_({3: 4})
+
+
 def test_all_that_is_wrong_comes_at_once(small: Scenario) -> None:
     with pytest.raises(ScenarioError) as caught:
         small.with_(seed=-1, control={"k1": "x", "k2": -1.0})

@@ -157,12 +157,12 @@ def test_the_schema_knows_arrays_and_files_of_a_trace() -> None:
     assert {choice["type"] for choice in delays["anyOf"]} == {"array", "string"}
 
 
-def test_no_robot_has_the_localisation_systems_name_where_there_are_effects() -> None:
+def test_no_robot_has_the_name_of_the_localisation_system() -> None:
     text = (Path(__file__).parents[2] / "configs" / "two_robots.toml").read_text("utf-8")
-    text = text.replace("r1", "localisation")
-    assert loads("here", text).names[0] == "localisation"
-    with pytest.raises(ScenarioError, match="rename the robot"):
-        loads("here", f"{text}\n[network.default]\n{HALF}\n")
+    with pytest.raises(ScenarioError) as refused:
+        loads("here", text.replace("r1", "localisation"))
+    said = "robot.name = 'localisation': edges have the localisation system by this name; give the"
+    assert said in str(refused.value)
 
 
 @pytest.mark.parametrize(

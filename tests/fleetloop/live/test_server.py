@@ -15,7 +15,7 @@ from configs.errors import ScenarioError
 from configs.events import Event
 from configs.loading import load
 from configs.scenario import Scenario
-from fleetloop.live.hub import Hub
+from fleetloop.live.hub import MOST_VIEWERS, Hub
 from fleetloop.live.page import MOST_UNDRAWN
 from fleetloop.live.server import LiveServer
 from fleetloop.live.state import LiveState
@@ -146,7 +146,8 @@ def test_there_is_the_page_and_nothing_else(scenario: Scenario) -> None:
         for path in ("metadata", "autoload.js", "two", "ws/more"):
             url = bench.address.replace("/?", f"/{path}?")
             assert (await answer(url)).code == 404
-        assert (await answer(bench.address, "POST")).code == 405
+        for method in ("POST", "HEAD"):
+            assert (await answer(bench.address, method)).code == 405
         beyond = f"http://{bench.place}/static/../server.py"
         assert (await answer(beyond)).code in (403, 404)
 
@@ -282,10 +283,30 @@ def test_too_many_viewers_are_turned_away(
     monkeypatch.setattr("fleetloop.live.server.MOST_VIEWERS", 1)
 
     async def test(bench: Bench) -> None:
-        assert (await answer(bench.address)).code == 200
+        page = await HeadlessPage.open(bench.address)
+        while bench.hub.count_there() < 1:
+            await asyncio.sleep(0.01)
         said = await answer(bench.address)
         assert said.code == 503
-        assert b"1 viewers are there already" in said.body
+        assert said.body == b"1 viewers are there already: close one, and load this again\n"
+        page.close()
+        while bench.hub.count_there():
+            await asyncio.sleep(0.01)
+        assert (await answer(bench.address)).code == 200
+
+    served(scenario, test)
+
+
+def test_who_loads_the_page_again_and_again_is_told_to_wait_only_after_many(
+    scenario: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fleetloop.live.server.MOST_PAGES", MOST_VIEWERS + 2)
+
+    async def test(bench: Bench) -> None:
+        for _ in range(MOST_VIEWERS + 2):
+            assert (await answer(bench.address)).code == 200
+        said = await answer(bench.address)
+        assert (said.code, said.body) == (503, b"loaded too often: load this again in 10 s\n")
 
     served(scenario, test)
 

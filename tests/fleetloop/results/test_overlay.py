@@ -12,8 +12,10 @@ from configs.errors import ScenarioError
 from fleetloop.launch.run import RunOptions, run_scenario
 from fleetloop.record.reader import Record
 from fleetloop.results.drawing import COLOURS
+from fleetloop.results.known import known_of
 from fleetloop.results.overlay import labels, write_overlay
-from fleetloop.results.overlay_figures import SIGNALS, _signal
+from fleetloop.results.overlay_figures import SIGNALS, _signal, overlay_figures
+from fleetloop.results.publication import png
 from fleetloop.results.run_folder import read_record
 
 
@@ -77,6 +79,15 @@ def test_many_robots_are_a_band_from_the_least_to_the_greatest(runs: list[Path])
     both = np.stack([record.controller[robot]["x_e_m"] for robot in ("r1", "r2")])
     assert low.min() == both.min()
     assert high.max() == both.max()
+
+
+def test_names_of_folders_are_drawn_as_they_are(runs: list[Path]) -> None:
+    first, second = map(known_of, records(runs))
+    hostile = {r"m$\frac$": first, "_hidden": second}
+    for one in overlay_figures(hostile):
+        png(one.figure)
+        (legend,) = one.figure.legends or [axes.get_legend() for axes in one.figure.axes]
+        assert [text.get_text() for text in legend.get_texts()] == [r"m\$\frac\$", " _hidden"]
 
 
 def test_labels_are_names_as_far_as_they_differ() -> None:
