@@ -161,8 +161,10 @@ def test_no_robot_has_the_name_of_the_localisation_system() -> None:
     text = (Path(__file__).parents[2] / "configs" / "two_robots.toml").read_text("utf-8")
     with pytest.raises(ScenarioError) as refused:
         loads("here", text.replace("r1", "localisation"))
-    said = "robot.name = 'localisation': edges have the localisation system by this name; give the"
-    assert said in str(refused.value)
+    assert str(refused.value) == (
+        'here: robot.name = "localisation": edges have the localisation system by this name;'
+        " give the robot another"
+    )
 
 
 @pytest.mark.parametrize(
