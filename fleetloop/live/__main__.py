@@ -37,8 +37,8 @@ from fleetloop.results import run_folder
 
 ROOM_BYTES = 1 << 22
 """Of what waits of one source: a viewer that falls behind misses rows."""
-_DRAIN_S, _IDLE_S = 0.03, 0.1
-_STATUS_S, _FAULTS_S = 0.1, 0.5
+_DRAIN_S, _IDLE_S = 0.04, 0.1
+_STATUS_S, _FAULTS_S = 0.2, 0.5
 _ASK_S = 5.0
 _LOOK_BACK_S, _LEAST_OFTEN_S = 0.5, 8.0
 """First and longest interval at which the record is read for rows from before."""

@@ -46,8 +46,9 @@ function take(array) {
   drawPlane(now, edges, t_s);
   if (number % view.every === 0) drawCharts(now, t_s, Math.floor(number / view.every) % 2);
   showClock(t_s);
-  // The answer goes when the browser has painted: a slow one is sent less. Every other frame will do.
-  if (number % 2 === 0 || board?.ended) requestAnimationFrame(() => { models.heard.data = {frame: [number]}; });
+  // The answer goes when the browser has painted: a slow one is sent less. To take an answer costs
+  // the viewer more than to send a frame, so one that keeps up answers seldom.
+  if (number % (view.every > 1 ? 2 : 6) === 0 || board?.ended) requestAnimationFrame(() => { models.heard.data = {frame: [number]}; });
 }
 
 function keep(rows, count, whole) {

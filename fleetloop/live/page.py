@@ -25,8 +25,8 @@ from fleetloop.live.plots import charts, plane, styles
 from fleetloop.live.state import LiveState
 from fleetloop.results.palette import plot_theme, theme_css
 
-FRAME_MS = 40
-MOST_UNDRAWN = 6
+FRAME_MS = 45
+MOST_UNDRAWN = 9
 BOARD_EVERY = 5
 """Frames."""
 _HERE = Path(__file__).parent

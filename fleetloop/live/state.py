@@ -7,7 +7,7 @@
 Rows wait, undecoded, until `settle`, in bounded memory.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -139,7 +139,7 @@ class LiveState:
         """Decode what waits; the series stay as they are."""
         self._room = MOST_WAITING_BYTES
         for (robot, source), held in self._sources.items():
-            for first, block in held.waiting:
+            for first, block in _joined(held.waiting, 8 * held.width):
                 rows = np.frombuffer(block, dtype="<f8").reshape(-1, held.width)
                 held.track.add(first, rows)
                 self.expectations.add(robot, source, first, rows)
@@ -233,6 +233,22 @@ class LiveState:
             self._bins[key] = [one for one in blocks if one[0] + len(one[1]) > end]
         self.history.append(self._made, rows)
         self._made = end
+
+
+def _joined(blocks: Sequence[tuple[int, bytes]], row_bytes: int) -> Iterator[tuple[int, bytes]]:
+    """Blocks of rows, those of consecutive ticks as one."""
+    parts: list[bytes] = []
+    first = end = 0
+    for begin, block in blocks:
+        if parts and begin != end:
+            yield first, b"".join(parts)
+            parts = []
+        if not parts:
+            first = end = begin
+        parts.append(block)
+        end += len(block) // row_bytes
+    if parts:
+        yield first, b"".join(parts)
 
 
 def _edges(scenario: Scenario, tables: Mapping[str, Sequence[Signal]]) -> list[LiveEdge]:
