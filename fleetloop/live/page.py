@@ -5,7 +5,9 @@ browser to server   `heard`, the number of the last frame that was drawn, 0: it 
                     first; `orders`, JSON
 
 A browser that has not drawn `MOST_UNDRAWN` frames gets none until it has: it is skipped, and then
-gets what it missed in one frame. Whatever a user named reaches the page as JSON and as text nodes.
+gets what it missed in one frame. Frame and board are changes in callbacks of their own: of several
+in one, Bokeh drops the rest with a warning if the first is cancelled, as at the end. Whatever a
+user named reaches the page as JSON and as text nodes.
 """
 
 import json
@@ -43,9 +45,11 @@ class Page:
     """
 
     def __init__(self, document: Document, state: LiveState, about: dict[str, Any]) -> None:
+        self._document = document
         self._cursor = Cursor()
         self._events = 0
         self._drawn: int | None = None
+        self._ends = False
         self._last: int | None = None  # number of the last frame, once it is sent
         self._board = ""
         self.skipped = 0
@@ -76,7 +80,7 @@ class Page:
             return
         self._feed.data = {"frame": self._cursor.frame(state)}
         if self._cursor.frames % BOARD_EVERY == 1:
-            self.push_board(board(self._events))
+            self._document.add_next_tick_callback(lambda: self.push_board(board(self._events)))
 
     @property
     def has_last(self) -> bool:
@@ -85,10 +89,14 @@ class Page:
 
     def push_last(self, state: LiveState, board: Callable[[int], dict[str, Any]]) -> None:
         """Send the last frame and board once, however far behind the browser is."""
-        if self._drawn is not None and self._last is None:
+        if self._drawn is not None and not self._ends:
+            self._ends = True
             self.push_board(board(self._events))
-            self._feed.data = {"frame": self._cursor.frame(state)}
-            self._last = self._cursor.frames
+            self._document.add_next_tick_callback(lambda: self._push_last_frame(state))
+
+    def _push_last_frame(self, state: LiveState) -> None:
+        self._feed.data = {"frame": self._cursor.frame(state)}
+        self._last = self._cursor.frames
 
     def push_board(self, board: dict[str, Any]) -> None:
         """Send a board, unless the browser has it."""

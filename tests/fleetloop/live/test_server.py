@@ -15,7 +15,7 @@ from configs.errors import ScenarioError
 from configs.events import Event
 from configs.loading import load
 from configs.scenario import Scenario
-from fleetloop.live.hub import MOST_VIEWERS, Hub
+from fleetloop.live.hub import Hub
 from fleetloop.live.page import MOST_UNDRAWN
 from fleetloop.live.server import LiveServer
 from fleetloop.live.state import LiveState
@@ -300,13 +300,14 @@ def test_too_many_viewers_are_turned_away(
 def test_who_loads_the_page_again_and_again_is_told_to_wait_only_after_many(
     scenario: Scenario, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fleetloop.live.server.MOST_PAGES", MOST_VIEWERS + 2)
+    for name, value in {"MOST_VIEWERS": 1, "MOST_PAGES": 3, "_UNUSED_MS": 600_000}.items():
+        monkeypatch.setattr(f"fleetloop.live.server.{name}", value)
 
     async def test(bench: Bench) -> None:
-        for _ in range(MOST_VIEWERS + 2):
+        for _ in range(3):
             assert (await answer(bench.address)).code == 200
         said = await answer(bench.address)
-        assert (said.code, said.body) == (503, b"loaded too often: load this again in 10 s\n")
+        assert (said.code, said.body) == (503, b"loaded too often: load this again in 600 s\n")
 
     served(scenario, test)
 
