@@ -126,8 +126,9 @@ def run(
         if stop.requested:
             raise KeyboardInterrupt(stop.reason)
         made = Run(job.out, partial=True, notes=notes)
-    done_s = made.summary.ticks * loaded.clock.control_period_s
-    far(Progress(done_s, loaded.ends_at_s, made.summary.wall_s))
+    if on_progress is not None:
+        done_s = made.summary.ticks * loaded.clock.control_period_s
+        on_progress(Progress(done_s, loaded.ends_at_s, made.summary.wall_s))
     if out is None:
         weakref.finalize(made, shutil.rmtree, job.out, ignore_errors=True)
     return made

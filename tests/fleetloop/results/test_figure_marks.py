@@ -27,9 +27,11 @@ def test_faults_events_and_bounds_are_marked_over_time_and_the_caption_says_so(
     assert shaded.get_x() == pytest.approx(1.0)
     assert shaded.get_width() == pytest.approx(0.5)
     at = 600 * scenario.clock.control_period_s
-    assert any(line.get_xdata()[0] == line.get_xdata()[-1] == at for line in axes.get_lines())
-    bounds = [path for one in axes.collections for path in one.get_paths()]
-    assert sorted(path.vertices[0].tolist() for path in bounds) == [[2.0, -0.05], [2.0, 0.05]]
+    drawn = [path.vertices.tolist() for one in axes.collections for path in one.get_paths()]
+    assert sorted(drawn) == [
+        [[at, 0.0], [at, 1.0]],
+        *([[2.0, level], [3.998, level]] for level in (-0.05, 0.05)),
+    ]
     assert made["x_e"].caption.endswith(
         "Shaded: faults; dotted: events, red for those that are bad; dashed: what was expected."
     )
