@@ -31,7 +31,7 @@ from bridge.frame import ERR, Frame
 from bridge.network.barrier import Hellos
 from bridge.network.launcher import CUT_OFF, LauncherWatch
 from bridge.network.link import Link, Publisher, waiting
-from bridge.network.messages import Go
+from bridge.network.messages import PROGRESS_EVERY_S, Go
 from bridge.network.orders import OrderInbox
 from bridge.network.reports import Deadlines
 from bridge.network.telemetry import LOOKS
@@ -47,8 +47,6 @@ BACKLOG_S = 1.0
 
 
 _STALL_NS = round(STALL_S * 1e9)
-PROGRESS_PERIOD_S = 0.2
-"""Longest period of a controller's progress messages: they are its signs of life."""
 
 
 @dataclass(slots=True)
@@ -101,7 +99,7 @@ class RealtimeLoop:
         self._watch = watch
         self._away = False  # as the guard was told
         self._narrator = Narrator(agent)
-        every_s = min(self._schedule.status_every_s, PROGRESS_PERIOD_S)
+        every_s = min(self._schedule.status_every_s, PROGRESS_EVERY_S)
         self._progress_ticks = max(round(every_s / self._schedule.period_s), 1)
         self._rows = agent.rows
         self._look_s = agent.brief.schedule.rows_within_ns * 1e-9 / LOOKS

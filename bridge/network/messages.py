@@ -46,6 +46,8 @@ MOST_BYTES = {
 }
 """Of what others than the launcher say, by `bridge.network.keys.kind`: several times what they
 need."""
+PROGRESS_EVERY_S = 0.2
+"""Longest time from one progress message of a process to the next: its signs of life [wall s]."""
 _MAX_CHANGES = 10_000
 
 

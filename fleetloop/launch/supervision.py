@@ -9,6 +9,7 @@ from configs.roles import PLANT, RECORDER, identity_of
 from fleetloop.launch.child import GAVE_UP, PEER_SILENT, Child, Failure, cause
 from fleetloop.launch.control_plane import ControlPlane
 from fleetloop.launch.machine import WATCH_EVERY_S
+from fleetloop.launch.vitals import FROZEN_S
 
 CONSEQUENCES_S = 0.3
 """After a failure, how long its causes and consequences are waited for."""
@@ -51,7 +52,9 @@ class Supervision:
 
     def silent(self) -> Failure | None:
         """The process whose progress stopped, None while all are well."""
-        plane, limit_s = self._plane, self._schedule.tick_deadline_s + self._patience_s
+        plane = self._plane
+        # However soon others give up waiting, a process says how far it is only so often.
+        limit_s = max(self._schedule.tick_deadline_s, FROZEN_S) + self._patience_s
         now_s = plane.now()
         for name in (PLANT.name, RECORDER.name):
             child, silence = plane.child(name), plane.vitals.silence(name, now_s)

@@ -8,8 +8,10 @@ back      the next beat of a frozen process
 from dataclasses import dataclass
 from typing import NamedTuple
 
-FROZEN_S = 0.6
-"""Three beats of the slowest to beat, and a little."""
+from bridge.network.messages import PROGRESS_EVERY_S
+
+FROZEN_S = 3.0 * PROGRESS_EVERY_S
+"""Three beats of the slowest to beat."""
 
 
 @dataclass(slots=True)

@@ -16,7 +16,7 @@ from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.client import open_client
 from bridge.network.link import Arrival, Dropped
-from bridge.network.messages import Progress, Rows
+from bridge.network.messages import PROGRESS_EVERY_S, Progress, Rows
 from bridge.network.refused_messages import Refusals
 from bridge.network.reports import Report
 from bridge.network.telemetry import BLOCK_FRAMES, BLOCK_TICKS, FRAME_ROW, PLANT_ROW, row_of
@@ -30,7 +30,6 @@ from fleetloop.record.writer import Source
 
 QUIET_S = 0.3
 """Once asked to stop, the recorder takes what still comes until nothing new came for this long."""
-PROGRESS_EVERY_S = 0.25
 AHEAD_TICKS = 1 << 17
 """Largest lead of a source's rows over the slowest's; they wait in memory."""
 GAPS = 8
@@ -309,11 +308,10 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
             stop=stop,
         )
         link.declare_live(keys.live(name, RECORDER.name))
-        next_report = 0.0
         began_ns = process_cpu_ns()
-        quiet_since = SYSTEM_CLOCK.monotonic_s()
+        quiet_since = now = next_report = SYSTEM_CLOCK.monotonic_s()
         while recorder.unfinished:
-            arrival = link.receive(PROGRESS_EVERY_S)
+            arrival = link.receive(max(next_report - now, 0.0))
             now = SYSTEM_CLOCK.monotonic_s()
             if arrival is not None and recorder.process(arrival):
                 quiet_since = now

@@ -147,6 +147,10 @@ def running(folder: Path, *args: str, bus_time_s: float = 1.3) -> Iterator[Run]:
     try:
         run.await_bus_time(bus_time_s)
         yield run
+    except BaseException as error:
+        with suppress(subprocess.TimeoutExpired):
+            error.add_note("the run: {}, {}".format(*run.end(5.0)))
+        raise
     finally:
         run.kill()
 

@@ -60,6 +60,13 @@ def test_however_it_was_paused_and_sped_it_leaves_the_record_of_its_scenario(
 
 
 @pytest.mark.wall_clock
+def test_a_deadline_shorter_than_signs_of_life_are_apart_ends_no_run(tmp_path: Path) -> None:
+    options = ("--set", "clock.tick_deadline_s=0.15", "--duration", "1.5", "--speed", "1")
+    status, out = completed(tmp_path / "run", "two_robots", "--set", "expect=[]", *options)
+    assert status == 0, out
+
+
+@pytest.mark.wall_clock
 def test_in_real_time_the_leader_changes_its_speed_and_nobody_the_pace(tmp_path: Path) -> None:
     options = ("--clock", "realtime", "--set", "expect=[]", "--duration", "30")
     speeds = ("--set", "leader.speed_m_s=0.6", "--set", "coordination.v_hat_0=0.6")
