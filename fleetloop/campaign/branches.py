@@ -38,7 +38,7 @@ from fleetloop.campaign.matrix import (
     windows,
 )
 from fleetloop.campaign.verdicts import Outcome, Result, kept_from_s, verdict_of
-from fleetloop.in_process import InProcessRun
+from fleetloop.in_process.run import InProcessRun
 from fleetloop.jobs.job import Tell, Told
 from fleetloop.record.memory import MemoryRecord
 from fleetloop.record.reader import Record

@@ -17,7 +17,7 @@ from configs.errors import FleetloopError
 from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of
 from configs.scenario import Scenario
 from fleetloop.check.finding import Finding
-from fleetloop.in_process import InProcessRun
+from fleetloop.in_process.run import InProcessRun
 from fleetloop.record.memory import MemoryRecord
 from fleetloop.settling import LOST_M, SETTLE_BAND
 

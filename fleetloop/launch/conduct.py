@@ -26,7 +26,7 @@ from configs.scenario import Scenario
 from fleetloop.check.examine import examine
 from fleetloop.check.finding import in_words, titled
 from fleetloop.foxglove.layout import layout_of
-from fleetloop.in_process import InProcessRun
+from fleetloop.in_process.run import InProcessRun
 from fleetloop.launch import placement, wall_time
 from fleetloop.launch.accounts import stats_of
 from fleetloop.launch.drawn import drawing

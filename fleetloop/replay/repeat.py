@@ -15,7 +15,7 @@ from bridge.process.lifecycle import Stop
 from configs.errors import FleetloopError, ScenarioError
 from configs.resolve import leader_brief, plant_brief
 from configs.scenario import Scenario
-from fleetloop.in_process import InProcessRun
+from fleetloop.in_process.run import InProcessRun
 from fleetloop.record.inputs_file import InputLog
 from fleetloop.record.reader import Record
 from fleetloop.record.writer import Source

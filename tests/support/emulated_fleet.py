@@ -10,7 +10,7 @@ from bridge.drives.odrive.frames import AxisError, AxisState
 from bridge.network.telemetry import FRAME_ROW
 from configs.loading import load
 from configs.resolve import agent_brief, leader_brief, plant_brief
-from fleetloop.in_process import InProcessRun
+from fleetloop.in_process.run import InProcessRun
 from fleetloop.record.writer import Source
 from plant.bus.timed import TimedBus
 from plant.robot import EmulatedRobot
@@ -48,9 +48,7 @@ class Fleet:
             self.plant, agents, leader_brief(scenario), self, lambda _: None, lambda _: None
         )
         self._next = -self.plant.schedule.countdown_ticks
-        self.run._exchange_paths(-1)
-        for robot, agent in zip(self.run._robots, self.run._agents, strict=True):
-            self.run._localise(robot, agent, -1, 0)
+        self.run.begin()
 
     # --- what an in-process run tells ------------------------------------------------------------
 

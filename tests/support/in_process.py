@@ -7,7 +7,7 @@ from configs.events import Event
 from configs.resolve import agent_brief, leader_brief, plant_brief, signals_of
 from configs.scenario import Scenario
 from configs.signals import PLANT_SIGNALS
-from fleetloop.in_process import InProcessRun
+from fleetloop.in_process.run import InProcessRun
 
 NETWORK = NetworkLink("in-process", "", "", "")
 Column = list[float]

@@ -21,7 +21,7 @@ from configs.resolve import agent_brief, leader_brief, plant_brief, robot_briefs
 from configs.signals import PLANT_SIGNALS
 from fleetloop.can.census import Census, Node
 from fleetloop.check.bus_load import bus_messages
-from fleetloop.in_process import InProcessRun
+from fleetloop.in_process.run import InProcessRun
 from fleetloop.torque_limits import limits
 
 OWN = "support.second_drive:ROW"

@@ -15,7 +15,7 @@ from fleetloop.campaign.branches import Planned, Trunk, groups_of
 from fleetloop.campaign.forks import Children
 from fleetloop.campaign.matrix import Cell, Conditions, kinds_of
 from fleetloop.campaign.verdicts import Result, Verdict
-from fleetloop.in_process import InProcessRun
+from fleetloop.in_process.run import InProcessRun
 from fleetloop.record.memory import MemoryRecord
 from fleetloop.record.reader import Record
 

@@ -12,7 +12,7 @@ from agents.agent import Agent
 from agents.inputs import LoggedAgent
 from agents.status import Narrator
 from bridge.network.inputs import InputBuffer
-from bridge.network.messages import LeaderSpeed, PathState, PoseFix, Progress
+from bridge.network.messages import LeaderSpeed, Progress
 from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer, row_of
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, settled_memory
@@ -21,7 +21,8 @@ from configs.edges import hearer
 from configs.events import Event
 from configs.faults.base import PlannedFault
 from configs.roles import AGENT, PLANT
-from fleetloop.controller_port import Controller, ControllerPort
+from fleetloop.in_process.controller_port import Controller, ControllerPort
+from fleetloop.in_process.exchange import Exchange
 from fleetloop.record.writer import Source
 from fleetloop.robot_states import RobotBoard, RobotState
 from plant.bus.build import build_buses
@@ -86,23 +87,17 @@ class InProcessRun:
             else Agent(brief, rows)
             for brief, rows in zip(agents, self._telemetry, strict=True)
         ]
-        self._locators = {
-            brief.robot: [agent for agent in self._agents if brief.robot in agent.brief.located]
-            for brief in agents
-        }
-        self._hearers: dict[str, list[Agent]] = {brief.robot: [] for brief in agents}
-        for agent in self._agents:
-            for edge in agent.brief.hears:
-                self._hearers[edge.speaker].append(agent)
         for agent in self._agents:
             agent.guard.announce = on_event
         period_ns = plant.schedule.period_ns
         self._herald = Herald(lambda _: divergences(self._robots, period_ns), on_event)
         self._on_progress = on_progress
-        ends = dict(zip(self._robots, zip(self._agents, self._truths, strict=True), strict=True))
+        self._exchange = exchange = Exchange(
+            plant.schedule, self._robots, self._agents, self._truths
+        )
 
         def begin(group: Sequence[EmulatedRobot]) -> Callable[[int], None]:
-            return partial(self._begin, [(robot, *ends[robot]) for robot in group])
+            return partial(exchange.begin, exchange.places(robot.brief.robot for robot in group))
 
         controllers = {agent.brief.robot: Controller.of(agent) for agent in self._agents}
 
@@ -194,9 +189,7 @@ class InProcessRun:
 
     def begin(self) -> None:
         """Exchange what is due before the first tick."""
-        self._exchange_paths(-1)
-        for robot, agent in zip(self._robots, self._agents, strict=True):
-            self._localise(robot, agent, -1, 0)
+        self._exchange.start()
         self._next_tick = -self._schedule.countdown_ticks
 
     def go(self, to_tick: int, stop: Stop) -> None:
@@ -244,36 +237,10 @@ class InProcessRun:
 
     def _tick(self, tick: int) -> None:
         """One tick of all buses, one after the other: within a tick they don't meet."""
-        if self._schedule.shares(tick):
-            self._exchange_paths(tick)
+        self._exchange.share(tick)
         for steps in self._steps:
             while next(steps) is not None:
                 pass
-
-    def _begin(self, group: Sequence[tuple[EmulatedRobot, Agent, RowBuffer]], tick: int) -> None:
-        """As a plant's process does when a tick begins on a bus."""
-        schedule = self._schedule
-        t_ns = tick * schedule.period_ns
-        for robot, agent, truth in group:
-            if 0 <= tick < schedule.ticks:
-                truth.add(tick, robot.row(t_ns * 1e-9))
-            if schedule.localises(tick):
-                self._localise(robot, agent, tick, t_ns)
-
-    def _exchange_paths(self, tick: int) -> None:
-        for agent in self._agents:
-            robot = agent.brief.robot
-            state = PathState.decode(agent.share(tick).encode())
-            if state is not None:
-                for hearer in self._hearers[robot]:
-                    hearer.receive_path_state(robot, state)
-
-    def _localise(self, robot: EmulatedRobot, agent: Agent, tick: int, t_ns: int) -> None:
-        fix = PoseFix.decode(robot.pose_fix(tick, t_ns).encode())
-        if fix is not None:
-            agent.receive_pose(fix)
-            for other in self._locators[robot.brief.robot]:
-                other.receive_place(robot.brief.robot, fix)
 
 
 def _write(
