@@ -23,20 +23,20 @@ Filters and κ̂ are advanced exactly, Θ̂ by Euler's rule. `proj` is in `agent
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import atan, cos, exp, hypot, inf, tanh
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple
+
+from mypy_extensions import mypyc_attr
 
 from agents.laws.dsc_terms import (
-    Eight,
     Projection,
     Row,
-    SurfaceGains,
     adapt,
     sense,
     smoothing,
     wheel_torques,
 )
+from agents.laws.gains import AdaptiveDscGains, SurfaceGains
 from agents.laws.interface import (
     PATH_ERRORS,
     AdaptationLimit,
@@ -53,9 +53,8 @@ from agents.laws.interface import (
     Wheels,
 )
 from agents.laws.path_errors import path_errors
-from configs.parameters import NotNegative, Positive, parameter
 
-_new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
+_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
 class DscState(NamedTuple):
@@ -69,22 +68,11 @@ class DscState(NamedTuple):
     kappa: float
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class AdaptiveDsc(Law):
     """Equations (8)-(36)."""
 
-    @dataclass(frozen=True, slots=True, kw_only=True)
-    class Gains(SurfaceGains):
-        """Gains of (15)-(36)."""
-
-        k5: Eight = parameter((0.1,) * 8, "(35), diagonal of K_5")
-        sigma_max: Positive = parameter(1.0, "bound of every element of Θ")
-        sigma_margin: Positive = parameter(0.1, "the projection's k")
-        eta: NotNegative = parameter(0.001, "(36) [1/s]")
-        rho: Positive = parameter(1.0, "(36)")
-        sgn_width: Positive = parameter(0.001, "sgn(e) is tanh(e / sgn_width)")
-        theta_hat_0: Eight = parameter((0.0,) * 8, "Θ̂ at the start")
-        kappa_hat_0: NotNegative = parameter(0.0, "κ̂ at the start")
-
+    Gains: ClassVar[type[SurfaceGains]] = AdaptiveDscGains
     SIGNALS = (
         *PATH_ERRORS,
         Signal("alpha_theta_rad", "rad", "filtered virtual control, (19)"),
@@ -105,7 +93,7 @@ class AdaptiveDsc(Law):
 
     def __init__(
         self,
-        gains: "AdaptiveDsc.Gains",
+        gains: AdaptiveDscGains,
         wheels: Wheels,
         period_s: float,
         path: RobotPath,  # noqa: ARG002 - the reference at the present s is enough
@@ -115,11 +103,12 @@ class AdaptiveDsc(Law):
         self._rates_1: Row = (rates[0], rates[1], rates[2], rates[3])
         self._rates_2: Row = (rates[4], rates[5], rates[6], rates[7])
         self._bounds = Projection.of(g.sigma_max, g.sigma_margin)
-        self._estimates: tuple[Row, Row, float] = (
+        self.estimates: tuple[Row, Row, float] = (
             g.theta_hat_0[:4],
             g.theta_hat_0[4:],
             g.kappa_hat_0,
         )
+        """At the start: the rows of Θ̂, and κ̂."""
         keep = exp(-g.eta * g.rho * h)
         self._constants = (
             *(g.k1, g.k2, g.k3, g.k4),
@@ -142,7 +131,7 @@ class AdaptiveDsc(Law):
         bar_v = approach + v_bar_d * s_dot * cos(theta_e)  # (15)
         turn = -k3 * (theta_e - bar_theta) + omega_bar_d * s_dot
         if state is None:
-            state = DscState(bar_theta, bar_v, turn, *self._estimates)
+            state = DscState(bar_theta, bar_v, turn, *self.estimates)
         alpha_theta, alpha_v, alpha_omega, theta_1, theta_2, kappa = state
         rate_theta = (bar_theta - alpha_theta) / g1  # (19)
         rate_v = (bar_v - alpha_v) / g2  # (20)
@@ -180,7 +169,7 @@ class AdaptiveDsc(Law):
 
     def hold(self, before: DscState | None, after: DscState) -> DscState:
         """Filters go on; Θ̂ and κ̂ hold still, or would learn the limit."""
-        theta_1, theta_2, kappa = self._estimates if before is None else before[3:]
+        theta_1, theta_2, kappa = self.estimates if before is None else before[3:]
         return after._replace(theta_1=theta_1, theta_2=theta_2, kappa=kappa)
 
     # --- what follows from the equations, for `fleetloop check` ---------------------------------
@@ -223,24 +212,7 @@ class AdaptiveDsc(Law):
         theta: Theta,
     ) -> Sequence[LoopElement] | None:
         """Filters (19), (20), (27) about steady motion; Θ̂ at its start values, and at Θ; κ̂ is 0."""
-        law = cls(gains, wheels, period_s, path)
-        start_1, start_2, _ = law._estimates
-        here = path(along.s)
-        steady = 0.0, here.v_bar * along.s_dot, here.omega_bar * along.s_dot
-        lags_s = gains.gamma_1_s, gains.gamma_2_s, gains.gamma_3_s
-
-        def element(theta_1: Row, theta_2: Row) -> LoopElement:
-            def step(
-                filters: Fast, motion: RobotMotion, reference: Reference, along: PathVariable
-            ) -> tuple[float, float, Fast]:
-                alpha_theta, alpha_v, alpha_omega = filters
-                state = DscState(alpha_theta, alpha_v, alpha_omega, theta_1, theta_2, 0.0)
-                right, left, after, _ = law.step(state, motion, reference, along)
-                return right, left, after[:3]
-
-            return LoopElement(steady, step, "filters", lags_s)
-
-        return element(start_1, start_2), element(theta[:4], theta[4:])
+        return loop_elements(cls(gains, wheels, period_s, path), gains, path, along, theta)
 
     @classmethod
     def adaptation_limit(cls, gains: Any, period_s: float) -> AdaptationLimit | None:
@@ -272,3 +244,26 @@ class AdaptiveDsc(Law):
             'control.law = "adaptive_dsc_robust" normalises it; or lower k5, or start closer',
             ratio,
         )
+
+
+def loop_elements(
+    law: AdaptiveDsc, gains: SurfaceGains, path: RobotPath, along: PathVariable, theta: Theta
+) -> Sequence[LoopElement]:
+    """The loop elements of this law, or of one that derives from it."""
+    start_1, start_2, _ = law.estimates
+    here = path(along.s)
+    steady = 0.0, here.v_bar * along.s_dot, here.omega_bar * along.s_dot
+    lags_s = gains.gamma_1_s, gains.gamma_2_s, gains.gamma_3_s
+
+    def element(theta_1: Row, theta_2: Row) -> LoopElement:
+        def step(
+            filters: Fast, motion: RobotMotion, reference: Reference, along: PathVariable
+        ) -> tuple[float, float, Fast]:
+            alpha_theta, alpha_v, alpha_omega = filters
+            state = DscState(alpha_theta, alpha_v, alpha_omega, theta_1, theta_2, 0.0)
+            right, left, after, _ = law.step(state, motion, reference, along)
+            return right, left, after[:3]
+
+        return LoopElement(steady, step, "filters", lags_s)
+
+    return element(start_1, start_2), element(theta[:4], theta[4:])

@@ -9,12 +9,15 @@ Four changes to `agents.laws.adaptive_dsc`, all of them that law again to first 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import atan, inf, tanh
 from typing import Any
 
-from agents.laws.adaptive_dsc import AdaptiveDsc, DscState
+from mypy_extensions import mypyc_attr
+
+from agents.laws.adaptive_dsc import AdaptiveDsc, DscState, loop_elements
 from agents.laws.dsc_terms import Row, adapt
+from agents.laws.gains import AdaptiveDscRobustGains
 from agents.laws.interface import (
     AdaptationLimit,
     LawOutput,
@@ -26,22 +29,17 @@ from agents.laws.interface import (
     Theta,
     Wheels,
 )
-from configs.parameters import Positive, parameter
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class AdaptiveDscRobust(AdaptiveDsc):
     """Equations (8)-(36) with the four changes above."""
 
-    @dataclass(frozen=True, slots=True, kw_only=True)
-    class Gains(AdaptiveDsc.Gains):
-        """Gains of (15)-(36), and the two bounds."""
-
-        v_bar_limit_m_s: Positive = parameter(2.0, "largest approach speed V")
-        torque_limit_wheel_N_m: Positive = parameter(2.0, "per wheel, at the wheel")
+    Gains = AdaptiveDscRobustGains
 
     def __init__(
         self,
-        gains: "AdaptiveDscRobust.Gains",
+        gains: AdaptiveDscRobustGains,
         wheels: Wheels,
         period_s: float,
         path: RobotPath,
@@ -93,7 +91,8 @@ class AdaptiveDscRobust(AdaptiveDsc):
     ) -> Sequence[LoopElement] | None:
         """Those of the law without its torque limit: close to the path it doesn't act."""
         unlimited = replace(gains, torque_limit_wheel_N_m=inf)
-        return super().loop_elements(unlimited, wheels, period_s, path, along, theta)
+        law = cls(unlimited, wheels, period_s, path)
+        return loop_elements(law, unlimited, path, along, theta)
 
     @classmethod
     def adaptation_limit(cls, gains: Any, period_s: float) -> AdaptationLimit | None:  # noqa: ARG003

@@ -7,25 +7,12 @@ with the regressor F of (34), whose rates are those of the virtual controls; Θ 
 multiple of the robot's. Nothing adapts.
 """
 
-from dataclasses import dataclass
 from math import inf
 
-from agents.laws.dsc_terms import Eight, wheel_torques
-from agents.laws.fixed_dsc import PAPER_THETA, scaled
+from agents.laws.dsc_terms import wheel_torques
+from agents.laws.fixed_dsc import scaled
+from agents.laws.gains import BacksteppingGains
 from agents.laws.interface import AdaptationLimit, Law, RobotMotion, Wheels
-from configs.parameters import NotNegative, Parameters, Positive, parameter
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BacksteppingGains(Parameters):
-    """Gains of (15), (17), [4] and of the heading, and the parameters."""
-
-    k1: Positive = parameter(2.0, "(15), of x_e [1/s]")
-    k2: Positive = parameter(3.0, "(17), of y_e [1/m]")
-    k3: Positive = parameter(1.5, "of the heading [1/s]")
-    k4: Positive = parameter(3.0, "[4], of the speeds [N·m·s/m, N·m·s/rad]")
-    theta: Eight = parameter(PAPER_THETA, "Θ of the design [kg·m², N·m·s]")
-    factor: NotNegative = parameter(1.0, "the law uses this multiple of theta")
 
 
 class Backstepping(Law):

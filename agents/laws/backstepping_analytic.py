@@ -24,11 +24,11 @@ as in `agents.laws.fixed_dsc`; nothing adapts, and there is no state.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import atan, cos, sin
 
-from agents.laws.backstepping import Backstepping, BacksteppingGains
+from agents.laws.backstepping import Backstepping
 from agents.laws.dsc_terms import sense
+from agents.laws.gains import BacksteppingAnalyticGains
 from agents.laws.interface import (
     PATH_ERRORS,
     Fast,
@@ -43,7 +43,6 @@ from agents.laws.interface import (
     Wheels,
 )
 from agents.laws.path_errors import path_errors
-from configs.parameters import Positive, parameter
 
 _STEP_M = 1e-4
 """Of the central differences along the path."""
@@ -52,12 +51,7 @@ _STEP_M = 1e-4
 class BacksteppingAnalytic(Backstepping):
     """Equations (15), (17), [1]-[4]."""
 
-    @dataclass(frozen=True, slots=True, kw_only=True)
-    class Gains(BacksteppingGains):
-        """Those of backstepping, and the least divisor of [2]."""
-
-        margin: Positive = parameter(0.1, "least 1 − G x_e")
-
+    Gains = BacksteppingAnalyticGains
     SIGNALS = (
         *PATH_ERRORS,
         Signal("v_bar_m_s", "m/s", "virtual control, (15)"),
@@ -71,7 +65,7 @@ class BacksteppingAnalytic(Backstepping):
 
     def __init__(
         self,
-        gains: "BacksteppingAnalytic.Gains",
+        gains: BacksteppingAnalyticGains,
         wheels: Wheels,
         period_s: float,  # noqa: ARG002 - nothing is integrated
         path: RobotPath,
@@ -141,7 +135,7 @@ class BacksteppingAnalytic(Backstepping):
     @classmethod
     def loop_elements(
         cls,
-        gains: "BacksteppingAnalytic.Gains",
+        gains: BacksteppingAnalyticGains,
         wheels: Wheels,
         period_s: float,
         path: RobotPath,

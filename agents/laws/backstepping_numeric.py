@@ -13,8 +13,9 @@ from collections.abc import Sequence
 from math import atan, cos
 from typing import NamedTuple
 
-from agents.laws.backstepping import Backstepping, BacksteppingGains
+from agents.laws.backstepping import Backstepping
 from agents.laws.dsc_terms import sense
+from agents.laws.gains import BacksteppingGains
 from agents.laws.interface import (
     PATH_ERRORS,
     Fast,

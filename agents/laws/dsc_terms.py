@@ -16,31 +16,13 @@ y_e, σ the sense in which the path is followed, and the product is damped in bo
     σ(ṡ) = 1 for ṡ ≥ 0 (the paper's law unchanged),  −1 for ṡ ≤ −`REVERSE_M_S`, linear in between
 """
 
-from dataclasses import dataclass
 from math import exp
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-from configs.parameters import Finite, Parameters, Positive, Seconds, parameter
-
-REVERSE_M_S = 0.05
+REVERSE_M_S: Final = 0.05
 """Path variables that go back this fast are followed backwards."""
 Row = tuple[float, float, float, float]
 """Four of the eight parameters: those of one row of Ω."""
-Eight = tuple[Finite, Finite, Finite, Finite, Finite, Finite, Finite, Finite]
-"""Θ's elements: c b, d̄_11, d̄_12, m̄_1, c/b, d̄_21, d̄_22, m̄_2 [kg·m², N·m·s]."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SurfaceGains(Parameters):
-    """Gains of the virtual controls, the filters and the speed loop, (15)-(34)."""
-
-    k1: Positive = parameter(2.0, "(15), of x_e [1/s]")
-    k2: Positive = parameter(3.0, "(17), of y_e [1/m]")
-    k3: Positive = parameter(1.5, "(25), of the heading [1/s]")
-    k4: Positive = parameter(3.0, "(34), of the speeds [N·m·s/m, N·m·s/rad]")
-    gamma_1_s: Positive = parameter(0.01, "filter (19)")
-    gamma_2_s: Seconds = parameter(0.01, "filter (20)")
-    gamma_3_s: Seconds = parameter(0.01, "filter (27)")
 
 
 def sense(s_dot: float) -> float:

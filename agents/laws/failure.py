@@ -40,7 +40,7 @@ def raised(error: BaseException) -> str:
 def place_of(error: BaseException) -> str:
     """File and line that raised an error, "" if they are Fleetloop's."""
     frames = traceback.extract_tb(error.__traceback__)
-    if not frames or frames[-1].filename.startswith(_HERE):
+    if not frames or frames[-1].filename.startswith(_OURS):
         return ""
     return f"{frames[-1].filename}, line {frames[-1].lineno}: "
 
@@ -57,4 +57,5 @@ def number(value: SupportsFloat) -> float:
     return float(value)
 
 
-_HERE = str(Path(__file__).parents[1])
+_OURS = (str(Path(__file__).parents[1]), "agents/")
+"""Compiled, a module has its path from the root of the sources."""

@@ -8,11 +8,10 @@ is the best that adaptation could come to, f = 0 is the speed loop alone. All el
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from agents.laws.adaptive_dsc import AdaptiveDsc
-from agents.laws.dsc_terms import Eight, SurfaceGains
+from agents.laws.gains import AdaptiveDscGains, Eight, FixedDscGains
 from agents.laws.interface import (
     AdaptationLimit,
     LoopElement,
@@ -21,9 +20,6 @@ from agents.laws.interface import (
     Theta,
     Wheels,
 )
-from configs.parameters import NotNegative, parameter
-
-PAPER_THETA: Eight = (3.68e-5, 0.02, 0.0, 0.007664, 3.68e-3, 0.0, 0.02, 0.0072416)
 
 
 def scaled(theta: Eight, factor: float) -> Eight:
@@ -35,17 +31,12 @@ def scaled(theta: Eight, factor: float) -> Eight:
 class FixedDsc(AdaptiveDsc):
     """Equations (8)-(34) with fixed parameters."""
 
-    @dataclass(frozen=True, slots=True, kw_only=True)
-    class Gains(SurfaceGains):
-        """Gains of (15)-(34), and the parameters."""
-
-        theta: Eight = parameter(PAPER_THETA, "Θ of the design [kg·m², N·m·s]")
-        factor: NotNegative = parameter(1.0, "the law uses this multiple of theta")
+    Gains = FixedDscGains
 
     def __init__(
-        self, gains: "FixedDsc.Gains", wheels: Wheels, period_s: float, path: RobotPath
+        self, gains: FixedDscGains, wheels: Wheels, period_s: float, path: RobotPath
     ) -> None:
-        fixed = AdaptiveDsc.Gains(
+        fixed = AdaptiveDscGains(
             k1=gains.k1,
             k2=gains.k2,
             k3=gains.k3,

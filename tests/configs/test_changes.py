@@ -171,7 +171,7 @@ def test_parameters_of_a_law_are_read_as_they_are_changed(small: Scenario) -> No
     control = small.with_(control={"k1": 3.0}).control
     assert (control.k1, control.parameters.k1) == (3.0, 3.0)
     assert "k1" in dir(control)
-    assert repr(control).startswith("adaptive_dsc: AdaptiveDsc.Gains(k1=3.0, ")
+    assert repr(control).startswith("adaptive_dsc: AdaptiveDscGains(k1=3.0, ")
     assert pickle.loads(pickle.dumps(control)) == control
     with pytest.raises(AttributeError, match="k9"):
         control.k9  # noqa: B018

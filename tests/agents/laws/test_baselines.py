@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from agents.laws.adaptive_dsc import AdaptiveDsc
 from agents.laws.backstepping_analytic import BacksteppingAnalytic
 from agents.laws.backstepping_numeric import BacksteppingNumeric
-from agents.laws.fixed_dsc import PAPER_THETA, FixedDsc
+from agents.laws.fixed_dsc import FixedDsc
+from agents.laws.gains import PAPER_THETA
 from agents.laws.interface import PathVariable, RobotMotion, Wheels
 from agents.laws.path_errors import path_errors
 from agents.paths import robot_path
