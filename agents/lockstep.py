@@ -9,18 +9,19 @@ controllers compute, and a graph with cycles can't deadlock.
 import errno
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import can
 
 from agents.admission import LEADER, LOCALISATION
 from agents.agent import Agent
 from agents.bus_clock import BusClock
+from agents.dues import Dues
 from agents.guard import Phase
 from agents.process_faults import ProcessFaults
 from agents.status import Narrator
 from agents.subscriptions import Subscriptions
-from bridge.can_bus.interface import FleetloopBus
-from bridge.can_bus.pythoncan import can_id_of, to_message
+from bridge.can_bus.interface import FleetloopBus, TimedFrame
 from bridge.frame import Frame
 from bridge.network.barrier import Hellos
 from bridge.network.fault_orders import FaultOrder
@@ -36,14 +37,14 @@ from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
 from configs.faults.base import Fault
 from configs.roles import PLANT
 
-LISTEN_SHARE = 0.75
+LISTEN_SHARE: Final = 0.75
 """Part of the tick deadline for the wait for messages: a controller reports a silent peer before
 the plant reports the controller."""
-BUS_SHARE = 2.0
+BUS_SHARE: Final = 2.0
 """Multiple of the tick deadline for the wait for the bus: the plant reports its own faults
 first."""
 
-_KINDS_AND_SENDERS = {
+_KINDS_AND_SENDERS: Final = {
     "pose": ("pose", LOCALISATION),
     "place": ("pose", LOCALISATION),
     "leader": ("speed", LEADER),
@@ -88,7 +89,10 @@ class LockstepLoop:
         self._clock = clock
         self._orders = orders
         self._agent = agent
-        self._schedule = agent.brief.schedule
+        self._schedule = schedule = agent.brief.schedule
+        self._dues = Dues(schedule)
+        self._tell_every_ns = int(schedule.status_every_s * 1e9)
+        self._resumes = agent.brief.rejoins
         self._robot = agent.brief.robot
         self._bus = bus
         self._link = link
@@ -101,6 +105,7 @@ class LockstepLoop:
         self._rows_within_s = self._schedule.rows_within_ns * 1e-9
         self._narrator = Narrator(agent)
         self._told_tick: int | None = None
+        self._asked_ns = self._told_ns = 0  # by the clock: the last answer; next to be told
         self.faults = ProcessFaults(agent.brief, agent.guard.note, clock=clock)
         """Faults of this process."""
         self.counters = LockstepCounters()
@@ -109,84 +114,85 @@ class LockstepLoop:
         """Deliver one message to the agent."""
         deliver(self._agent, arrival)
 
-    def await_first_frame(self, stop: Stop) -> can.Message | None:
-        """Say hello until the plant's first frame; None on a stop."""
+    def await_first_frame(self, stop: Stop) -> Sequence[TimedFrame] | None:
+        """Say hello until the plant's first frames; None on a stop."""
         clock = AwakeClock(held=launcher_stopped, clock=self._clock)
         deadline = clock.now() + self._schedule.start_deadline_s
         while not stop.requested:
-            message = self._receive(min(self._hellos.say(), LOOK_S))
-            if message is not None:
-                return message
+            frames = self._receive(min(self._hellos.say(), LOOK_S))
+            if frames is not None:
+                return frames
             if clock.now() > deadline:
                 raise did_not_start(self._agent)
         return None
 
-    def run(self, first: can.Message, stop: Stop) -> None:
-        """Run from the first frame to the closing tick, or to a stop.
+    def run(self, first: Sequence[TimedFrame], stop: Stop) -> None:
+        """Run from the first frames to the closing tick, or to a stop.
 
         Raises:
             InfrastructureError: the bus was silent beyond the tick deadline.
             PeerSilentError: a pose or a neighbour's path state did not come.
             PeerLostError: the bus closed.
         """
-        agent = self._agent
-        counters = self.counters
-        message: can.Message | None = first
-        asked_ns = self._clock.monotonic_ns()
-        on_frame, schedule, faults = agent.on_frame, self._schedule, self.faults
-        resumes = agent.brief.rejoins
-        first_tick = agent.brief.resumes_tick if resumes else -schedule.countdown_ticks
+        agent, schedule, bus = self._agent, self._schedule, self._bus
+        frames = first
+        on_frame = agent.on_frame
+        first_tick = agent.brief.resumes_tick if self._resumes else -schedule.countdown_ticks
         clock = BusClock(schedule, agent.feedback_since, first_tick)
-        faults.skip_to(first_tick)
+        self.faults.skip_to(first_tick)
+        self._asked_ns = self._told_ns = self._clock.monotonic_ns()
         next_tick = first_tick
-        subscriptions, orders, bus = self._subscriptions, self._orders, self._bus
-        look_at_rows = self._rows.look
-        timeout_s = self._frames_within_s
-        told_ns = asked_ns
-        tell_every_ns = int(schedule.status_every_s * 1e9)
         while True:
-            tick: int | None = None
-            if message is not None:
-                now_ns = round(message.timestamp * 1e9)
-                on_frame(can_id_of(message), message.data, now_ns)
-                tick = clock.due(now_ns)
-            if tick is None and (question_ns := bus.question_ns) is not None:
+            for at_ns, (can_id, data) in frames:
+                on_frame(can_id, data, at_ns)
+                tick = clock.due(at_ns)
+                if tick is not None:
+                    if self._tick(tick, stop):
+                        return
+                    next_tick = tick + 1
+            question_ns = bus.question_ns
+            if question_ns is not None:
                 tick = clock.due_at_end(question_ns)
-            if tick is not None:
-                came_ns = self._clock.monotonic_ns()
-                if tick >= faults.due_tick:
-                    faults.begin(tick)
-                if schedule.owes(tick):
-                    self._await_messages(tick, stop)
-                heard_ns = self._clock.monotonic_ns()
-                if orders is not None and orders.waiting:
-                    take_orders(agent, faults, orders, tick)
-                self._send(agent.step(tick) if not stop.requested else agent.shut_down())
-                if tick >= subscriptions.next_change:
-                    subscriptions.change(tick)
-                if schedule.shares(tick + 1) and tick >= faults.mute_tick:
-                    silent = resumes and not agent.speaks(tick + 1)
-                    said = Silence(tick + 1) if silent else agent.share(tick + 1)
-                    self._path.put(said.encode())
-                counters.bus_ns += came_ns - asked_ns
-                counters.listen_ns += heard_ns - came_ns
-                asked_ns = self._clock.monotonic_ns()
-                look_at_rows(asked_ns)
-                counters.compute_ns += asked_ns - heard_ns
-                counters.ticks += 1
-                if asked_ns >= told_ns:
-                    told_ns = asked_ns + tell_every_ns
-                    self._tell(tick)
-                if agent.phase is Phase.DONE:
-                    return
-                next_tick = tick + 1
-            message = self._await_frame(timeout_s, next_tick)
+                if tick is not None:
+                    if self._tick(tick, stop):
+                        return
+                    next_tick = tick + 1
+            frames = self._await_frames(self._frames_within_s, next_tick)
+
+    def _tick(self, tick: int, stop: Stop) -> bool:
+        """Compute one tick and answer; whether it was the last."""
+        agent, counters, faults = self._agent, self.counters, self.faults
+        came_ns = self._clock.monotonic_ns()
+        if tick >= faults.due_tick:
+            faults.begin(tick)
+        if self._dues.owes(tick):
+            self._await_messages(tick, stop)
+        heard_ns = self._clock.monotonic_ns()
+        orders = self._orders
+        if orders is not None and orders.waiting:
+            take_orders(agent, faults, orders, tick)
+        self._send(agent.step(tick) if not stop.requested else agent.shut_down())
+        if tick >= self._subscriptions.next_change:
+            self._subscriptions.change(tick)
+        if tick >= faults.mute_tick and self._dues.shares(tick + 1):
+            silent = self._resumes and not agent.speaks(tick + 1)
+            said = Silence(tick + 1) if silent else agent.share(tick + 1)
+            self._path.put(said.encode())
+        counters.bus_ns += came_ns - self._asked_ns
+        counters.listen_ns += heard_ns - came_ns
+        self._asked_ns = asked_ns = self._clock.monotonic_ns()
+        self._rows.look(asked_ns)
+        counters.compute_ns += asked_ns - heard_ns
+        counters.ticks += 1
+        if asked_ns >= self._told_ns:
+            self._told_ns = asked_ns + self._tell_every_ns
+            self._tell(tick)
+        return agent.phase is Phase.DONE
 
     def _send(self, frames: Sequence[Frame]) -> None:
-        send = self._bus.send
-        for can_id, data in frames:
+        for frame in frames:
             try:
-                send(to_message(can_id, data))
+                self._bus.send_frame(frame)
             except can.CanOperationError as error:
                 if error.error_code != errno.ENOBUFS:
                     raise PeerLostError(f"{self._robot}: lost its bus: {error}") from error
@@ -214,20 +220,20 @@ class LockstepLoop:
                 said = "; ".join((f"no {', no '.join(missing)}", *agent.refusals()))
                 raise PeerSilentError(f"{self._robot}: tick {tick}: within {within_s:g} s {said}")
 
-    def _await_frame(self, within_s: float, tick: int) -> can.Message | None:
-        """The next frame of the bus; None at a question without a frame.
+    def _await_frames(self, within_s: float, tick: int) -> Sequence[TimedFrame]:
+        """The next frames of the bus; none with a question that has none.
 
-        While none comes rows are handed on, progress is told, and orders are taken before the next
-        tick.
+        While nothing comes rows are handed on, progress is told, and orders are taken before the
+        next tick.
         """
-        message = self._receive(self._rows_within_s)
-        if message is not None or self._bus.asked:
-            return message
+        frames = self._receive(self._rows_within_s)
+        if frames is not None:
+            return frames
         self._rows.hand_on()
         self._tell(tick - 1)
         clock = AwakeClock(held=launcher_stopped, clock=self._clock)
         deadline = clock.now() + within_s - self._rows_within_s
-        while (message := self._receive(LOOK_S)) is None and not self._bus.asked:
+        while (frames := self._receive(LOOK_S)) is None:
             if self._time_stands(tick):
                 deadline = clock.now() + within_s
             if clock.now() > deadline:
@@ -235,7 +241,7 @@ class LockstepLoop:
                     f"{self._robot}: no encoder frames within {within_s:g} s after"
                     f" {self.counters.ticks} ticks"
                 )
-        return message
+        return frames
 
     def _tell(self, tick: int) -> None:
         """Tell how far this controller is, of a tick once."""
@@ -253,9 +259,9 @@ class LockstepLoop:
         stands, orders.stands = orders.stands, False
         return stands
 
-    def _receive(self, timeout_s: float) -> can.Message | None:
+    def _receive(self, timeout_s: float) -> Sequence[TimedFrame] | None:
         try:
-            return self._bus.recv(timeout_s)
+            return self._bus.recv_frames(timeout_s)
         except can.CanOperationError as error:
             raise PeerLostError(
                 f"{self._robot}: lost its bus after {self.counters.ticks} ticks: {error}"

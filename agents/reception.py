@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from agents.admission import Admission
+from agents.dues import Dues
 from agents.emulated_network import HERE, EmulatedNetwork
 from agents.in_edges import InEdges
 from agents.neighbours import Neighbours
@@ -30,6 +31,7 @@ class Reception:
     def __init__(self, brief: AgentBrief) -> None:
         self._brief = brief
         self._schedule = brief.schedule
+        self._dues = Dues(brief.schedule)
         self._realtime = brief.schedule.realtime
         self._rejoins = brief.rejoins
         self._follows_leader = brief.leader_link is not None
@@ -168,7 +170,7 @@ class Reception:
             if self._fixes:
                 fixes = [self._fixes[number] for number in sorted(self._fixes)]
                 self._fixes.clear()
-        elif self._schedule.owes(tick):
+        elif self._dues.owes(tick):
             fixes = self._due(tick)
         if self.network is not None:
             return self._through(self.network, tick, fixes)

@@ -91,14 +91,6 @@ class Schedule:
         """Whether the localisation system takes poses at this tick."""
         return tick >= 0 and tick % self.localise_every == 0
 
-    def owes(self, tick: int) -> bool:
-        """Whether a pose or path states are due at this tick."""
-        return (
-            self.shares(tick)
-            or self.localises(tick - self.pose_delay_ticks)
-            or self.localises(tick - self.place_delay_ticks)
-        )
-
     @property
     def place_delay_ticks(self) -> int:
         """Delay of other robots' poses to the emulated network: a tick or more."""

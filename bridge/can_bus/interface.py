@@ -50,19 +50,22 @@ from bridge.can_bus.packet import (
     OWN,
     SYNCHRONOUS,
     VERSION,
+    Packet,
     decode,
     encode_frames,
     encode_text,
 )
 from bridge.can_bus.pythoncan import to_frame, to_message
 from bridge.can_bus.transport import JoinError, Transport, connect
-from bridge.frame import Frame
+from bridge.frame import Frame, flaw
 from bridge.process.clock import SYSTEM_CLOCK
 
 FLUSH_S = 10.0
 """How long a batched client waits for a hub that doesn't read."""
 PATIENCE_S = 1.0
 """How long a sender without a timeout waits for a hub that doesn't read."""
+TimedFrame = tuple[int, Frame]
+"""A frame and the bus time of its end [ns]."""
 _LOG = logging.getLogger("can.fleetloop")  # as python-can's own interfaces name theirs
 
 
@@ -186,15 +189,11 @@ class FleetloopBus(can.BusABC):
             frame = to_frame(msg)
         except ValueError as error:
             raise can.CanOperationError(f"bus {self.channel!r}: not sent: {error}") from error
+        if self._batched:
+            self._submit(frame, timeout)
+            return
         if self._queue:
             self._await_credit(timeout)
-        if self._batched:
-            if self._is_shutdown:
-                raise self._gone_with(None)
-            if len(self._outbox) == MAX_FRAMES:
-                self._flush(0)
-            self._outbox.append(frame)
-            return
         data = encode_frames(0, self._stamp_ns, (frame,))
         try:
             self._send_now(data)
@@ -215,6 +214,44 @@ class FleetloopBus(can.BusABC):
         None: frames of it are left, or it was answered.
         """
         return self._stamp_ns if self._reply_due and not self._inbox else None
+
+    # --- frames, beside python-can's messages ----------------------------------------------------
+
+    def recv_frames(self, timeout: float) -> list[TimedFrame] | None:
+        """The frames of the next packet; filters don't apply.
+
+        Of a synchronous client: a question without a frame has none. None: no packet came within
+        `timeout` seconds.
+
+        Raises:
+            can.CanOperationError: the bus is gone.
+        """
+        deadline = None
+        wait_s = timeout
+        while True:
+            data = self._next_packet(wait_s)
+            if data is None:
+                return None
+            packet = self._take(data)
+            if packet is not None:
+                stamp_ns, before_ns = packet.stamp_ns, packet.before_ns
+                if before_ns:
+                    pairs = zip(packet.frames, before_ns, strict=True)
+                    return [(stamp_ns - ago_ns, frame) for frame, ago_ns in pairs]
+                return [(stamp_ns, frame) for frame in packet.frames]
+            if deadline is None:
+                deadline = SYSTEM_CLOCK.monotonic_s() + timeout
+            wait_s = max(0.0, deadline - SYSTEM_CLOCK.monotonic_s())
+
+    def send_frame(self, frame: Frame) -> None:
+        """Send a frame of a batched client, as `send` does.
+
+        Raises:
+            can.CanOperationError: no classic frame, the bus is gone, or the queue is full.
+        """
+        if wrong := flaw(frame[0], len(frame[1])):
+            raise can.CanOperationError(f"bus {self.channel!r}: not sent: {wrong}")
+        self._submit(frame, None)
 
     def fileno(self) -> int:
         """The descriptor that becomes readable with the next frame."""
@@ -245,6 +282,16 @@ class FleetloopBus(can.BusABC):
 
     def _receive(self, wait_s: float | None) -> bool:
         """Take one packet; False if none came in time."""
+        data = self._next_packet(wait_s)
+        if data is None:
+            return False
+        packet = self._take(data)
+        if packet is not None:
+            self._put(packet)
+        return True
+
+    def _next_packet(self, wait_s: float | None) -> bytes | None:
+        """Send what waits, then wait for a packet; None if none came in time."""
         if self._reply_due and not (wait_s is not None and wait_s <= 0.0):
             self._reply_due = False
             self._flush(DONE)
@@ -253,37 +300,49 @@ class FleetloopBus(can.BusABC):
         if self._closed_because is not None:
             raise self._closed()
         try:
-            data = self._next(wait_s)
+            return self._next(wait_s)
         except OSError as error:
             raise self._gone_with(error) from error
-        if data is None:
-            return False
-        self._process(data)
-        return True
 
-    def _process(self, data: bytes) -> None:
+    def _put(self, packet: Packet) -> None:
+        """Put the frames of a packet into the inbox."""
+        _, flags, _, stamp_ns, frames, _, _, before_ns, _ = packet
+        timestamp, channel, is_rx = stamp_ns / 1e9, self.channel, not flags & OWN
+        put = self._inbox.append
+        if before_ns:
+            for (can_id, content), ago_ns in zip(frames, before_ns, strict=True):
+                at = (stamp_ns - ago_ns) / 1e9
+                put(to_message(can_id, content, at, channel, is_rx))
+            return
+        for can_id, content in frames:
+            put(to_message(can_id, content, timestamp, channel, is_rx))
+
+    def _submit(self, frame: Frame, timeout: float | None) -> None:
+        """Put a frame of a batched client with those that travel together."""
+        if self._queue:
+            self._await_credit(timeout)
+        if self._is_shutdown:
+            raise self._gone_with(None)
+        if len(self._outbox) == MAX_FRAMES:
+            self._flush(0)
+        self._outbox.append(frame)
+
+    def _take(self, data: bytes) -> Packet | None:
+        """A packet of frames; None: it was another, which is taken account of here."""
         packet = decode(data)
         if packet is not None and packet[0] == FRAMES:
-            _, flags, _, stamp_ns, frames, _, self._released, before_ns, _ = packet
-            self._stamp_ns = stamp_ns
-            self._reply_due = self._synchronous and not flags & MORE
-            timestamp, channel, is_rx = stamp_ns / 1e9, self.channel, not flags & OWN
-            put = self._inbox.append
-            if before_ns:
-                for (can_id, content), ago_ns in zip(frames, before_ns, strict=True):
-                    at = (stamp_ns - ago_ns) / 1e9
-                    put(to_message(can_id, content, at, channel, is_rx))
-                return
-            for can_id, content in frames:
-                put(to_message(can_id, content, timestamp, channel, is_rx))
-        elif packet is not None and packet.kind == BYE:
+            self._stamp_ns, self._released = packet.stamp_ns, packet.credit
+            self._reply_due = self._synchronous and not packet.flags & MORE
+            return packet
+        if packet is not None and packet.kind == BYE:
             self._closed_because = packet.text
             raise self._closed()
-        elif packet is not None and packet.kind == LOST:
+        if packet is not None and packet.kind == LOST:
             self.lost += packet.credit
             _LOG.warning("bus %r: %d frames lost: not read in time", self.channel, packet.credit)
         elif not data:
             raise self._gone_with(None)
+        return None
 
     def _closed(self) -> BusClosedError:
         return BusClosedError(

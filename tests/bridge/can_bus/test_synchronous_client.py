@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from support.hub_running import Remote
 
 from bridge.can_bus import sockets
 from bridge.can_bus.hub import Hub
+from bridge.can_bus.interface import FleetloopBus
 from bridge.frame import Frame
 
 LEAVE = 0x7FF
@@ -29,8 +31,25 @@ def answered(hub: Hub) -> bool:
     return any(hub.collect(0.01) for _ in range(1000))
 
 
-@pytest.fixture
-def synchronous(where: str, runtime_folder, tmp_path: Path) -> Iterator[Hub]:
+def answer_messages(bus: FleetloopBus) -> None:
+    while (message := bus.recv(10.0)) is None or message.arbitration_id != LEAVE:
+        if message is not None and message.arbitration_id == 0x009:
+            bus.send(can.Message(arbitration_id=0x00E, data=message.data[:4]))
+            bus.send(can.Message(arbitration_id=0x02E, data=message.data[4:]))
+
+
+def answer_frames(bus: FleetloopBus) -> None:
+    while True:
+        for _, (can_id, data) in bus.recv_frames(10.0) or ():
+            if can_id == LEAVE:
+                return
+            if can_id == 0x009:
+                bus.send_frame(Frame(0x00E, data[:4]))
+                bus.send_frame(Frame(0x02E, data[4:]))
+
+
+@pytest.fixture(params=[answer_messages, answer_frames])
+def synchronous(request, where: str, runtime_folder, tmp_path: Path) -> Iterator[Hub]:
     """A hub driven by the test, and a synchronous client in a thread, as a controller."""
     folder = sockets.create_run_folder("test")
     hub = Hub(sockets.listen(folder, ("r1",)), controllers=CONTROLLERS)
@@ -39,16 +58,8 @@ def synchronous(where: str, runtime_folder, tmp_path: Path) -> Iterator[Hub]:
 
     def answer() -> None:
         bus = can.Bus(interface="fleetloop", channel="r1", **OWN, **settings)
-        try:
-            while True:
-                message = bus.recv(10.0)
-                if message is not None and message.arbitration_id == LEAVE:
-                    break
-                if message is not None and message.arbitration_id == 0x009:
-                    bus.send(can.Message(arbitration_id=0x00E, data=message.data[:4]))
-                    bus.send(can.Message(arbitration_id=0x02E, data=message.data[4:]))
-        except can.CanOperationError:
-            pass
+        with suppress(can.CanOperationError):
+            request.param(bus)
         bus.shutdown()
 
     thread = threading.Thread(target=answer)
@@ -78,6 +89,25 @@ def test_a_synchronous_client_with_nothing_to_say_still_answers(synchronous) -> 
     hub.deliver("r1", 0, (Frame(0x001, bytes(8)),))
     assert answered(hub)
     assert hub.receive("r1") == []
+
+
+def test_frames_come_together_and_with_their_times(running, join) -> None:
+    client = join(batched=True)
+    assert client.recv_frames(0.0) is None
+    running.deliver(Frame(0x009, b"abc"), Frame(0x029, b""), stamp_ns=1_500_000_000)
+    heard = client.recv_frames(5.0)
+    assert heard == [
+        (1_500_000_000, Frame(0x009, b"abc")),
+        (1_500_000_000, Frame(0x029, b"")),
+    ]
+
+
+def test_what_is_no_frame_is_refused_before_it_is_sent(join) -> None:
+    client = join(batched=True)
+    with pytest.raises(can.CanOperationError, match="not sent: 9 bytes of data"):
+        client.send_frame(Frame(0x009, bytes(9)))
+    with pytest.raises(can.CanOperationError, match="not sent: 11-bit identifier 0x800"):
+        client.send_frame(Frame(0x800, b""))
 
 
 def test_a_listener_beside_a_synchronous_client_changes_nothing(synchronous) -> None:

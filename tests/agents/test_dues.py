@@ -1,0 +1,22 @@
+"""Ticks at which messages are due, from the schedule's periods and delays."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agents.dues import Dues
+from configs.brief import Schedule
+
+EVERY = st.integers(1, 40)
+
+
+@given(EVERY, EVERY, st.integers(0, 50), st.integers(-60, 400))
+def test_due_is_what_was_shared_or_taken_its_delay_ago(
+    share_every: int, localise_every: int, delay: int, tick: int
+) -> None:
+    schedule = Schedule(1_000_000, 400, 60, share_every, localise_every, delay, 2.0, 20.0)
+    dues = Dues(schedule)
+    shared = {k for k in range(401) if k % share_every == 0}
+    taken = {k for k in range(401) if k % localise_every == 0}
+    assert dues.shares(tick) == schedule.shares(tick) == (tick in shared)
+    posed, placed = tick - delay in taken, tick - max(delay, 1) in taken
+    assert dues.owes(tick) == (tick in shared or posed or placed)
