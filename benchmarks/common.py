@@ -15,26 +15,48 @@ from typing import Any, TypeVar
 T = TypeVar("T", float, dict[str, float])
 
 
-def arguments(text: str) -> argparse.Namespace:
-    """--quick, with the script's docstring as its help."""
+def arguments(text: str, *, against: bool = False) -> argparse.Namespace:
+    """--quick, and --against where it is offered, with the script's docstring as its help."""
     parser = argparse.ArgumentParser(
         description=text, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
         "--quick", action="store_true", help="one short round, for a first look: no ranges"
     )
-    return parser.parse_args()
+    if against:
+        parser.add_argument(
+            "--against",
+            action="append",
+            default=[],
+            type=Path,
+            metavar="FOLDER",
+            help="another checkout, set up there by `uv sync`; may be repeated",
+        )
+    options = parser.parse_args()
+    for checkout in options.against if against else ():
+        if not _python(checkout).is_file():
+            parser.error(f"--against {checkout}: no {_python(checkout)}; `uv sync` there makes it")
+    return options
 
 
-def run(scenario: str, *options: str) -> dict[str, Any]:
-    """The summary of a run over processes (or as `options` say), nothing else printed."""
+def _python(checkout: Path) -> Path:
+    return checkout.absolute() / ".venv" / "bin" / "python"
+
+
+def run(scenario: str, *options: str, checkout: Path | None = None) -> dict[str, Any]:
+    """The summary of a run over processes (or as `options` say), nothing else printed.
+
+    `checkout`: of another version, with its own environment.
+    """
+    python = sys.executable if checkout is None else str(_python(checkout))
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "fleetloop", "run", scenario, "--json", "--no-report"]
+        command = [python, "-m", "fleetloop", "run", scenario, "--json", "--no-report"]
         done = subprocess.run(
             [*command, "--out", f"{folder}/run", *options],
             capture_output=True,
             text=True,
             timeout=600,
+            cwd=checkout,
         )
         if done.returncode not in (0, 1):
             sys.exit(

@@ -16,7 +16,9 @@ one core, networks, more than one machine.
 """
 
 import tempfile
+from collections.abc import Sequence
 from functools import partial
+from pathlib import Path
 
 import barrier
 from common import (
@@ -36,12 +38,15 @@ OURS = "Fleetloop"
 SIZES = (4, 16)
 
 
-def fleetloop(scenario: str, seconds: float) -> float:
+def fleetloop(scenario: str, seconds: float, checkout: Path | None = None) -> float:
     """Ticks per second of a run."""
-    return ticks_per_second(run(scenario, "--duration", str(seconds)))
+    options = ("--duration", str(seconds), "--set", "expect=[]")
+    return ticks_per_second(run(scenario, *options, checkout=checkout))
 
 
-def measured(n: int, rounds: int, seconds: float, peers: Peers) -> dict[str, list[float]]:
+def measured(
+    n: int, rounds: int, seconds: float, peers: Peers, against: Sequence[Path]
+) -> dict[str, list[float]]:
     """Rounds or ticks per second with N controllers, by case."""
     with tempfile.TemporaryDirectory() as folder:
         scenario = "paper" if n == 4 else fleet(folder, n, 30.0)
@@ -50,19 +55,23 @@ def measured(n: int, rounds: int, seconds: float, peers: Peers) -> dict[str, lis
             "raw barrier, free": partial(barrier.rounds_per_second, n, seconds, pinned=False),
             OURS: partial(fleetloop, scenario, 5 * seconds if n == 4 else seconds),
         }
+        for checkout in against:
+            cases[f"{OURS} in {checkout}"] = partial(
+                fleetloop, scenario, 5 * seconds if n == 4 else seconds, checkout
+            )
         cases |= {name: partial(measure, n, seconds) for name, measure in peers.items()}
         return interleaved(rounds, cases)
 
 
 def main() -> None:
     """Measure and print."""
-    options = arguments(__doc__)
+    options = arguments(__doc__, against=True)
     rounds, seconds = (1, 1.0) if options.quick else (5, 2.0)
     print(machine())
     peers = available_peers()
     rows = []
     for n in SIZES:
-        results = measured(n, rounds, seconds, peers)
+        results = measured(n, rounds, seconds, peers, options.against)
         if peers:
             best = [max(values) for values in zip(*(results[name] for name in peers), strict=True)]
             results[f"the best of {', '.join(peers)}"] = best
