@@ -17,17 +17,18 @@ counts as silent: in lockstep the wait times out with its name, in real time it 
 """
 
 from collections import Counter
+from typing import Final
 
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.network.refused_messages import Refusals
 from configs.brief import LEAD_TICKS, AgentBrief
 from configs.reach import within_world
 
-LOCALISATION = "the localisation system"
-LEADER = "the leader"
-LATE_MESSAGES_TOLERATED = 5000
+LOCALISATION: Final = "the localisation system"
+LEADER: Final = "the leader"
+LATE_MESSAGES_TOLERATED: Final = 5000
 """Start messages of one sender that may arrive after control has begun; more are a flood."""
-_AHEAD_TICKS = LEAD_TICKS + 2
+_AHEAD_TICKS: Final = LEAD_TICKS + 2
 """A path state is published a tick before it is due, and this robot may be between two ticks."""
 
 

@@ -33,7 +33,7 @@ One class: it is the order in which its parts, in modules of their own, act with
 from collections.abc import Sequence
 from enum import StrEnum
 from math import hypot, inf, isfinite, nan
-from typing import Any
+from typing import Any, Final
 
 from agents.coordination import CoordinationState, Coordinator
 from agents.emulated_network import EmulatedNetwork
@@ -57,10 +57,10 @@ from configs.brief import AgentBrief
 from configs.netem import LOCALISATION, MOST_DELAY_NS
 from configs.signals import AGE_PREFIX
 
-_new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
-_NOWHERE = RobotMotion(nan, nan, nan, nan, nan)
-_NO_REFERENCE = Reference(nan, nan, nan, nan, nan)
-POSE_HISTORY_TICKS = 64
+_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
+_NOWHERE: Final = RobotMotion(nan, nan, nan, nan, nan)
+_NO_REFERENCE: Final = Reference(nan, nan, nan, nan, nan)
+POSE_HISTORY_TICKS: Final = 64
 """Longest age of a fix in real time [ticks]."""
 
 

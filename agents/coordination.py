@@ -13,16 +13,16 @@ robot's motion.
 """
 
 from math import isfinite, nan
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from agents.neighbours import Sums
 from configs.sections import Coordination
 
 Matrix = list[list[float]]
 Rows = tuple[tuple[float, ...], ...]
-MOST_MAPS = 256
+MOST_MAPS: Final = 256
 """Maps kept, one for each d and h_i: many neighbours that come and go make more."""
-_new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
+_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
 class CoordinationState(NamedTuple):

@@ -18,7 +18,7 @@ sent from as far as the robots were apart at the last poses that both have.
 
 from collections.abc import Collection, Mapping
 from math import hypot, nan
-from typing import Any
+from typing import Any, Final
 
 from bridge.netem.channel import Channel
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
@@ -27,7 +27,7 @@ from configs.edges import LEADER
 from configs.leader_speed import speed_at
 from configs.netem import LOCALISATION
 
-HERE = ""
+HERE: Final = ""
 """This robot among those that have poses."""
 
 

@@ -7,6 +7,7 @@ first tick. Torque is sent in one place only, in phase DRIVING and in a tick wit
 from collections.abc import Callable, Sequence
 from enum import Enum, auto
 from math import isfinite
+from typing import Final
 
 from agents.limits import TorqueLimiter
 from agents.rearming import Rearming
@@ -40,8 +41,8 @@ class TorqueOutcome(Enum):
     RESTARTED = auto()  # withheld, and the law restarts with the next tick
 
 
-UNCHANGED = TorqueOutcome.UNCHANGED
-_DRIVING = Phase.DRIVING
+UNCHANGED: Final = TorqueOutcome.UNCHANGED
+_DRIVING: Final = Phase.DRIVING
 
 
 class Guard:

@@ -17,6 +17,7 @@ were all started again. The others hear it then: the graph has a path from the l
 """
 
 from collections.abc import Callable
+from typing import Final
 
 from agents.coordination import CoordinationState, Coordinator
 from agents.in_edges import InEdges
@@ -26,7 +27,7 @@ from configs.brief import AgentBrief
 from configs.edges import FOREVER
 from configs.leader_speed import speed_at
 
-_NOBODY = Sums(0, 0.0, 0.0, 0.0)
+_NOBODY: Final = Sums(0, 0.0, 0.0, 0.0)
 
 
 class Joining:

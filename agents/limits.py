@@ -11,8 +11,9 @@ does not learn the limit.
 """
 
 from math import exp, inf
+from typing import Final
 
-FORGET_S = 0.2
+FORGET_S: Final = 0.2
 
 
 class TorqueLimiter:

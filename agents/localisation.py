@@ -17,11 +17,12 @@ a fix is taken as the nearest angle of its direction.
 
 from collections import deque
 from math import cos, pi, sin
+from typing import Final
 
 from agents.laws.interface import RobotMotion
 from configs.brief import Wheels
 
-_new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
+_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
 class Localiser:

@@ -22,12 +22,12 @@ from collections import deque
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from math import nan
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from configs.edges import InEdge
 from configs.sections import Coordination
 
-_new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
+_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
 class Sums(NamedTuple):

@@ -15,7 +15,7 @@ method `jet(s)` that returns the jets of x and y; for an offset, those of ahead 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from math import atan2, cos, isfinite, sin, sqrt
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from agents.laws.failure import ShapeError, number, raised
 from agents.laws.interface import Reference, RobotPath
@@ -23,7 +23,7 @@ from configs.curves import FormationOffset, ReferencePath, SplinePath, VaryingOf
 from configs.paths import Circle, Cosine, FigureEight, Line, Structure, World
 from configs.plugins import Choice, file_of
 
-_new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
+_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
 class Jet(NamedTuple):

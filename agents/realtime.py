@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import nan
+from typing import Final
 
 import can
 
@@ -40,13 +41,13 @@ from bridge.process.clock import SYSTEM_CLOCK, Clock, implausible_start, monoton
 from bridge.process.lifecycle import Stop
 from configs.roles import LAUNCHER
 
-ARRIVALS_PER_TICK = 64
+ARRIVALS_PER_TICK: Final = 64
 """Most messages per tick, besides two for every in-neighbour: the rest waits."""
-BACKLOG_S = 1.0
+BACKLOG_S: Final = 1.0
 """Longest time for dropping the backlog of the bus; no interface queues more."""
 
 
-_STALL_NS = round(STALL_S * 1e9)
+_STALL_NS: Final = round(STALL_S * 1e9)
 
 
 @dataclass(slots=True)

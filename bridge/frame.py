@@ -8,14 +8,14 @@ plain number.
     bit 29  ERR  error frame; the identifier holds error classes; never together with RTR
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-EFF = 0x8000_0000
-RTR = 0x4000_0000
-ERR = 0x2000_0000
-ID_MASK_11 = 0x7FF
-ID_MASK_29 = 0x1FFF_FFFF
-MAX_DATA = 8
+EFF: Final = 0x8000_0000
+RTR: Final = 0x4000_0000
+ERR: Final = 0x2000_0000
+ID_MASK_11: Final = 0x7FF
+ID_MASK_29: Final = 0x1FFF_FFFF
+MAX_DATA: Final = 8
 
 
 class Frame(NamedTuple):

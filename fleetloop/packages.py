@@ -17,7 +17,7 @@ from types import ModuleType
 
 NAMES = ("agents", "bridge", "configs", "plant")
 HOME = Path(__file__).resolve().parent.parent
-_OF_CLIENTS = ("bridge", "configs")
+_OF_CLIENTS = ("configs", "bridge")  # in the order of their imports
 
 
 def prefer_own() -> None:

@@ -17,6 +17,7 @@ the scenario, or by an order (`plant.orders`), which may also end one before its
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum, auto
+from typing import Final
 
 from bridge.can_bus.hub import Hub
 from bridge.network.link import Publisher
@@ -26,7 +27,7 @@ from configs.edges import FOREVER
 from configs.events import Event
 from configs.faults.absences import Absence, overlapping
 
-_AT_ONCE = -FOREVER
+_AT_ONCE: Final = -FOREVER
 
 
 class State(Enum):

@@ -8,6 +8,7 @@ other protocols, are then no robot's.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 from bridge.drives import protocol
 from bridge.drives.interface import DriveNode
@@ -19,7 +20,7 @@ from configs.faults.buses import FrameFault, NodeBabbling
 from plant.effects import of_side
 from plant.robot import EmulatedRobot
 
-BABBLE = bytes(8)
+BABBLE: Final = bytes(8)
 """Data of the frames of a node that babbles."""
 
 
@@ -76,7 +77,7 @@ def _babbling(acting: _Acting, on: Disturbance) -> None:
         on.babbling += [(drive, frame, period_ns) for drive in acting.drives]
 
 
-BUS_EFFECTS: Mapping[str, Callable[[_Acting, Disturbance], None]] = {
+BUS_EFFECTS: Final[Mapping[str, Callable[[_Acting, Disturbance], None]]] = {
     "can_drop": _frames,
     "can_duplicate": _frames,
     "can_corrupt": _frames,

@@ -9,10 +9,10 @@ their encoders any more: they disarm with that error, which nothing clears, so t
 controller stops it. Robots beside it notice nothing.
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-FASTEST_WHEEL_RAD_S = 1e6
-FARTHEST = 1e9
+FASTEST_WHEEL_RAD_S: Final = 1e6
+FARTHEST: Final = 1e9
 """A float still tells a tenth of a micrometre apart there, and an encoder its counts."""
 
 

@@ -10,18 +10,18 @@ is stuck, the counts that an encoder has lost) as long as the effect lasts.
 """
 
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from configs.faults.base import Side
 from configs.sections import Body
 
 _T = TypeVar("_T")
 
-_LEAST_MASS = 1e-3
+_LEAST_MASS: Final = 1e-3
 """Part of its own mass and inertia that a body keeps, whatever is ordered during a run."""
-_LEAST_ROLL = 0.01
+_LEAST_ROLL: Final = 0.01
 _RADII = (0.01, 100.0)
-_MOST_FRICTION = 1e4
+_MOST_FRICTION: Final = 1e4
 
 
 def of_side(right_left: tuple[_T, _T], side: Side) -> tuple[_T, ...]:

@@ -28,15 +28,16 @@ count where it is.
 
 from math import copysign, hypot, isfinite, pi
 from random import Random
+from typing import Final
 
 from configs import powertrain
 from plant.effects import WheelEffects
 
-PER_RADIAN = 1.0 / (2.0 * pi)
+PER_RADIAN: Final = 1.0 / (2.0 * pi)
 """Revolutions per radian; also rev/s per rad/s."""
-_LARGEST_COUNT = 2.0**52
+_LARGEST_COUNT: Final = 2.0**52
 """Beyond it a float doesn't tell counts apart, so the count stays there."""
-_EARLY = 1e-9
+_EARLY: Final = 1e-9
 """A sample that is due within this part of a loop period is taken: sums of steps are rounded."""
 
 

@@ -9,7 +9,7 @@ Those of faults of frames and CAN controllers are in `plant.disturbance`.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import hypot
-from typing import Any
+from typing import Any, Final
 
 from bridge.fault_schedule import FaultSchedule
 from configs.brief import Schedule
@@ -164,7 +164,7 @@ def _localisation_jump(robot: EmulatedRobot, fault: Any, _: int) -> None:
     robot.jump_pose(fault.x_m, fault.y_m, fault.theta_rad)
 
 
-EFFECTS: Mapping[str, Effect] = {
+EFFECTS: Final[Mapping[str, Effect]] = {
     "torque_stuck": _torque_stuck,
     "torque_half": _torque_half,
     "torque_zero": _torque_zero,
@@ -186,7 +186,7 @@ EFFECTS: Mapping[str, Effect] = {
     "localisation_drift": _localisation_drift,
 }
 """By kind."""
-STRIKES: Mapping[str, Strike] = {
+STRIKES: Final[Mapping[str, Strike]] = {
     "drive_estop": _drive_estop,
     "drive_watchdog": _drive_watchdog,
     "drive_reboot": _drive_reboot,

@@ -5,11 +5,12 @@ that are linear in (v, ω), so they come from the same stages.
 """
 
 from math import cos, sin
+from typing import Final
 
 from plant.body import RigidBody, State
 from plant.divergence import FARTHEST
 
-_new = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
+_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
 def rk4(

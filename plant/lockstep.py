@@ -20,7 +20,7 @@ One class, as lookahead, pace and absent controllers decide together which bus g
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from bridge.can_bus.hub import Hub
 from bridge.network.link import Publisher
@@ -40,17 +40,17 @@ from plant.orders import PlantOrders
 from plant.pacing import Pacing
 from plant.robot import EmulatedRobot
 
-REPORT_EVERY_NS = 100_000_000
-WAIT_S = LOOK_S
+REPORT_EVERY_NS: Final = 100_000_000
+WAIT_S: Final = LOOK_S
 """Longest wait for an answer before absent controllers are looked for."""
-_STALL_NS = int((LOOK_S + STALL_S) * 1e9)
-ANSWER_SHARE = 0.9
+_STALL_NS: Final = int((LOOK_S + STALL_S) * 1e9)
+ANSWER_SHARE: Final = 0.9
 """Part of the tick deadline that the plant waits for answers: before that, controllers name a
 silent peer; after it, the launcher names the plant."""
 
-_WAITS_NS = 100_000_000
+_WAITS_NS: Final = 100_000_000
 """A controller that answers later than this is said to be waited for."""
-STANDSTILL_SHARE = 0.25
+STANDSTILL_SHARE: Final = 0.25
 """Part of the tick deadline after which controllers are told again that time stands still."""
 
 

@@ -34,13 +34,14 @@ A demand or speed that isn't finite acts as the largest one, NaN as 0: what come
 
 from math import exp, expm1, inf, sqrt
 from random import Random
+from typing import Final
 
 from configs.brief import MotorModel
 from plant.effects import WheelEffects
 from plant.supply import Supply
 
-_MODULATION = sqrt(3.0) / 2.0
-FASTEST_SHAFT_RAD_S = 1e12
+_MODULATION: Final = sqrt(3.0) / 2.0
+FASTEST_SHAFT_RAD_S: Final = 1e12
 """Behind the largest gear ratio, 10⁶, of a wheel at `plant.divergence.FASTEST_WHEEL_RAD_S`."""
 
 

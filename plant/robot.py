@@ -16,6 +16,7 @@ nothing on the way is asked for them: what they need is made with them.
 
 from collections.abc import Sequence
 from math import ceil, inf
+from typing import Final
 
 from bridge.drives import protocol
 from bridge.drives.interface import DriveMeasurements, DriveNode
@@ -31,10 +32,10 @@ from plant.integrate import rk4
 from plant.localisation import FaultyLocalisation
 from plant.powertrain import powertrain
 
-MEASURE_EVERY_S = 0.001
+MEASURE_EVERY_S: Final = 0.001
 """Shortest period at which a drive's firmware reads its thermistors and currents."""
-_SHORTEST_STEP_S = 1e-5
-_STABLE = 2.0
+_SHORTEST_STEP_S: Final = 1e-5
+_STABLE: Final = 2.0
 """Friction's rate by the step: explicit steps are stable below 2.78."""
 
 

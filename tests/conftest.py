@@ -9,6 +9,17 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+# The tests' own process runs the sources, whose classes a test may derive from; what it starts runs
+# what is installed. First of all imports of ours. With FLEETLOOP_PURE=0 it runs what is installed.
+_PURE = os.environ.get("FLEETLOOP_PURE")
+os.environ["FLEETLOOP_PURE"] = _PURE or "1"
+import configs.compiled  # noqa: E402, F401
+
+if _PURE is None:
+    del os.environ["FLEETLOOP_PURE"]
+else:
+    os.environ["FLEETLOOP_PURE"] = _PURE
+
 pytest_plugins = ("support.browser", "support.wall_clock", "support.workers")
 
 # In the background of a script, or under nohup, these are ignored, and all children inherit that.

@@ -12,13 +12,14 @@ nothing. `consumed` is a total, so the next CREDIT packet replaces a lost or lat
 """
 
 import struct
+from typing import Final
 
 from bridge.can_bus.packet import MAX_BYTES
 
-INITIAL_CREDIT_BYTES = 128 * 1024
-LEAST_BYTES = 256
-CREDIT = 0x40
-_CREDIT = struct.Struct("<B7xQ")
+INITIAL_CREDIT_BYTES: Final = 128 * 1024
+LEAST_BYTES: Final = 256
+CREDIT: Final = 0x40
+_CREDIT: Final = struct.Struct("<B7xQ")
 
 
 def cost(packet: bytes) -> int:

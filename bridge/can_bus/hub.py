@@ -27,6 +27,7 @@ emulation of the wire reads with `submitted` the frames that clients want to sen
 
 import socket
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 from bridge.can_bus.connection import Bus, Connection
 from bridge.can_bus.packet import (
@@ -47,9 +48,9 @@ from bridge.frame import ERR, Frame
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.waiting import readable
 
-UNTAKEN = 100_000
-_NEVER = 1 << 62
-_NOBODY: Mapping[str, Mapping[str, str]] = {}
+UNTAKEN: Final = 100_000
+_NEVER: Final = 1 << 62
+_NOBODY: Final[Mapping[str, Mapping[str, str]]] = {}
 
 
 class Hub:

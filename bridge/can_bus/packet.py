@@ -27,26 +27,26 @@ The data of remote frames is zero.
 
 import struct
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from bridge.frame import ERR, ID_MASK_11, MAX_DATA, RTR, Frame, flaw
 
-VERSION = 3
+VERSION: Final = 3
 HELLO, WELCOME, REFUSED, FRAMES, BYE, LOST = 1, 2, 3, 4, 5, 6
 SYNCHRONOUS, OWN, DONE, BATCHED, MORE = 1, 2, 4, 8, 16
-MAX_FRAMES = 1024
-MAX_BYTES = 16 + 20 * MAX_FRAMES
-LONGEST_BEFORE_NS = 2**32 - 1
+MAX_FRAMES: Final = 1024
+MAX_BYTES: Final = 16 + 20 * MAX_FRAMES
+LONGEST_BEFORE_NS: Final = 2**32 - 1
 
-_new = tuple.__new__  # of the named tuples below, past their constructor: this is the hot path
-_HEADER = struct.Struct("<BBHIq")
-_FRAME = struct.Struct("<IB3x8s")
-_ONE = struct.Struct("<BBHIqIB3x8s")
-_TWO = struct.Struct("<BBHIqIB3x8sIB3x8s")
+_new: Final = tuple.__new__  # of the tuples below, past their constructor: the hot path
+_HEADER: Final = struct.Struct("<BBHIq")
+_FRAME: Final = struct.Struct("<IB3x8s")
+_ONE: Final = struct.Struct("<BBHIqIB3x8s")
+_TWO: Final = struct.Struct("<BBHIqIB3x8sIB3x8s")
 
 Key = str | int
 """A client of a bus: the name of the robot that it controls in lockstep, else a number."""
-_NOBODY: Mapping[Key, Frame] = {}
+_NOBODY: Final[Mapping[Key, Frame]] = {}
 
 
 class Stamped(NamedTuple):

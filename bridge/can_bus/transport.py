@@ -17,7 +17,7 @@ from bridge.can_bus.packet import MAX_BYTES, WELCOME, Packet, decode
 from bridge.process.waiting import readable
 from configs.errors import InfrastructureError, ScenarioError
 
-FINE_S = 0.05
+FINE_S = 0.03
 """Waits below this are kept to the microsecond; the kernel's own bound counts in its ticks."""
 _TIMEVAL = struct.Struct("ll")
 
@@ -41,7 +41,7 @@ class Transport(Protocol):
         """Leave; sent packets arrive, and waits in other threads end. Idempotent."""
 
 
-class JoinError(OSError):
+class JoinError(Exception):
     """A client could not join a bus; the text has the reason."""
 
 

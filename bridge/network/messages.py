@@ -21,14 +21,14 @@ or one of `bridge.network.status`.
     ClockPong      [1, sent_ns, received_ns, answered_ns]        @pong/<process>
 """
 
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from bridge.network.packing import MAX_BYTES, finite, ints, pack, printable, unpack
 from bridge.network.status import Status, status_of
 from configs.events import KINDS, MAX_EVENT_TEXT, Event
 from configs.leader_speed import SpeedChange, in_order
 
-MOST_BYTES = {
+MOST_BYTES: Final = {
     "path": 128,
     "silence": 128,
     "pose": 128,
@@ -46,9 +46,9 @@ MOST_BYTES = {
 }
 """Of what others than the launcher say, by `bridge.network.keys.kind`: several times what they
 need."""
-PROGRESS_EVERY_S = 0.2
+PROGRESS_EVERY_S: Final = 0.2
 """Longest time from one progress message of a process to the next: its signs of life [wall s]."""
-_MAX_CHANGES = 10_000
+_MAX_CHANGES: Final = 10_000
 
 
 class PathState(NamedTuple):

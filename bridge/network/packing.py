@@ -5,14 +5,14 @@ exception. Text is for people: what doesn't print, such as a terminal's escapes,
 """
 
 from math import isfinite
-from typing import Any
+from typing import Any, Final
 
 import msgpack
 
-VERSION = 1
-MAX_BYTES = 1 << 18
+VERSION: Final = 1
+MAX_BYTES: Final = 1 << 18
 """Of any message."""
-_MAX_INT = 1 << 63
+_MAX_INT: Final = 1 << 63
 
 
 def pack(*fields: object) -> bytes:

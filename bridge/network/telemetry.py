@@ -6,6 +6,7 @@ over Zenoh.
 
 import struct
 from collections.abc import Callable, Sequence
+from typing import Final
 
 from bridge.frame import Frame
 from bridge.network.link import Publisher
@@ -19,11 +20,11 @@ def row_of(signals: Sequence[Signal]) -> struct.Struct:
     return struct.Struct(f"<{len(signals)}d")
 
 
-PLANT_ROW = row_of(PLANT_SIGNALS)
+PLANT_ROW: Final = row_of(PLANT_SIGNALS)
 
-BLOCK_TICKS = 128
+BLOCK_TICKS: Final = 128
 """Rows that are gathered before a block is sent, unless it is old before."""
-LOOKS = 4
+LOOKS: Final = 4
 """Looks at a block's age within the time in which it is handed on."""
 
 
@@ -140,12 +141,12 @@ class RowLooks:
             buffer.look(now_ns)
 
 
-FRAME_ROW = struct.Struct("<qIBB2x8s")
+FRAME_ROW: Final = struct.Struct("<qIBB2x8s")
 """A frame that crossed a bus: end in bus time [ns], SocketCAN's identifier, length, flags, data."""
-_TWO_FRAMES = struct.Struct("<qIBB2x8sqIBB2x8s")
-FROM_DRIVE = 1
+_TWO_FRAMES: Final = struct.Struct("<qIBB2x8sqIBB2x8s")
+FROM_DRIVE: Final = 1
 """Flag of a frame that a drive sent."""
-BLOCK_FRAMES = 1024
+BLOCK_FRAMES: Final = 1024
 
 Tap = Callable[[int, Sequence[Frame], int], None]
 """Told what crosses a bus: end in bus time [ns], frames, flags."""

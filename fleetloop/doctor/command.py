@@ -9,6 +9,7 @@ from dataclasses import asdict
 from rich.text import Text
 
 from bridge.can_bus import sockets
+from configs import compiled
 from configs.errors import ExitStatus
 from fleetloop.check.finding import Finding, worst
 from fleetloop.doctor import judgement, probes
@@ -81,7 +82,7 @@ def findings(rate_hz: float | None, seconds: float) -> Iterator[Finding]:
     yield judgement.can_interfaces(
         probes.can_interfaces(), probes.can_modules(), registered=probes.registered()
     )
-    yield judgement.versions(probes.versions(), compiled=probes.compiled())
+    yield judgement.versions(probes.versions(), compiled.how())
     yield judgement.packages(probes.package_problem())
     yield judgement.leftovers(probes.dead_runs(), probes.lone_roles())
     place = probes.place_of_runs()

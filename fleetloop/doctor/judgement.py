@@ -202,10 +202,10 @@ def scouting() -> Finding:
     return Finding("ok", "multicast scouting", value)
 
 
-def versions(installed: Sequence[tuple[str, str]], *, compiled: bool) -> Finding:
-    """Versions, and whether our modules are machine code."""
+def versions(installed: Sequence[tuple[str, str]], how: str) -> Finding:
+    """Versions, and how what runs every tick runs: compiled, or pure Python and why."""
     said = ", ".join(f"{name} {version}" for name, version in installed)
-    return Finding("ok", "versions", f"{said}; {'compiled' if compiled else 'pure Python'}")
+    return Finding("ok", "versions", f"{said}; {how}")
 
 
 def packages(problem: str) -> Finding:

@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from importlib.metadata import entry_points, version
 from pathlib import Path
 
-import agents.agent
 from bridge.can_bus import sockets
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.kernel_stat import kernel_stat
@@ -160,11 +159,6 @@ def versions() -> list[tuple[str, str]]:
     """Of what counts."""
     ours = [(name, version(name)) for name in ("fleetloop", "eclipse-zenoh", "python-can")]
     return [*ours, ("Python", platform.python_version())]
-
-
-def compiled() -> bool:
-    """Whether the controller is machine code."""
-    return not (agents.agent.__file__ or "").endswith(".py")
 
 
 def package_problem() -> str:

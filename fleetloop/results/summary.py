@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from configs.compiled import WHY_PURE
 from configs.events import KINDS, Event, in_order, told
 from configs.leader_speed import corners, speed_at
 from configs.membership import Membership
@@ -132,6 +133,7 @@ def summarise(record: Record, scenario: Scenario, stats: RunStats) -> Summary:
         "profile_us_per_tick": _profile(stats, ticks),
         "realtime": _realtime(controllers, stats) if stats.realtime and ticks else None,
         "seed": scenario.seed,
+        "compiled": not WHY_PURE,
         "versions": {"python": platform.python_version()}
         | {package: version(package) for package in _PACKAGES},
     }

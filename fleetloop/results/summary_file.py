@@ -217,6 +217,7 @@ class RunSummary(_Table):
     clock_offsets: dict[str, ClockOffset] = {}
     machine: MachineSummary | None
     seed: int
+    compiled: bool = False
     versions: dict[str, str]
 
     @model_validator(mode="after")

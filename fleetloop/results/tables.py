@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from bridge.process.profile import PARTS
+from configs import compiled
 from configs.roles import short_name
 from fleetloop.results.summary import ERRORS, Summary
 from fleetloop.settling import FINAL_S
@@ -77,7 +78,8 @@ def print_report(page: Path) -> None:
 def _profile(profile: dict[str, dict[str, float]]) -> Table:
     """Processor time per tick, processes by parts."""
     parts = [part for part in PARTS if any(part in shares for shares in profile.values())]
-    title = "processor time per tick [µs]; bus with its system calls, Zenoh with its threads"
+    title = "processor time per tick [µs]; bus with its system calls, Zenoh with its threads; "
+    title += compiled.how()
     table = Table(title=title, box=table_box(), pad_edge=False)
     table.add_column("process", no_wrap=True)
     for name in (*parts, "all"):

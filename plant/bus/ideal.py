@@ -12,6 +12,7 @@ Faults of frames and nodes act at the drives' end (`plant.bus.interference`).
 """
 
 from collections.abc import Sequence
+from typing import Final
 
 from bridge.frame import Frame
 from bridge.network.telemetry import FROM_DRIVE, Tap
@@ -21,7 +22,7 @@ from plant.bus.port import ALL, Begin, Port, Steps
 from plant.faults import BusFaults
 from plant.robot import EmulatedRobot
 
-MOST_A_TICK = 1024
+MOST_A_TICK: Final = 1024
 
 
 class IdealBus:

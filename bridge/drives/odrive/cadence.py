@@ -7,9 +7,11 @@ shows in the ratio alone, which is near 2. Windows are a second or longer, so wh
 stood still for a fifth of it delivers at once stays below `LIMIT`.
 """
 
-WINDOW_NS = 1_000_000_000
-WINDOW_PERIODS = 10
-LIMIT = 1.5
+from typing import Final
+
+WINDOW_NS: Final = 1_000_000_000
+WINDOW_PERIODS: Final = 10
+LIMIT: Final = 1.5
 
 
 class Cadence:

@@ -19,6 +19,7 @@ here, and torques at the wheel torques at the shaft, nowhere else.
 from collections.abc import Callable, Sequence
 from enum import Enum, auto
 from functools import partial
+from typing import Final
 
 from bridge.drives.interface import Motion
 from bridge.drives.odrive import frames as f
@@ -28,11 +29,11 @@ from bridge.drives.odrive.remote_axis import NEVER, RemoteAxis
 from bridge.frame import RTR, Frame
 from configs.brief import DriveLink
 
-RETRY_NS = 200_000_000
-REPEAT_NS = 50_000_000
+RETRY_NS: Final = 200_000_000
+REPEAT_NS: Final = 50_000_000
 """Period of IDLE requests to a drive that should be idle and reports another state."""
-FLOAT32_MAX = 3.4e38
-_FOREIGN = (
+FLOAT32_MAX: Final = 3.4e38
+_FOREIGN: Final = (
     Command.SET_AXIS_STATE,
     Command.SET_CONTROLLER_MODE,
     Command.SET_INPUT_POS,
@@ -40,9 +41,9 @@ _FOREIGN = (
     Command.SET_INPUT_TORQUE,
     Command.SET_LIMITS,
 )
-_PACK_TWO = f.TWO_FLOATS.pack
-_new = tuple.__new__  # of a frame, past its constructor: this is the hot path
-_UNPACK_TWO = f.TWO_FLOATS.unpack
+_PACK_TWO: Final = f.TWO_FLOATS.pack
+_new: Final = tuple.__new__  # of a frame, past its constructor: this is the hot path
+_UNPACK_TWO: Final = f.TWO_FLOATS.unpack
 
 _Handler = Callable[[bytes | bytearray, int], None]
 

@@ -5,6 +5,7 @@ limits and gains) change nothing; all values of a message are taken, or none.
 """
 
 from collections.abc import Callable, Mapping
+from typing import Final
 
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import Command
@@ -83,7 +84,7 @@ def _two(first: str, second: str) -> Setter:
     return act
 
 
-SETTERS: Mapping[int, Setter] = {
+SETTERS: Final[Mapping[int, Setter]] = {
     Command.SET_AXIS_STATE: _axis_state,
     Command.SET_CONTROLLER_MODE: _controller_mode,
     Command.SET_INPUT_POS: _input_pos,

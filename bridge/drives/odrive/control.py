@@ -22,15 +22,17 @@ don't exist here: `exists` says so and the axis disarms. (2), (4), (5) aren't th
 drive.
 """
 
+from typing import Final
+
 from bridge.drives.odrive.frames import ControlMode, InputMode
 from bridge.drives.odrive.parameters import Parameters
 from bridge.drives.odrive.trapezoid import Trapezoid, plan
 
-_LOOP_HZ = 8000.0
-_INTEGRATOR_KEEP = 0.99
+_LOOP_HZ: Final = 8000.0
+_INTEGRATOR_KEEP: Final = 0.99
 """Factor on z per loop period while τ is limited."""
-_CONTROL_MODES = frozenset((ControlMode.TORQUE, ControlMode.VELOCITY, ControlMode.POSITION))
-_INPUT_MODES = frozenset(InputMode) - {InputMode.MIRROR, InputMode.TUNING}
+_CONTROL_MODES: Final = frozenset((ControlMode.TORQUE, ControlMode.VELOCITY, ControlMode.POSITION))
+_INPUT_MODES: Final = frozenset(InputMode) - {InputMode.MIRROR, InputMode.TUNING}
 
 
 def exists(control_mode: int, input_mode: int) -> bool:

@@ -9,13 +9,13 @@ Hosts send other lengths than the table's: missing bytes read as zero, extra one
 
 import struct
 from enum import IntEnum, IntFlag
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from bridge.frame import RTR, Frame
 
-UNADDRESSED = 0x3F
-MAX_NODE = 0x3E
-BITS = 5
+UNADDRESSED: Final = 0x3F
+MAX_NODE: Final = 0x3E
+BITS: Final = 5
 
 
 class Command(IntEnum):
@@ -150,14 +150,14 @@ class AxisError(IntFlag):
     CALIBRATION_ERROR = 0x4000_0000
 
 
-ONE_FLOAT = struct.Struct("<f")
-TWO_FLOATS = struct.Struct("<ff")
-ONE_U32 = struct.Struct("<I")
-TWO_U32 = struct.Struct("<II")
-HEARTBEAT = struct.Struct("<IBBBB")  # axis error, state, procedure result, flags, reserved
-VERSION = struct.Struct("<8B")
-SDO = struct.Struct("<BHB")  # opcode (0 in replies), endpoint, reserved; the value follows
-INPUT_POS = struct.Struct("<fhh")  # rev, 0.001 rev/s, 0.001 N·m
+ONE_FLOAT: Final = struct.Struct("<f")
+TWO_FLOATS: Final = struct.Struct("<ff")
+ONE_U32: Final = struct.Struct("<I")
+TWO_U32: Final = struct.Struct("<II")
+HEARTBEAT: Final = struct.Struct("<IBBBB")  # axis error, state, procedure result, flags, reserved
+VERSION: Final = struct.Struct("<8B")
+SDO: Final = struct.Struct("<BHB")  # opcode (0 in replies), endpoint, reserved; the value follows
+INPUT_POS: Final = struct.Struct("<fhh")  # rev, 0.001 rev/s, 0.001 N·m
 
 
 class Heartbeat(NamedTuple):

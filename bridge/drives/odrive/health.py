@@ -14,13 +14,14 @@ thermistor.cpp, motor.cpp, controller.cpp; names of the errors are 0.6's.
 """
 
 from math import exp, pi
+from typing import Final
 
 from bridge.drives.interface import DriveMeasurements
 from bridge.drives.odrive.frames import AxisError
 from bridge.drives.odrive.model import AxisModel
 
-TRIP_K = 5.0
-_POWER_BANDWIDTH_RAD_S = 20.0
+TRIP_K: Final = 5.0
+_POWER_BANDWIDTH_RAD_S: Final = 20.0
 
 
 def derating(celsius: float, model: AxisModel) -> float:

@@ -5,6 +5,7 @@ that the scenario makes cyclic. Payloads are those of a moving robot, at the sha
 """
 
 from collections.abc import Sequence
+from typing import Final
 
 from bridge.drives.interface import CyclicMessage
 from bridge.drives.odrive.frames import (
@@ -18,9 +19,9 @@ from bridge.drives.odrive.frames import (
 from bridge.drives.odrive.model import AxisModel
 from configs.brief import DriveModel
 
-_SAMPLES = 64
-_WHEEL_REV_S = 2.4  # a wheel of 4 cm radius at 0.6 m/s
-_WHEEL_N_M = 0.05
+_SAMPLES: Final = 64
+_WHEEL_REV_S: Final = 2.4  # a wheel of 4 cm radius at 0.6 m/s
+_WHEEL_N_M: Final = 0.05
 
 
 def cyclic_messages(

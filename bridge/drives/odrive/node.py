@@ -24,6 +24,7 @@ A message that is late is sent once; its next is due at the next multiple of its
 
 from collections.abc import Sequence
 from random import Random
+from typing import Final
 
 from bridge.drives.odrive import endpoints, functions
 from bridge.drives.odrive import frames as f
@@ -36,12 +37,12 @@ from bridge.drives.odrive.parameters import FLOAT32_MAX, Parameters
 from bridge.drives.odrive.reports import REPORTS, address, floats
 from bridge.frame import EFF, ERR, RTR, Frame
 
-ANSWER_WITHIN_NS = 20_000_000
+ANSWER_WITHIN_NS: Final = 20_000_000
 """Longest delay of an unaddressed drive's answer to Address."""
-_NONE: Sequence[Frame] = ()
-_UNPACK_FLOAT = f.ONE_FLOAT.unpack
-_PACK_TWO = f.TWO_FLOATS.pack
-_new = tuple.__new__  # of a frame, past its constructor: this is the hot path
+_NONE: Final[Sequence[Frame]] = ()
+_UNPACK_FLOAT: Final = f.ONE_FLOAT.unpack
+_PACK_TWO: Final = f.TWO_FLOATS.pack
+_new: Final = tuple.__new__  # of a frame, past its constructor: this is the hot path
 
 
 class OdriveNode(LocalAxis):

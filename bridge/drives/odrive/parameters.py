@@ -6,12 +6,12 @@ stays. The vendor's defaults come with `AxisModel`.
 
 from dataclasses import dataclass, replace
 from math import inf, isfinite
-from typing import Self
+from typing import Final, Self
 
 from bridge.drives.odrive.frames import Command, ControlMode, InputMode
 from bridge.drives.odrive.model import AxisModel
 
-FLOAT32_MAX = 3.4028234663852886e38
+FLOAT32_MAX: Final = 3.4028234663852886e38
 
 
 @dataclass(slots=True)

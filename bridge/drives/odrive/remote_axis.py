@@ -10,6 +10,7 @@ Requests of other hosts are counted, so that their answers don't count as those 
 """
 
 from math import pi
+from typing import Final
 
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.cadence import LIMIT, Cadence
@@ -18,8 +19,8 @@ from bridge.drives.odrive.model import section_of
 from bridge.frame import Frame
 from configs.brief import DriveLink
 
-NEVER = -(1 << 62)
-PASSING = AxisError.WATCHDOG_TIMER_EXPIRED | AxisError.INITIALIZING
+NEVER: Final = -(1 << 62)
+PASSING: Final = AxisError.WATCHDOG_TIMER_EXPIRED | AxisError.INITIALIZING
 """Errors of a lost connection between drive and host, which a host may clear by itself. All others,
 an e-stop above all, only a person may clear."""
 

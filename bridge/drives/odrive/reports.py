@@ -6,18 +6,19 @@ and the bus has 24 V. What a single can't hold saturates; NaN stays.
 
 from collections.abc import Callable, Mapping
 from math import pi
+from typing import Final
 
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import Command
 from bridge.drives.odrive.local_axis import LocalAxis
 from bridge.drives.odrive.parameters import FLOAT32_MAX
 
-PROTOCOL_VERSION = 2
-HARDWARE = (4, 4, 58)
+PROTOCOL_VERSION: Final = 2
+HARDWARE: tuple[int, int, int] = (4, 4, 58)
 """Product line, version, variant: an ODrive Pro."""
-AMBIENT_C = 25.0
-NOMINAL_V = 24.0
-_pack = f.TWO_FLOATS.pack
+AMBIENT_C: Final = 25.0
+NOMINAL_V: Final = 24.0
+_pack: Final = f.TWO_FLOATS.pack
 
 
 def floats(first: float, second: float) -> bytes:
@@ -122,7 +123,7 @@ def _single(value: float) -> float:
     return min(max(value, -FLOAT32_MAX), FLOAT32_MAX)
 
 
-REPORTS: Mapping[int, Callable[[LocalAxis], bytes]] = {
+REPORTS: Final[Mapping[int, Callable[[LocalAxis], bytes]]] = {
     Command.GET_VERSION: version,
     Command.HEARTBEAT: heartbeat,
     Command.GET_ERROR: error,

@@ -92,7 +92,7 @@ def level_of(finding: Finding | None) -> str:
         (judgement.can_interfaces([], [], registered=True), "ok"),
         (judgement.can_interfaces(["can0"], ["can"], registered=True), "ok"),
         (judgement.can_interfaces(["can0"], ["can"], registered=False), "error"),
-        (judgement.versions([("Python", "3.11.7")], compiled=False), "ok"),
+        (judgement.versions([("Python", "3.11.7")], "compiled"), "ok"),
         (judgement.packages(""), "ok"),
         (judgement.leftovers([], []), "ok"),
         (judgement.leftovers(["a", "b"], []), "ok"),
@@ -130,6 +130,6 @@ def test_the_room_for_names_is_what_a_path_of_a_socket_has() -> None:
 
 def test_versions_say_whether_it_is_compiled() -> None:
     installed = [("fleetloop", "0.1.0"), ("Python", "3.11.7")]
-    assert judgement.versions(installed, compiled=False).value == (
-        "fleetloop 0.1.0, Python 3.11.7; pure Python"
+    assert judgement.versions(installed, "pure Python: so").value == (
+        "fleetloop 0.1.0, Python 3.11.7; pure Python: so"
     )
