@@ -130,6 +130,8 @@ class Run:
                 process.kill()
         if self._process.poll() is None:
             self._process.wait(WAIT_S)
+        for reader in self._readers:
+            reader.join(WAIT_S)
         for stream in (self._process.stdout, self._process.stderr):
             if stream is not None:
                 stream.close()
