@@ -48,8 +48,16 @@ function take(array) {
   showClock(t_s);
   // The answer goes when the browser has painted: a slow one is sent less. To take an answer costs
   // the viewer more than to send a frame, so one that keeps up answers seldom.
-  if (number % (view.every > 1 ? 2 : 6) === 0 || board?.ended) requestAnimationFrame(() => { models.heard.data = {frame: [number]}; });
+  if (number % (view.every > 1 ? 2 : 6) === 0 || board?.ended) requestAnimationFrame(answer);
 }
+
+let answered_to = 0;
+function answer() {
+  const {number} = view.last;
+  if (number > answered_to) models.heard.data = {frame: [answered_to = number]};
+}
+// The viewer waits for an answer before it sends many more: none may be missing.
+setInterval(() => { if (view.last && view.last.number > answered_to) requestAnimationFrame(answer); }, 500);
 
 function keep(rows, count, whole) {
   if (whole) store.rows = 0;
