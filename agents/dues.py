@@ -1,4 +1,4 @@
-"""Ticks at which messages are due at a controller."""
+"""Ticks at which messages are due at controllers."""
 
 from configs.brief import Schedule
 
@@ -18,11 +18,14 @@ class Dues:
         """Whether path states are due at a tick, as `Schedule.shares`."""
         return tick >= 0 and tick % self._share_every == 0
 
+    def localises(self, tick: int) -> bool:
+        """Whether the localisation system takes poses at a tick, as `Schedule.localises`."""
+        return tick >= 0 and tick % self._localise_every == 0
+
     def owes(self, tick: int) -> bool:
         """Whether a pose or path states are due at a tick."""
-        posed, placed = tick - self._pose_delay_ticks, tick - self._place_delay_ticks
         return (
-            (tick >= 0 and tick % self._share_every == 0)
-            or (posed >= 0 and posed % self._localise_every == 0)
-            or (placed >= 0 and placed % self._localise_every == 0)
+            self.shares(tick)
+            or self.localises(tick - self._pose_delay_ticks)
+            or self.localises(tick - self._place_delay_ticks)
         )

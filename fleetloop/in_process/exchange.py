@@ -6,6 +6,7 @@ It goes through the same bytes as over the network, in the same order.
 from collections.abc import Iterable, Sequence
 
 from agents.agent import Agent
+from agents.dues import Dues
 from bridge.network.messages import PathState, PoseFix
 from bridge.network.telemetry import RowBuffer
 from configs.brief import Schedule
@@ -31,8 +32,7 @@ class Exchange:
     ) -> None:
         self._ticks = schedule.ticks
         self._period_ns = schedule.period_ns
-        self._share_every = schedule.share_every
-        self._localise_every = schedule.localise_every
+        self._dues = Dues(schedule)
         self._agents = list(agents)
         self._places = {
             robot.brief.robot: _Place(robot, agent, truth)
@@ -56,7 +56,7 @@ class Exchange:
 
     def share(self, tick: int) -> None:
         """Exchange path states, if they are due at this tick."""
-        if tick >= 0 and tick % self._share_every == 0:
+        if self._dues.shares(tick):
             self._share(tick)
 
     def _share(self, tick: int) -> None:
@@ -73,7 +73,7 @@ class Exchange:
         for place in places:
             if 0 <= tick < self._ticks:
                 place.truth.add(tick, place.robot.row(t_ns * 1e-9))
-            if tick >= 0 and tick % self._localise_every == 0:
+            if self._dues.localises(tick):
                 place.localise(tick, t_ns)
 
 

@@ -18,5 +18,6 @@ def test_due_is_what_was_shared_or_taken_its_delay_ago(
     shared = {k for k in range(401) if k % share_every == 0}
     taken = {k for k in range(401) if k % localise_every == 0}
     assert dues.shares(tick) == schedule.shares(tick) == (tick in shared)
+    assert dues.localises(tick) == schedule.localises(tick) == (tick in taken)
     posed, placed = tick - delay in taken, tick - max(delay, 1) in taken
     assert dues.owes(tick) == (tick in shared or posed or placed)
