@@ -267,7 +267,7 @@ def _lockstep(connections: _Connections, stop: Stop) -> str:
         )
     loop = LockstepLoop(
         connections.agent,
-        bus,
+        bus.client,
         connections.link,
         connections.subscriptions,
         connections.path,

@@ -21,7 +21,7 @@ from agents.guard import Phase
 from agents.process_faults import ProcessFaults
 from agents.status import Narrator
 from agents.subscriptions import Subscriptions
-from bridge.can_bus.interface import FleetloopBus, TimedFrame
+from bridge.can_bus.client import BusClient, TimedFrame
 from bridge.frame import Frame
 from bridge.network.barrier import Hellos
 from bridge.network.fault_orders import FaultOrder
@@ -76,7 +76,7 @@ class LockstepLoop:
     def __init__(
         self,
         agent: Agent,
-        bus: FleetloopBus,
+        bus: BusClient,
         link: Link,
         subscriptions: Subscriptions,
         path: Publisher,
@@ -192,7 +192,7 @@ class LockstepLoop:
     def _send(self, frames: Sequence[Frame]) -> None:
         for frame in frames:
             try:
-                self._bus.send_frame(frame)
+                self._bus.send(frame)
             except can.CanOperationError as error:
                 if error.error_code != errno.ENOBUFS:
                     raise PeerLostError(f"{self._robot}: lost its bus: {error}") from error
@@ -261,7 +261,7 @@ class LockstepLoop:
 
     def _receive(self, timeout_s: float) -> Sequence[TimedFrame] | None:
         try:
-            return self._bus.recv_frames(timeout_s)
+            return self._bus.receive_frames(timeout_s)
         except can.CanOperationError as error:
             raise PeerLostError(
                 f"{self._robot}: lost its bus after {self.counters.ticks} ticks: {error}"

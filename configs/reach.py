@@ -21,8 +21,8 @@ hull.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import exp, log, pi, sqrt, tanh
+from typing import NamedTuple
 
 MOST_AMPLIFIED = 250.0
 LONGEST_S = 1e6
@@ -41,8 +41,7 @@ def within_world(x_m: float, y_m: float, theta_rad: float) -> bool:
     return here and abs(theta_rad) <= HEADING_LIMIT_RAD
 
 
-@dataclass(frozen=True, slots=True)
-class Reach:
+class Reach(NamedTuple):
     """The bounds of one scenario."""
 
     s_min_m: float  # at t = 0, with its margin

@@ -308,7 +308,7 @@ class Hub:
 
     def _receive_frames(self, client: Connection, packet: Packet) -> None:
         bus = client.bus
-        _, flags, _, stamp_ns, frames, *_ = packet
+        flags, stamp_ns, frames = packet.flags, packet.stamp_ns, packet.frames
         if stamp_ns < client.since_ns:
             client.awake |= bool(flags & DONE)
             client.released += len(frames)

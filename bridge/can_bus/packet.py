@@ -43,6 +43,8 @@ _HEADER: Final = struct.Struct("<BBHIq")
 _FRAME: Final = struct.Struct("<IB3x8s")
 _ONE: Final = struct.Struct("<BBHIqIB3x8s")
 _TWO: Final = struct.Struct("<BBHIqIB3x8sIB3x8s")
+_ONE_SIZE: Final = 32
+_TWO_SIZE: Final = 48
 
 Key = str | int
 """A client of a bus: the name of the robot that it controls in lockstep, else a number."""
@@ -90,18 +92,32 @@ class Transmitted(NamedTuple):
         return Stamped(self.end_ns, self.apart.get(key, self.frame) if self.apart else self.frame)
 
 
-class Packet(NamedTuple):
+class Packet:
     """A decoded packet; `frames` for FRAMES, `text` for the others."""
 
-    kind: int
-    flags: int
-    number: int  # the header's count
-    stamp_ns: int
-    frames: tuple[Frame, ...]
-    text: str
-    credit: int = 0
-    before_ns: tuple[int, ...] = ()  # of each frame; empty: all of them ended at `stamp_ns`
-    flawed: int = 0  # frames that were none of classic CAN
+    __slots__ = (
+        *("before_ns", "credit", "flags", "flawed", "frames", "kind", "number", "stamp_ns", "text"),
+    )
+
+    def __init__(
+        self,
+        kind: int,
+        flags: int,
+        number: int,
+        stamp_ns: int,
+        credit: int,
+        frames: tuple[Frame, ...] = (),
+        text: str = "",
+    ) -> None:
+        self.kind = kind
+        self.flags = flags
+        self.number = number  # the header's count
+        self.stamp_ns = stamp_ns
+        self.credit = credit
+        self.frames = frames
+        self.text = text
+        self.before_ns: tuple[int, ...] = ()  # of each frame; empty: all ended at `stamp_ns`
+        self.flawed = 0  # frames that were none of classic CAN
 
 
 def encode_frames(flags: int, stamp_ns: int, frames: Sequence[Frame]) -> bytes:
@@ -164,34 +180,40 @@ def encode_lost(frames: int) -> bytes:
 def decode(packet: bytes) -> Packet | None:
     """The packet in the bytes, None if there is none."""
     size = len(packet)
-    if size == _TWO.size and packet[0] == FRAMES and packet[2] == 2 and packet[3] == 0:
+    if size == _TWO_SIZE and packet[0] == FRAMES and packet[2] == 2 and packet[3] == 0:
         kind, flags, count, credit, stamp, id_1, n_1, data_1, id_2, n_2, data_2 = _TWO.unpack(
             packet
         )
         if n_1 <= MAX_DATA and n_2 <= MAX_DATA and id_1 <= ID_MASK_11 and id_2 <= ID_MASK_11:
-            both = (_new(Frame, (id_1, data_1[:n_1])), _new(Frame, (id_2, data_2[:n_2])))
-            return _new(Packet, (kind, flags, count, stamp, both, "", credit, (), 0))
-    if size == _ONE.size and packet[0] == FRAMES and packet[2] == 1 and packet[3] == 0:
+            both = (_frame(id_1, n_1, data_1), _frame(id_2, n_2, data_2))
+            return Packet(kind, flags, count, stamp, credit, both)
+    if size == _ONE_SIZE and packet[0] == FRAMES and packet[2] == 1 and packet[3] == 0:
         kind, flags, count, credit, stamp, can_id, n, data = _ONE.unpack(packet)
         if n <= MAX_DATA and can_id <= ID_MASK_11:
-            one = (_new(Frame, (can_id, data[:n])),)
-            return _new(Packet, (kind, flags, count, stamp, one, "", credit, (), 0))
+            return Packet(kind, flags, count, stamp, credit, (_frame(can_id, n, data),))
     if size < _HEADER.size:
         return None
     kind, flags, count, credit, stamp = _HEADER.unpack_from(packet)
+    found = Packet(kind, flags, count, stamp, credit)
     body = packet[_HEADER.size :]
     if kind == FRAMES:
-        return _decode_frames(Packet(kind, flags, count, stamp, (), "", credit), body)
+        return found if _decode_frames(found, body) else None
     if HELLO <= kind <= LOST:
-        return Packet(kind, flags, count, stamp, (), body.decode("utf-8", "replace"), credit)
+        found.text = body.decode("utf-8", "replace")
+        return found
     return None
 
 
-def _decode_frames(head: Packet, body: bytes) -> Packet | None:
-    count = head.number
+def _frame(can_id: int, length: int, data: bytes) -> Frame:
+    return _new(Frame, (can_id, data if length == MAX_DATA else data[:length]))
+
+
+def _decode_frames(found: Packet, body: bytes) -> bool:
+    """Put the frames in the bytes into their packet; False: it is none."""
+    count = found.number
     end = count * _FRAME.size
     if count > MAX_FRAMES or len(body) not in (end, end + 4 * count):
-        return None
+        return False
     before = struct.unpack(f"<{count}I", body[end:]) if len(body) > end else ()
     frames, kept = [], []
     for n, (can_id, length, data) in enumerate(_FRAME.iter_unpack(body[:end])):
@@ -200,7 +222,8 @@ def _decode_frames(head: Packet, body: bytes) -> Packet | None:
         content = bytes(length) if can_id & RTR else data[:length]
         frames.append(Frame(can_id, content))
         kept.append(n)
-    flawed = count - len(kept)
-    if flawed and before:
+    found.flawed = count - len(kept)
+    if found.flawed and before:
         before = tuple(before[n] for n in kept)
-    return head._replace(frames=tuple(frames), before_ns=before, flawed=flawed)
+    found.frames, found.before_ns = tuple(frames), before
+    return True

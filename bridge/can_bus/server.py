@@ -171,7 +171,7 @@ class ClientServer:
             self._drop(client)
             return
         packet = decode(data)
-        if packet is not None and packet[0] == FRAMES and client.joined:
+        if packet is not None and packet.kind == FRAMES and client.joined:
             self._on_frames(client, packet)
             if packet.flawed:
                 client.bus.counters.garbage += packet.flawed

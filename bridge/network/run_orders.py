@@ -18,7 +18,7 @@ from bridge.network.packing import finite, ints, pack, unpack
 from configs.leader_speed import SpeedChange
 from configs.reach import Reach
 
-_REACH = len(Reach.__slots__)
+_REACH = len(Reach._fields)
 
 
 class Pace(StrEnum):
@@ -66,8 +66,7 @@ class LeaderOrder(NamedTuple):
 
     def encode(self) -> bytes:
         """Bytes for the wire."""
-        reach = [getattr(self.reach, name) for name in Reach.__slots__]
-        return pack(*self[:-1], reach)
+        return pack(*self)
 
     @classmethod
     def decode(cls, payload: bytes) -> "LeaderOrder | None":

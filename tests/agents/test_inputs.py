@@ -1,7 +1,6 @@
 """A controller's input log, fed to another one, gives the same rows and frames bit for bit."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from math import nan
 
 import pytest
@@ -206,7 +205,7 @@ def test_an_order_of_the_leaders_speed_that_is_repeated_only_brings_its_reach() 
     bench = Bench("r1")
     bench.agent.receive_leader_speed(LeaderSpeed((SpeedChange(0, 0.5),)))
     bench.drive(1)
-    fast = replace(bench.agent.brief.reach, v_max_m_s=3.0)
+    fast = bench.agent.brief.reach._replace(v_max_m_s=3.0)
     order = LeaderOrder(1, bench.tick_now + 3, False, 0.1, 10**9, bench.agent.brief.reach)
     acts = bench.agent.take_leader_order(order, bench.tick_now)
     assert acts == order.from_tick
@@ -228,6 +227,6 @@ def test_with_an_ordered_speed_neighbours_are_believed_what_they_say_then() -> N
         return bench.agent.admission.admits_path_state("r1", said)
 
     assert not believed(every)
-    fast = replace(bench.agent.brief.reach, v_max_m_s=3.0, v_margin_m_s=3.0)
+    fast = bench.agent.brief.reach._replace(v_max_m_s=3.0, v_margin_m_s=3.0)
     bench.agent.take_leader_order(LeaderOrder(1, 0, False, 2.5, 0, fast), bench.tick_now)
     assert believed(every)

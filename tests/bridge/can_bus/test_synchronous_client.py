@@ -40,12 +40,12 @@ def answer_messages(bus: FleetloopBus) -> None:
 
 def answer_frames(bus: FleetloopBus) -> None:
     while True:
-        for _, (can_id, data) in bus.recv_frames(10.0) or ():
+        for _, (can_id, data) in bus.client.receive_frames(10.0) or ():
             if can_id == LEAVE:
                 return
             if can_id == 0x009:
-                bus.send_frame(Frame(0x00E, data[:4]))
-                bus.send_frame(Frame(0x02E, data[4:]))
+                bus.client.send(Frame(0x00E, data[:4]))
+                bus.client.send(Frame(0x02E, data[4:]))
 
 
 @pytest.fixture(params=[answer_messages, answer_frames])
@@ -92,10 +92,10 @@ def test_a_synchronous_client_with_nothing_to_say_still_answers(synchronous) -> 
 
 
 def test_frames_come_together_and_with_their_times(running, join) -> None:
-    client = join(batched=True)
-    assert client.recv_frames(0.0) is None
+    client = join(batched=True).client
+    assert client.receive_frames(0.0) is None
     running.deliver(Frame(0x009, b"abc"), Frame(0x029, b""), stamp_ns=1_500_000_000)
-    heard = client.recv_frames(5.0)
+    heard = client.receive_frames(5.0)
     assert heard == [
         (1_500_000_000, Frame(0x009, b"abc")),
         (1_500_000_000, Frame(0x029, b"")),
@@ -103,11 +103,11 @@ def test_frames_come_together_and_with_their_times(running, join) -> None:
 
 
 def test_what_is_no_frame_is_refused_before_it_is_sent(join) -> None:
-    client = join(batched=True)
+    client = join(batched=True).client
     with pytest.raises(can.CanOperationError, match="not sent: 9 bytes of data"):
-        client.send_frame(Frame(0x009, bytes(9)))
+        client.send(Frame(0x009, bytes(9)))
     with pytest.raises(can.CanOperationError, match="not sent: 11-bit identifier 0x800"):
-        client.send_frame(Frame(0x800, b""))
+        client.send(Frame(0x800, b""))
 
 
 def test_a_listener_beside_a_synchronous_client_changes_nothing(synchronous) -> None:
