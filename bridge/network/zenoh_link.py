@@ -10,9 +10,10 @@ import os
 import threading
 from collections.abc import Callable
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import zenoh
+from mypy_extensions import mypyc_attr
 from zenoh.handlers import Callback, RingChannel
 
 from bridge.network.link import ROOM_BYTES, Arrival, Dropped, Inbox, Publisher
@@ -49,6 +50,7 @@ class _SteadyPublisher:
         )
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class ZenohLink:
     """One Zenoh session as a `bridge.network.link.Link`."""
 
@@ -58,7 +60,7 @@ class ZenohLink:
         self._declared: list[object] = []
         self._subscribers: dict[str, zenoh.Subscriber[Any]] = {}  # by key
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
-        self.receive = self._inbox.receive
+        self.receive: Callable[[float], Arrival | None] = self._inbox.receive
 
     def publisher(self, key: str, *, express: bool = True, steady: bool = False) -> Publisher:
         """A publisher on `key`; a put blocks rather than drops."""
@@ -147,7 +149,7 @@ class ZenohLink:
         """The subscriptions that lost messages because their buffer was full."""
         return self._inbox.dropped()
 
-    stuck = False
+    stuck: ClassVar[bool] = False
     """A session of this process did not close in time: the process must end without its leave."""
 
     def close(self) -> None:
@@ -197,7 +199,7 @@ class PolledLink(ZenohLink):
         self._idle_since_s = 0.0
         self.receive = self._receive
 
-    def subscribe(self, key: str, tag: str, **_: int) -> None:
+    def subscribe(self, key: str, tag: str, *, room_bytes: int = ROOM_BYTES) -> None:  # noqa: ARG002
         """Keep the last that others put on `key`, marked with `tag`.
 
         Never more, whatever their size: of what arrives here the router bounds that.
