@@ -23,6 +23,7 @@ from fleetloop.launch import placement
 from fleetloop.launch.child import Child
 from fleetloop.launch.drawn import drawing
 from fleetloop.launch.fork_server import ForkServer
+from fleetloop.launch.row_lines import RowLines
 
 AFTERWARDS_NS = 60 * 10**9
 """Bus time in which frames may still end after the closing tick, in real time on a slow machine."""
@@ -68,8 +69,23 @@ class Place:
     robot: str  # of a role per robot
 
 
+def row_lines(orders: Orders) -> RowLines:
+    """The ways to the recorder of all processes on this machine that have rows.
+
+    Raises:
+        InfrastructureError: no more files can be opened.
+    """
+    names = [PLANT.name, *map(AGENT.process, orders.scenario.names)]
+    return RowLines(filter(orders.deployment.runs_here, names))
+
+
 def spawn(
-    orders: Orders, links: Links, folder: Path, fork_server: ForkServer, children: list[Child]
+    orders: Orders,
+    links: Links,
+    folder: Path,
+    fork_server: ForkServer,
+    lines: RowLines,
+    children: list[Child],
 ) -> None:
     """Start the processes in the order of their roles and add them to `children` as they start.
 
@@ -84,10 +100,14 @@ def spawn(
             place = Place(orders, links[role.identity(robot)], folder, robot)
             brief = BRIEFS[role.name](place)
             if isinstance(brief, PlantBrief):
-                children.append(_start_plant(brief, place, fork_server))
-                continue
-            children.append(Child(fork_server, role.process(robot), role.module))
-            children[-1].tell(brief)
+                children.append(_start_plant(brief, place, fork_server, lines))
+            elif isinstance(brief, AgentBrief):
+                children.append(_start_agent(brief, fork_server, lines))
+            elif isinstance(brief, RecorderBrief):
+                children.append(_start_recorder(brief, fork_server, lines))
+            else:
+                children.append(Child(fork_server, role.process(robot), role.module))
+                children[-1].tell(brief)
 
 
 def respawn(
@@ -96,6 +116,7 @@ def respawn(
     folder: Path,
     robot: str,
     fork_server: ForkServer,
+    lines: RowLines,
     faults: Iterable[PlannedFault],
     resumes_tick: int = 0,
 ) -> Child:
@@ -107,10 +128,9 @@ def respawn(
         InfrastructureError: a process can't be had.
     """
     place = Place(orders, links[AGENT.identity(robot)], folder, robot)
-    child = Child(fork_server, AGENT.process(robot), AGENT.module)
     known = agent_faults(faults, robot)
-    child.tell(replace(_agent(place), rejoins=True, resumes_tick=resumes_tick, faults=known))
-    return child
+    brief = replace(_agent(place), rejoins=True, resumes_tick=resumes_tick, faults=known)
+    return _start_agent(brief, fork_server, lines)
 
 
 def ours(scenario: Scenario, deployment: Deployment) -> tuple[str, ...]:
@@ -120,7 +140,24 @@ def ours(scenario: Scenario, deployment: Deployment) -> tuple[str, ...]:
     return tuple(robot for robot in scenario.names if deployment.is_ours(robot))
 
 
-def _start_plant(brief: PlantBrief, place: Place, fork_server: ForkServer) -> Child:
+def _start_agent(brief: AgentBrief, fork_server: ForkServer, lines: RowLines) -> Child:
+    process = AGENT.process(brief.robot)
+    child = Child(fork_server, process, AGENT.module, lines.end(process))
+    child.tell(replace(brief, recorder=child.fds[0] if child.fds else None))
+    return child
+
+
+def _start_recorder(brief: RecorderBrief, fork_server: ForkServer, lines: RowLines) -> Child:
+    ends = lines.of_recorder
+    child = Child(fork_server, RECORDER.name, RECORDER.module, tuple(ends.values()))
+    lines.given()
+    child.tell(replace(brief, sockets=tuple(zip(ends, child.fds, strict=True))))
+    return child
+
+
+def _start_plant(
+    brief: PlantBrief, place: Place, fork_server: ForkServer, lines: RowLines
+) -> Child:
     """Open the listening sockets of its buses, and hand them to it."""
     orders = place.orders
     buses = list(
@@ -133,8 +170,11 @@ def _start_plant(brief: PlantBrief, place: Place, fork_server: ForkServer) -> Ch
         for listener in listeners.values():
             listening.enter_context(listener)
         fds = [listeners[bus].fileno() for bus in buses]
+        fds += lines.end(PLANT.name)
         child = Child(fork_server, PLANT.name, PLANT.module, fds)
-    child.tell(replace(brief, listeners=tuple(zip(buses, child.fds, strict=True))))
+    recorder = child.fds[len(buses)] if len(child.fds) > len(buses) else None
+    listening_at = tuple(zip(buses, child.fds, strict=False))
+    child.tell(replace(brief, listeners=listening_at, recorder=recorder))
     return child
 
 

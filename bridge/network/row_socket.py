@@ -1,0 +1,242 @@
+"""Rows to a recorder on the same machine: a pair of sockets for each process, no network between.
+
+    plant, agent/<robot>  ──►  recorder        tag, NUL, `Rows`: a packet a block
+
+The launcher makes the pairs and gives each process its own end; they have no name by which anybody
+else could come to one. So a block's sender is known by the socket on which it came, and the
+recorder takes from it what is of that process, nothing else. What was sent is the kernel's: it
+survives a sender that is killed, and a process that takes its place goes on behind it on the same
+socket.
+
+Sending waits for nothing. What the recorder hasn't room for yet is kept by the sender, up to
+`ROOM_BYTES`, and goes with the next blocks, or with `flush`. A run in lockstep then waits for the
+recorder, as long as it takes anything; what finds no room is lost, counted and named. A recorder
+that has ended takes nothing: its launcher says so.
+
+The same blocks go to the network, where viewers hear them, if there are any.
+"""
+
+import errno
+import select
+import socket
+from collections import Counter, deque
+from collections.abc import Iterable, Mapping
+from types import TracebackType
+from typing import Self
+
+from bridge.network.link import Arrival, Publisher, Receiver
+from bridge.process.awake import LOOK_S
+from bridge.process.clock import SYSTEM_CLOCK, Clock
+from configs.brief import Schedule
+
+ROOM_BYTES = 1 << 24
+"""Of what one process keeps for a recorder that is behind."""
+PATIENCE_S = 0.5
+"""A recorder that takes nothing for so long isn't waited for any more."""
+MOST_BYTES = 1 << 18
+"""Of a packet: several times the longest honest one; the rest of a longer one is cut off."""
+TURN = 4
+"""Packets that are taken from one socket before it is the others' turn."""
+_SEND_BYTES = 1 << 20
+"""The kernel's buffer that is asked for; it gives what it may."""
+_OVERHEAD_BYTES = 256
+
+
+def pair() -> tuple[socket.socket, socket.socket]:
+    """A process's end and the recorder's.
+
+    Raises:
+        OSError: no more files can be opened.
+    """
+    return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+
+
+class RowSocket:
+    """A process's end.
+
+    Args:
+        sock: of a `pair`.
+        patience_s: how long a block without room waits for a recorder that takes nothing.
+    """
+
+    def __init__(
+        self, sock: socket.socket, patience_s: float, *, clock: Clock = SYSTEM_CLOCK
+    ) -> None:
+        sock.setblocking(False)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BYTES)
+        self._sock, self._send = sock, sock.sendmsg
+        self._patience_s = patience_s
+        self._clock = clock
+        self._kept: deque[tuple[bytes, bytes]] = deque()
+        self._kept_bytes = 0
+        self._lost = 0
+        self._writable = select.poll()
+        self._writable.register(sock, select.POLLOUT)
+
+    @classmethod
+    def of(cls, descriptor: int | None, schedule: Schedule) -> "RowSocket | None":
+        """The end that was inherited, if there is one; no real robot waits for the recorder."""
+        if descriptor is None:
+            return None
+        patience_s = 0.0 if schedule.realtime else PATIENCE_S
+        return cls(socket.socket(fileno=descriptor), patience_s)
+
+    def send(self, head: bytes, block: bytes) -> None:
+        """Send a block, or keep it until there is room."""
+        if self._kept:
+            self._drain()
+        if not self._kept and self._sent(head, block):
+            return
+        size = len(block) + _OVERHEAD_BYTES
+        if self._kept_bytes + size > ROOM_BYTES and not self._await_room(size):
+            self._lost += 1
+            return
+        self._kept.append((head, block))
+        self._kept_bytes += size
+
+    def flush(self) -> None:
+        """Send what is kept, as long as the recorder takes some."""
+        while self._kept:
+            if not self._await_taken(PATIENCE_S):
+                self._lost += len(self._kept)
+                self._kept.clear()
+                self._kept_bytes = 0
+
+    def remarks(self) -> list[str]:
+        """What was lost, in words."""
+        lost = f"{self._lost} blocks for the record are lost: the recorder was too slow for them"
+        return [lost] if self._lost else []
+
+    def _await_room(self, size: int) -> bool:
+        while self._kept_bytes + size > ROOM_BYTES:
+            if not self._await_taken(self._patience_s):
+                return False
+        return True
+
+    def _await_taken(self, within_s: float) -> bool:
+        """Wait until something of what is kept is sent; False if nothing was."""
+        count = len(self._kept)
+        deadline_s = self._clock.monotonic_s() + within_s
+        while True:
+            self._drain()
+            if len(self._kept) < count:
+                return True
+            left_s = deadline_s - self._clock.monotonic_s()
+            if left_s <= 0.0:
+                return False
+            self._writable.poll(left_s * 1e3)
+
+    def _drain(self) -> None:
+        kept = self._kept
+        while kept and self._sent(*kept[0]):
+            self._kept_bytes -= len(kept.popleft()[1]) + _OVERHEAD_BYTES
+
+    def _sent(self, head: bytes, block: bytes) -> bool:
+        """Whether it is off one's hands; False if there is no room for it now."""
+        try:
+            self._send([head, block])
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            if error.errno in (errno.ENOBUFS, errno.ENOMEM):
+                return False
+            if error.errno not in (errno.EPIPE, errno.ECONNRESET):
+                self._lost += 1  # longer than any packet may be
+        return True
+
+
+class _RowPublisher:
+    """Puts blocks on a socket, and on the network for those that listen there."""
+
+    def __init__(self, line: RowSocket, tag: str, network: Publisher) -> None:
+        self._send = line.send
+        self._head = tag.encode() + b"\0"
+        self._network = network
+
+    def put(self, payload: bytes) -> None:
+        """Put one block."""
+        self._send(self._head, payload)
+        self._network.put(payload)
+
+
+def row_publisher(line: RowSocket | None, tag: str, network: Publisher) -> Publisher:
+    """Where a process puts its blocks: without a socket the recorder hears them on the network."""
+    return network if line is None else _RowPublisher(line, tag, network)
+
+
+class RowSockets:
+    """The recorder's ends; with those processes that are elsewhere, on its link.
+
+    Args:
+        ends: of the processes on this machine, by process, with the tags of their blocks.
+        link: where the blocks of others arrive; None: there are no others.
+    """
+
+    def __init__(
+        self, ends: Mapping[str, tuple[socket.socket, Iterable[str]]], link: Receiver | None
+    ) -> None:
+        self._link = link
+        self._epoll = select.epoll()
+        self._ends: dict[int, tuple[str, socket.socket, Mapping[bytes, str]]] = {}
+        self._arrivals: deque[Arrival] = deque()
+        self._buffer = bytearray(MOST_BYTES)
+        self._view = memoryview(self._buffer)
+        self.refused: Counter[str] = Counter()
+        """Packets by processes whose they can't be."""
+        for process, (sock, tags) in ends.items():
+            sock.setblocking(False)
+            self._ends[sock.fileno()] = process, sock, {tag.encode(): tag for tag in tags}
+            self._epoll.register(sock.fileno(), select.EPOLLIN)
+
+    def receive(self, timeout_s: float) -> Arrival | None:
+        """The next block, waiting at most `timeout_s`; 0 polls."""
+        arrivals = self._arrivals
+        if not arrivals:
+            self._take(0.0)
+        if not arrivals and timeout_s > 0.0:
+            # What comes on the link wakes nobody here: it is looked for.
+            self._take(timeout_s if self._link is None else min(timeout_s, LOOK_S))
+        return arrivals.popleft() if arrivals else None
+
+    def _take(self, timeout_s: float) -> None:
+        """Take some of what is there, of each sender in turn."""
+        for fd, _ in self._epoll.poll(timeout_s):
+            self._read(*self._ends[fd])
+        for _ in range(TURN if self._link is not None else 0):
+            arrival = self._link.receive(0.0) if self._link is not None else None
+            if arrival is None:
+                break
+            self._arrivals.append(arrival)
+
+    def _read(self, process: str, sock: socket.socket, tags: Mapping[bytes, str]) -> None:
+        buffer, view = self._buffer, self._view
+        for _ in range(TURN):
+            try:
+                length = sock.recv_into(buffer)
+            except BlockingIOError:
+                return
+            except OSError:
+                length = 0
+            if not length:  # all that had the other end have gone
+                self._epoll.unregister(sock.fileno())
+                return
+            end = buffer.find(0, 0, length)
+            tag = tags.get(bytes(view[: max(end, 0)]))
+            if tag is None:
+                self.refused[process] += 1
+            else:
+                self._arrivals.append(Arrival(tag, "", bytes(view[end + 1 : length])))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close all: senders find it out with their next block."""
+        self._epoll.close()
+        for _, sock, _ in self._ends.values():
+            sock.close()
