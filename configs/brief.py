@@ -357,6 +357,6 @@ class RecorderBrief:
     last_frame_ns: int  # bus time after which no frame ends
     fills_gaps: bool = False  # sources may be cut off or start again: missing rows aren't numbers
     logged_inputs: bool = False  # controllers log theirs
-    sockets: tuple[tuple[str, int], ...] = ()  # process on the same machine, inherited file
-    # descriptor of its rows' socket; others are heard over the network
+    elsewhere: tuple[str, ...] = ()  # processes that are heard over the network
+    sockets: int = -1  # inherited file descriptor: where the sockets of all others come
     drawing: Drawing = NO_DRAWING  # for 3-D views of the record

@@ -2,11 +2,10 @@
 
     plant, agent/<robot>  ──►  recorder        tag, NUL, `Rows`: a packet a block
 
-The launcher makes the pairs and gives each process its own end; they have no name by which anybody
-else could come to one. So a block's sender is known by the socket on which it came, and the
-recorder takes from it what is of that process, nothing else. What was sent is the kernel's: it
-survives a sender that is killed, and a process that takes its place goes on behind it on the same
-socket.
+The launcher makes the pairs and gives both ends away; they have no name by which anybody else could
+come to one. So a block's sender is known by the socket on which it came, and the recorder takes
+from it what is of that process, nothing else. What was sent is the kernel's: it survives a sender
+that is killed, and is taken before what a process in its place sends.
 
 Sending waits for nothing. What the recorder hasn't room for yet is kept by the sender, up to
 `ROOM_BYTES`, and goes with the next blocks, or with `flush`. A run in lockstep then waits for the
@@ -21,8 +20,9 @@ import select
 import socket
 from collections import Counter, deque
 from collections.abc import Iterable, Mapping
+from itertools import count
 from types import TracebackType
-from typing import Self
+from typing import NamedTuple, Self
 
 from bridge.network.link import Arrival, Publisher, Receiver
 from bridge.process.awake import LOOK_S
@@ -115,11 +115,11 @@ class RowSocket:
 
     def _await_taken(self, within_s: float) -> bool:
         """Wait until something of what is kept is sent; False if nothing was."""
-        count = len(self._kept)
+        before = len(self._kept)
         deadline_s = self._clock.monotonic_s() + within_s
         while True:
             self._drain()
-            if len(self._kept) < count:
+            if len(self._kept) < before:
                 return True
             left_s = deadline_s - self._clock.monotonic_s()
             if left_s <= 0.0:
@@ -164,29 +164,50 @@ def row_publisher(line: RowSocket | None, tag: str, network: Publisher) -> Publi
     return network if line is None else _RowPublisher(line, tag, network)
 
 
+def hand_over(to: socket.socket, process: str, end: socket.socket) -> None:
+    """Give a recorder its end of a process's pair.
+
+    Raises:
+        OSError: it has ended, or doesn't take it in time.
+    """
+    socket.send_fds(to, [process.encode()], [end.fileno()])
+
+
+class _End(NamedTuple):
+    """The recorder's end of a process."""
+
+    process: str
+    sock: socket.socket
+    tags: Mapping[bytes, str]
+
+
 class RowSockets:
     """The recorder's ends; with those processes that are elsewhere, on its link.
 
     Args:
-        ends: of the processes on this machine, by process, with the tags of their blocks.
+        handed_over: where its ends come, one for each start of a process.
+        tags: of the blocks of each process.
         link: where the blocks of others arrive; None: there are no others.
     """
 
     def __init__(
-        self, ends: Mapping[str, tuple[socket.socket, Iterable[str]]], link: Receiver | None
+        self,
+        handed_over: socket.socket,
+        tags: Mapping[str, Iterable[str]],
+        link: Receiver | None = None,
     ) -> None:
         self._link = link
-        self._epoll = select.epoll()
-        self._ends: dict[int, tuple[str, socket.socket, Mapping[bytes, str]]] = {}
+        self._handed_over = handed_over
+        self._tags = {process: {tag.encode(): tag for tag in of} for process, of in tags.items()}
+        self._ends: dict[int, _End] = {}
         self._arrivals: deque[Arrival] = deque()
         self._buffer = bytearray(MOST_BYTES)
         self._view = memoryview(self._buffer)
         self.refused: Counter[str] = Counter()
         """Packets by processes whose they can't be."""
-        for process, (sock, tags) in ends.items():
-            sock.setblocking(False)
-            self._ends[sock.fileno()] = process, sock, {tag.encode(): tag for tag in tags}
-            self._epoll.register(sock.fileno(), select.EPOLLIN)
+        self._epoll = select.epoll()
+        handed_over.setblocking(False)
+        self._epoll.register(handed_over.fileno(), select.EPOLLIN)
 
     def receive(self, timeout_s: float) -> Arrival | None:
         """The next block, waiting at most `timeout_s`; 0 polls."""
@@ -201,31 +222,64 @@ class RowSockets:
     def _take(self, timeout_s: float) -> None:
         """Take some of what is there, of each sender in turn."""
         for fd, _ in self._epoll.poll(timeout_s):
-            self._read(*self._ends[fd])
+            if fd == self._handed_over.fileno():
+                self._take_ends()
+            elif fd in self._ends:
+                self._read(self._ends[fd], TURN)
         for _ in range(TURN if self._link is not None else 0):
             arrival = self._link.receive(0.0) if self._link is not None else None
             if arrival is None:
                 break
             self._arrivals.append(arrival)
 
-    def _read(self, process: str, sock: socket.socket, tags: Mapping[bytes, str]) -> None:
-        buffer, view = self._buffer, self._view
-        for _ in range(TURN):
+    def _take_ends(self) -> None:
+        """Take the ends that were handed over; before a successor all of its predecessor's."""
+        while True:
             try:
-                length = sock.recv_into(buffer)
+                name, descriptors, _, _ = socket.recv_fds(
+                    self._handed_over, 256, 1, socket.MSG_CMSG_CLOEXEC
+                )
+            except BlockingIOError:
+                return
+            except OSError:
+                name = b""
+            if not name:  # the launcher has gone
+                self._epoll.unregister(self._handed_over.fileno())
+                return
+            process = name.decode()
+            for end in [it for it in self._ends.values() if it.process == process]:
+                self._read(end, None)
+                self._forget(end)
+            for descriptor in descriptors:
+                end = _End(process, socket.socket(fileno=descriptor), self._tags[process])
+                end.sock.setblocking(False)
+                self._ends[descriptor] = end
+                self._epoll.register(descriptor, select.EPOLLIN)
+
+    def _forget(self, end: _End) -> None:
+        if self._ends.pop(end.sock.fileno(), None) is not None:
+            self._epoll.unregister(end.sock.fileno())
+            end.sock.close()
+
+    def _read(self, end: _End, most: int | None) -> None:
+        """Take what waits on a socket, at most so many packets."""
+        buffer, view, refused = self._buffer, self._view, self.refused
+        for _ in count() if most is None else range(most):
+            try:
+                length = end.sock.recv_into(buffer)
             except BlockingIOError:
                 return
             except OSError:
                 length = 0
-            if not length:  # all that had the other end have gone
-                self._epoll.unregister(sock.fileno())
+            if not length:  # the process has ended
+                self._forget(end)
                 return
-            end = buffer.find(0, 0, length)
-            tag = tags.get(bytes(view[: max(end, 0)]))
+            at = buffer.find(0, 0, length)
+            tag = end.tags.get(bytes(view[: max(at, 0)]))
             if tag is None:
-                self.refused[process] += 1
+                refused[end.process] += 1
             else:
-                self._arrivals.append(Arrival(tag, "", bytes(view[end + 1 : length])))
+                self._arrivals.append(Arrival(tag, "", bytes(view[at + 1 : length])))
 
     def __enter__(self) -> Self:
         return self
@@ -238,5 +292,6 @@ class RowSockets:
     ) -> None:
         """Close all: senders find it out with their next block."""
         self._epoll.close()
-        for _, sock, _ in self._ends.values():
-            sock.close()
+        self._handed_over.close()
+        for end in self._ends.values():
+            end.sock.close()

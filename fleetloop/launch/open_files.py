@@ -1,14 +1,14 @@
 """The number of files that a run needs open at once, against this user's limit.
 
-The launcher has two pipes, a network connection and both ends of a socket for rows for each role;
-the plant has two sockets for each bus, and one for every further client.
+The launcher has two pipes and a network connection for each role; the plant has two sockets for
+each bus, and one for every further client.
 """
 
 import resource
 
 from configs.errors import InfrastructureError
 
-PER_ROLE, BESIDES = 5, 64
+PER_ROLE, BESIDES = 3, 64
 PLENTY = 65_536
 
 

@@ -49,7 +49,7 @@ from fleetloop.launch.remote_roles import RemoteRoles
 from fleetloop.launch.restarts import Restarts
 from fleetloop.launch.row_lines import RowLines
 from fleetloop.launch.run_requests import RunRequests
-from fleetloop.launch.spawn import Orders, respawn, row_lines, spawn, viewer_brief
+from fleetloop.launch.spawn import Orders, respawn, spawn, viewer_brief
 from fleetloop.launch.supervision import CONSEQUENCES_S, Supervision
 from fleetloop.launch.viewer import Viewer
 from fleetloop.robot_states import RobotBoard, buses_of
@@ -118,7 +118,7 @@ class ProcessRun:
         self._next_look_s = 0.0
         self._clocks = ClockGate(scenario, self._deployment, self._plane.clocks, self._now)
         self._links: dict[str, NetworkLink] = {}
-        self._lines = RowLines(())
+        self._lines: RowLines
         self._viewer = Viewer(
             lambda token: viewer_brief(self._orders, self._links, self._run, token),
             self._schedule.start_deadline_s,
@@ -202,7 +202,7 @@ class ProcessRun:
             batch = not self._schedule.realtime
             with ForkServer(sockets.folder_of(run), batch=batch) as fork_server:
                 folder = open_.enter_context(sockets.run_folder(run))
-                self._lines = open_.enter_context(row_lines(self._orders))
+                self._lines = open_.enter_context(RowLines())
                 link = open_.enter_context(self._router(folder, stop))
                 link.declare_live(keys.live(run, LAUNCHER.name))
                 self._plane.subscribe(link, run, self._processes)

@@ -1,58 +1,57 @@
 """The sockets over which this machine's processes hand their rows to the recorder.
 
-Made before the processes, one pair for each that has rows. The launcher keeps the processes' ends,
-so that one that is started again goes on with the same; the recorder's it gives away.
+The launcher makes a pair for a process when it starts it, first or again, and gives both ends away:
+one to the process, the other, over a socket of its own, to the recorder.
 """
 
 import socket
-from collections.abc import Iterable
-from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
 
 from bridge.network import row_socket
 from configs.errors import InfrastructureError
 
+_HAND_OVER_S = 5.0
+
 
 class RowLines:
-    """The pairs of one run; a context manager that closes what the launcher has of them.
-
-    Args:
-        processes: on this machine, with rows.
+    """The way to the recorder of one run; a context manager that closes it.
 
     Raises:
-        InfrastructureError: no more files can be opened.
+        InfrastructureError: no more files can be opened; so does `connect`.
     """
 
-    def __init__(self, processes: Iterable[str]) -> None:
-        self._ends: dict[str, socket.socket] = {}
-        self._of_recorder: dict[str, socket.socket] = {}
-        self._open = ExitStack()
+    def __init__(self) -> None:
         try:
-            for process in processes:
-                own, recorders = row_socket.pair()
-                self._ends[process] = self._open.enter_context(own)
-                self._of_recorder[process] = self._open.enter_context(recorders)
+            self._handing_over, self._recorders = row_socket.pair()
         except OSError as error:
-            self._open.close()
-            raise InfrastructureError(
-                f"can't open a socket for the rows of {process}: {error.strerror}"
-            ) from error
-
-    def end(self, process: str) -> list[int]:
-        """The descriptor of a process's end, if it has one."""
-        return [self._ends[process].fileno()] if process in self._ends else []
+            raise _no_socket("recorder", error) from error
+        self._handing_over.settimeout(_HAND_OVER_S)
 
     @property
-    def of_recorder(self) -> dict[str, int]:
-        """The descriptors of the recorder's ends, by process."""
-        return {process: end.fileno() for process, end in self._of_recorder.items()}
+    def recorders(self) -> int:
+        """The descriptor on which the recorder takes its ends."""
+        return self._recorders.fileno()
 
     def given(self) -> None:
-        """The recorder has its ends: once it has gone, senders shall find nobody there."""
-        for end in self._of_recorder.values():
-            end.close()
-        self._of_recorder.clear()
+        """The recorder has it: once it has gone, nobody shall find anyone there."""
+        self._recorders.close()
+
+    def connect(self, process: str) -> socket.socket:
+        """The end of a process that is to be started."""
+        try:
+            own, recorders = row_socket.pair()
+        except OSError as error:
+            raise _no_socket(process, error) from error
+        with recorders:
+            try:
+                row_socket.hand_over(self._handing_over, process, recorders)
+            except BrokenPipeError:
+                pass  # the recorder has ended: who sends finds nobody
+            except OSError as error:
+                own.close()
+                raise _no_socket(process, error) from error
+        return own
 
     def __enter__(self) -> Self:
         return self
@@ -63,4 +62,9 @@ class RowLines:
         value: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._open.close()
+        self._handing_over.close()
+        self._recorders.close()
+
+
+def _no_socket(process: str, error: OSError) -> InfrastructureError:
+    return InfrastructureError(f"can't open a socket for the rows of {process}: {error}")

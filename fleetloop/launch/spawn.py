@@ -69,16 +69,6 @@ class Place:
     robot: str  # of a role per robot
 
 
-def row_lines(orders: Orders) -> RowLines:
-    """The ways to the recorder of all processes on this machine that have rows.
-
-    Raises:
-        InfrastructureError: no more files can be opened.
-    """
-    names = [PLANT.name, *map(AGENT.process, orders.scenario.names)]
-    return RowLines(filter(orders.deployment.runs_here, names))
-
-
 def spawn(
     orders: Orders,
     links: Links,
@@ -142,16 +132,16 @@ def ours(scenario: Scenario, deployment: Deployment) -> tuple[str, ...]:
 
 def _start_agent(brief: AgentBrief, fork_server: ForkServer, lines: RowLines) -> Child:
     process = AGENT.process(brief.robot)
-    child = Child(fork_server, process, AGENT.module, lines.end(process))
-    child.tell(replace(brief, recorder=child.fds[0] if child.fds else None))
+    with lines.connect(process) as end:
+        child = Child(fork_server, process, AGENT.module, [end.fileno()])
+    child.tell(replace(brief, recorder=child.fds[0]))
     return child
 
 
 def _start_recorder(brief: RecorderBrief, fork_server: ForkServer, lines: RowLines) -> Child:
-    ends = lines.of_recorder
-    child = Child(fork_server, RECORDER.name, RECORDER.module, tuple(ends.values()))
+    child = Child(fork_server, RECORDER.name, RECORDER.module, [lines.recorders])
     lines.given()
-    child.tell(replace(brief, sockets=tuple(zip(ends, child.fds, strict=True))))
+    child.tell(replace(brief, sockets=child.fds[0]))
     return child
 
 
@@ -165,15 +155,14 @@ def _start_plant(
             orders.scenario.bus_of(robot) for robot in ours(orders.scenario, orders.deployment)
         )
     )
-    with ExitStack() as listening:
+    with ExitStack() as listening, lines.connect(PLANT.name) as end:
         listeners = sockets.listen(place.folder, buses)
         for listener in listeners.values():
             listening.enter_context(listener)
         fds = [listeners[bus].fileno() for bus in buses]
-        fds += lines.end(PLANT.name)
-        child = Child(fork_server, PLANT.name, PLANT.module, fds)
-    recorder = child.fds[len(buses)] if len(child.fds) > len(buses) else None
-    listening_at = tuple(zip(buses, child.fds, strict=False))
+        child = Child(fork_server, PLANT.name, PLANT.module, [*fds, end.fileno()])
+    *fds, recorder = child.fds
+    listening_at = tuple(zip(buses, fds, strict=True))
     child.tell(replace(brief, listeners=listening_at, recorder=recorder))
     return child
 
@@ -222,6 +211,7 @@ def _recorder(place: Place) -> RecorderBrief:
         ticks.bus_time_ns(ticks.ticks) + AFTERWARDS_NS,
         fills_gaps=_may_have_gaps(orders),
         logged_inputs=orders.scenario.records_inputs,
+        elsewhere=orders.deployment.elsewhere(orders.scenario),
         drawing=drawing(orders.scenario),
     )
 

@@ -5,6 +5,7 @@ where an operator started them, they are heard over the network.
 """
 
 import socket
+from itertools import chain
 
 from bridge.network import keys
 from bridge.network.link import Link
@@ -23,18 +24,14 @@ _KEYS = {
 
 
 def open_ears(brief: RecorderBrief, link: Link) -> RowSockets:
-    """All sources of a run: the sockets that were inherited; of other processes the keys."""
-    sources = _sources(brief)
-    ends = {
-        process: (socket.socket(fileno=descriptor), sources.pop(process))
-        for process, descriptor in brief.sockets
-    }
+    """Where the blocks of all processes of a run arrive."""
+    here = _sources(brief)
+    elsewhere = [here.pop(process) for process in brief.elsewhere]
     run = brief.network.run
-    for tags in sources.values():
-        for tag in tags:
-            kind, _, name = tag.partition("/")
-            link.subscribe(_KEYS[kind](run, name), tag, room_bytes=ROOM_BYTES)
-    return RowSockets(ends, link if sources else None)
+    for tag in chain.from_iterable(elsewhere):
+        kind, _, name = tag.partition("/")
+        link.subscribe(_KEYS[kind](run, name), tag, room_bytes=ROOM_BYTES)
+    return RowSockets(socket.socket(fileno=brief.sockets), here, link if elsewhere else None)
 
 
 def _sources(brief: RecorderBrief) -> dict[str, list[str]]:
