@@ -213,24 +213,24 @@ class RowSockets:
         """The next block, waiting at most `timeout_s`; 0 polls."""
         arrivals = self._arrivals
         if not arrivals:
-            self._take(0.0)
-        if not arrivals and timeout_s > 0.0:
-            # What comes on the link wakes nobody here: it is looked for.
-            self._take(timeout_s if self._link is None else min(timeout_s, LOOK_S))
+            self._take(timeout_s)
         return arrivals.popleft() if arrivals else None
 
     def _take(self, timeout_s: float) -> None:
         """Take some of what is there, of each sender in turn."""
-        for fd, _ in self._epoll.poll(timeout_s):
-            if fd == self._handed_over.fileno():
+        link = self._link
+        if link is not None:
+            for _ in range(TURN):
+                if (arrival := link.receive(0.0)) is None:
+                    break
+                self._arrivals.append(arrival)
+            # What comes on the link wakes nobody here: it is looked for.
+            timeout_s = 0.0 if self._arrivals else min(timeout_s, LOOK_S)
+        for descriptor, _ in self._epoll.poll(timeout_s):
+            if descriptor == self._handed_over.fileno():
                 self._take_ends()
-            elif fd in self._ends:
-                self._read(self._ends[fd], TURN)
-        for _ in range(TURN if self._link is not None else 0):
-            arrival = self._link.receive(0.0) if self._link is not None else None
-            if arrival is None:
-                break
-            self._arrivals.append(arrival)
+            elif descriptor in self._ends:
+                self._read(self._ends[descriptor], TURN)
 
     def _take_ends(self) -> None:
         """Take the ends that were handed over; before a successor all of its predecessor's."""
@@ -255,6 +255,7 @@ class RowSockets:
                 end.sock.setblocking(False)
                 self._ends[descriptor] = end
                 self._epoll.register(descriptor, select.EPOLLIN)
+                self._read(end, TURN)
 
     def _forget(self, end: _End) -> None:
         if self._ends.pop(end.sock.fileno(), None) is not None:
