@@ -48,7 +48,9 @@ def pair() -> tuple[socket.socket, socket.socket]:
     Raises:
         OSError: no more files can be opened.
     """
-    return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    own, recorders = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    own.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BYTES)
+    return own, recorders
 
 
 class RowSocket:
@@ -63,7 +65,6 @@ class RowSocket:
         self, sock: socket.socket, patience_s: float, *, clock: Clock = SYSTEM_CLOCK
     ) -> None:
         sock.setblocking(False)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BYTES)
         self._sock, self._send = sock, sock.sendmsg
         self._patience_s = patience_s
         self._clock = clock

@@ -224,6 +224,24 @@ def test_who_says_much_keeps_nobody_else_from_being_heard(lines: Lines) -> None:
     assert tags.index("controller/r2") <= 2 * TURN
 
 
+def test_a_recorder_that_starts_last_finds_the_sockets_of_the_largest_fleet() -> None:
+    launchers, recorders = pair()
+    processes = [f"agent/r{number}" for number in range(256)]
+    launchers.settimeout(1.0)
+    ends = []
+    for process in processes:
+        own, theirs = pair()
+        ends.append(own)
+        with theirs:
+            hand_over(launchers, process, theirs)
+        RowSocket(own, 0.0).send(f"{process}\0".encode(), b"hello")
+    with RowSockets(recorders, {process: [process] for process in processes}) as recorder:
+        heard = [recorder.receive(1.0) for _ in processes]
+    assert sorted(arrival.tag for arrival in heard if arrival) == sorted(processes)
+    for end in (launchers, *ends):
+        end.close()
+
+
 def test_those_elsewhere_are_heard_as_well() -> None:
     waiting = deque(Arrival("plant/r1", "key", b"%d" % n) for n in range(3 * TURN))
 
