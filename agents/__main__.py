@@ -29,6 +29,7 @@ from bridge.network.link import Arrival, Link, Publisher
 from bridge.network.messages import Notice, Rows
 from bridge.network.orders import OrderInbox
 from bridge.network.reports import AgentReport
+from bridge.network.row_socket import RowSocket, row_publisher
 from bridge.network.telemetry import RowBuffer, put_rows, row_of
 from bridge.network.zenoh_link import POLLED_DEPTH, ZenohLink
 from bridge.process.awake import LOOK_S, AwakeClock
@@ -78,14 +79,17 @@ def _run(brief: AgentBrief, stop: Stop, link: ZenohLink, watch: LauncherWatch | 
     may_be_absent = brief.schedule.on_late != "abort"
     # A neighbour that comes again has to hear the first path state that is due.
     path = link.publisher(keys.path(name, robot), steady=may_be_absent)
-    telemetry = link.publisher(keys.telemetry(name, robot))
+    line = RowSocket.of(brief.recorder, brief.schedule)
+    heard = link.publisher(keys.telemetry(name, robot))
+    telemetry = row_publisher(line, f"controller/{robot}", heard)
     report = link.publisher(keys.report(name, AGENT.process(robot)))
     progress = link.publisher(keys.progress(name, AGENT.process(robot)))
     within_ns = brief.schedule.rows_within_ns
     rows = RowBuffer(row_of(brief.signals), partial(put_rows, telemetry), within_ns)
     log = None
     if brief.logs_inputs:
-        inputs = link.publisher(keys.inputs(name, robot))
+        heard = link.publisher(keys.inputs(name, robot))
+        inputs = row_publisher(line, f"inputs/{robot}", heard)
         log = InputBuffer(
             lambda first, block, final: put_rows(inputs, first, len(block), block, final)
         )
@@ -125,6 +129,7 @@ def _run(brief: AgentBrief, stop: Stop, link: ZenohLink, watch: LauncherWatch | 
             orders,
             watch,
             log,
+            line,
         )
         return (_realtime if realtime else _lockstep)(connections, stop)
 
@@ -163,6 +168,7 @@ class _Connections(NamedTuple):
     orders: OrderInbox | None = None
     watch: LauncherWatch | None = None
     inputs: InputBuffer | None = None
+    line: RowSocket | None = None
 
     def await_peers(self, deliver: Callable[[Arrival], None], stop: Stop) -> None:
         """Wait for the first message of every peer, then declare this controller ready."""
@@ -199,7 +205,7 @@ class _Connections(NamedTuple):
                 failure=failure,
                 left_early="" if self.agent.closed else early,
                 events=tuple(guard.events),
-                remarks=tuple(self.agent.remarks()),
+                remarks=(*self.agent.remarks(), *(self.line.remarks() if self.line else ())),
                 flooders=tuple(self.agent.admission.refusals.floods()),
                 missing_privileges=tuple(missing_privileges),
                 cpu_ns=process_cpu_ns() - began_ns,
@@ -230,6 +236,8 @@ class _Connections(NamedTuple):
             self.rows.finish()
             if self.inputs is not None:
                 self.inputs.finish()
+            if self.line is not None:
+                self.line.flush()
             say_last(failure, early)
         return early
 
@@ -247,6 +255,8 @@ class _Connections(NamedTuple):
             self.rows.leave(schedule.ticks, final=not returns)
         if self.inputs is not None:
             (self.inputs.hand_on if returns else self.inputs.finish)()
+        if self.line is not None:
+            self.line.flush()
 
     def stop_wheels(self) -> None:
         """Disarm the drives, as far as the bus still sends, after a loop that ended early."""

@@ -185,6 +185,8 @@ class AgentBrief:
     detached: bool = False  # no launcher is its parent: the run's end is when the launcher's
     # token on the network goes
     logs_inputs: bool = False  # for a replay
+    recorder: int | None = None  # inherited file descriptor of its socket to the recorder, if that
+    # is on the same machine
     rejoins: bool = False  # a run that goes on; another process was its controller
     resumes_tick: int = 0  # in lockstep, of one that re-joins: the first tick that it is asked
 
@@ -288,6 +290,7 @@ class PlantBrief:
     attached: tuple[tuple[str, Settings], ...] = ()  # bus, keyword arguments of can.Bus: not ours
     real_robots: tuple[tuple[str, Pose], ...] = ()  # robots that aren't emulated; where they start
     detached: bool = False  # as an agent's
+    recorder: int | None = None  # as an agent's
     controllers: tuple[
         tuple[str, str], ...
     ] = ()  # robot, secret: the clients that lockstep waits for
@@ -354,4 +357,6 @@ class RecorderBrief:
     last_frame_ns: int  # bus time after which no frame ends
     fills_gaps: bool = False  # sources may be cut off or start again: missing rows aren't numbers
     logged_inputs: bool = False  # controllers log theirs
+    elsewhere: tuple[str, ...] = ()  # processes that are heard over the network
+    sockets: int = -1  # inherited file descriptor: where the sockets of all others come
     drawing: Drawing = NO_DRAWING  # for 3-D views of the record

@@ -21,6 +21,7 @@ from bridge.network.messages import Go, Notice, PoseFix, Progress, Rows, Silence
 from bridge.network.orders import OrderInbox
 from bridge.network.refused_messages import Refusals
 from bridge.network.reports import PlantReport
+from bridge.network.row_socket import RowSocket, row_publisher
 from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer, put_rows
 from bridge.network.zenoh_link import ZenohLink
 from bridge.process.awake import Stall
@@ -120,13 +121,18 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
     ]
     silences = _silences(brief, link)
     robots = [*(robot.brief.robot for robot in emulated), *(other.robot for other in others)]
-    truths = [link.publisher(keys.truth(name, robot)) for robot in robots]
+    line = RowSocket.of(brief.recorder, brief.schedule)
+    truths = [
+        row_publisher(line, f"plant/{robot}", link.publisher(keys.truth(name, robot)))
+        for robot in robots
+    ]
     within_ns = brief.schedule.rows_within_ns
     rows = [RowBuffer(PLANT_ROW, partial(put_rows, truth), within_ns) for truth in truths]
     logs: dict[str, FrameBuffer] = {}
     if brief.traffic:
         for bus in dict.fromkeys(robot.bus for robot in brief.robots):
-            traffic = link.publisher(keys.traffic(name, bus), express=False)
+            heard = link.publisher(keys.traffic(name, bus), express=False)
+            traffic = row_publisher(line, f"can/{bus}", heard)
             truths.append(traffic)
             logs[bus] = FrameBuffer(partial(put_rows, traffic))
     taps = {bus: log.add for bus, log in logs.items()}
@@ -203,10 +209,16 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
             buffer.finish()
         for log in logs.values():
             log.finish()
+        if line is not None:
+            line.flush()
         say(progress_of())
         summary = PlantReport(
             events=tuple(herald.events),
-            remarks=(*refusals.lines(), *herald.remarks()),
+            remarks=(
+                *refusals.lines(),
+                *herald.remarks(),
+                *(line.remarks() if line is not None else ()),
+            ),
             left_early=stop.reason if counters.ticks < brief.schedule.ticks else "",
             missing_privileges=tuple(missing_privileges),
             cpu_ns=process_cpu_ns() - began_ns,

@@ -8,7 +8,7 @@ process waits for the next hello between two rounds of its own.
 
 from collections.abc import Callable, Iterable
 
-from bridge.network.link import Arrival, Link, Publisher, waiting
+from bridge.network.link import Arrival, Publisher, Receiver, waiting
 from bridge.process.awake import LOOK_S, AwakeClock
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, launcher_stopped
@@ -56,7 +56,7 @@ class Hellos:
 
 
 def await_hellos(
-    link: Link,
+    link: Receiver,
     hellos: Hellos,
     deliver: Callable[[Arrival], object],
     missing: Callable[[], Iterable[str]],

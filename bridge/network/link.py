@@ -47,7 +47,14 @@ class Publisher(Protocol):
         """Put one message."""
 
 
-class Link(Protocol):
+class Receiver(Protocol):
+    """Where messages arrive."""
+
+    def receive(self, timeout_s: float) -> Arrival | None:
+        """The next message, waiting at most `timeout_s`; 0 polls."""
+
+
+class Link(Receiver, Protocol):
     """One process's connection to the others."""
 
     def publisher(self, key: str, *, express: bool = True, steady: bool = False) -> Publisher:
@@ -63,9 +70,6 @@ class Link(Protocol):
 
     def unsubscribe(self, key: str) -> None:
         """End the subscription to `key`; it may be subscribed to again."""
-
-    def receive(self, timeout_s: float) -> Arrival | None:
-        """The next message, waiting at most `timeout_s`; 0 polls."""
 
     def declare_live(self, key: str) -> None:
         """Hold a liveliness token: seen by its subscribers, withdrawn with this link."""
@@ -88,7 +92,7 @@ class Link(Protocol):
         """Close."""
 
 
-def waiting(link: Link, most: int = MOST_AT_ONCE) -> Iterator[Arrival]:
+def waiting(link: Receiver, most: int = MOST_AT_ONCE) -> Iterator[Arrival]:
     """What has arrived, without waiting; of a flood no more than `most`: the rest stays."""
     for _ in range(most):
         arrival = link.receive(0.0)

@@ -39,7 +39,7 @@ _BATCH = "--batch"
 """Processes start as batch work: one that is woken waits for its turn and interrupts none, which
 is worth a seventh of a lockstep tick."""
 _FORKED = tuple(role.module for role in STARTED if role.forked)
-"""Forked; any other module gets an interpreter of its own, and no descriptors."""
+"""Forked; any other module gets an interpreter of its own."""
 
 
 class Forked(NamedTuple):
@@ -190,7 +190,7 @@ def _receive(orders: socket.socket) -> tuple[str, list[int]]:
     return order, list(fds)
 
 
-def _be(module: str, stdin: int, stdout: int, *_: int) -> None:
+def _be(module: str, stdin: int, stdout: int, *given: int) -> None:
     """In the child: become the process, its other descriptors as they came. Never returns."""
     status = 1
     try:
@@ -199,6 +199,8 @@ def _be(module: str, stdin: int, stdout: int, *_: int) -> None:
             os.dup2(fd, standard)
             os.close(fd)
         if module not in _FORKED:
+            for fd in given:
+                os.set_inheritable(fd, True)
             os.execv(sys.executable, [sys.executable, "-P", "-m", module])
         role = sys.modules[f"{module}.__main__"]
         status = role.main()

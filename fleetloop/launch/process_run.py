@@ -47,6 +47,7 @@ from fleetloop.launch.outcome import Outcome
 from fleetloop.launch.process_faults import ProcessFaults
 from fleetloop.launch.remote_roles import RemoteRoles
 from fleetloop.launch.restarts import Restarts
+from fleetloop.launch.row_lines import RowLines
 from fleetloop.launch.run_requests import RunRequests
 from fleetloop.launch.spawn import Orders, respawn, spawn, viewer_brief
 from fleetloop.launch.supervision import CONSEQUENCES_S, Supervision
@@ -117,6 +118,7 @@ class ProcessRun:
         self._next_look_s = 0.0
         self._clocks = ClockGate(scenario, self._deployment, self._plane.clocks, self._now)
         self._links: dict[str, NetworkLink] = {}
+        self._lines: RowLines
         self._viewer = Viewer(
             lambda token: viewer_brief(self._orders, self._links, self._run, token),
             self._schedule.start_deadline_s,
@@ -200,11 +202,13 @@ class ProcessRun:
             batch = not self._schedule.realtime
             with ForkServer(sockets.folder_of(run), batch=batch) as fork_server:
                 folder = open_.enter_context(sockets.run_folder(run))
+                self._lines = open_.enter_context(RowLines())
                 link = open_.enter_context(self._router(folder, stop))
                 link.declare_live(keys.live(run, LAUNCHER.name))
                 self._plane.subscribe(link, run, self._processes)
                 self._asked.open(link, run, self._processes)
-                spawn(self._orders, self._links, folder, fork_server, self._plane.children)
+                children = self._plane.children
+                spawn(self._orders, self._links, folder, fork_server, self._lines, children)
             if granted := placement.bus_guests(self._deployment):
                 open_.enter_context(Relay(link, folder, scenario.buses, granted))
             open_.callback(self._viewer.stop)
@@ -346,7 +350,7 @@ class ProcessRun:
         folder = sockets.folder_of(self._run)
         faults = self._asked.faults.ledger.planned()
         orders = replace(self._orders, scenario=self._asked.steering.scenario)
-        return respawn(orders, self._links, folder, robot, fork_server, faults, tick)
+        return respawn(orders, self._links, folder, robot, fork_server, self._lines, faults, tick)
 
     def _report_refusals(self, link: LauncherLink) -> None:
         """Look for floods now and then; announce what the router refused or cut off."""

@@ -23,6 +23,7 @@ from fleetloop.launch import placement
 from fleetloop.launch.child import Child
 from fleetloop.launch.drawn import drawing
 from fleetloop.launch.fork_server import ForkServer
+from fleetloop.launch.row_lines import RowLines
 
 AFTERWARDS_NS = 60 * 10**9
 """Bus time in which frames may still end after the closing tick, in real time on a slow machine."""
@@ -69,7 +70,12 @@ class Place:
 
 
 def spawn(
-    orders: Orders, links: Links, folder: Path, fork_server: ForkServer, children: list[Child]
+    orders: Orders,
+    links: Links,
+    folder: Path,
+    fork_server: ForkServer,
+    lines: RowLines,
+    children: list[Child],
 ) -> None:
     """Start the processes in the order of their roles and add them to `children` as they start.
 
@@ -84,10 +90,14 @@ def spawn(
             place = Place(orders, links[role.identity(robot)], folder, robot)
             brief = BRIEFS[role.name](place)
             if isinstance(brief, PlantBrief):
-                children.append(_start_plant(brief, place, fork_server))
-                continue
-            children.append(Child(fork_server, role.process(robot), role.module))
-            children[-1].tell(brief)
+                children.append(_start_plant(brief, place, fork_server, lines))
+            elif isinstance(brief, AgentBrief):
+                children.append(_start_agent(brief, fork_server, lines))
+            elif isinstance(brief, RecorderBrief):
+                children.append(_start_recorder(brief, fork_server, lines))
+            else:
+                children.append(Child(fork_server, role.process(robot), role.module))
+                children[-1].tell(brief)
 
 
 def respawn(
@@ -96,6 +106,7 @@ def respawn(
     folder: Path,
     robot: str,
     fork_server: ForkServer,
+    lines: RowLines,
     faults: Iterable[PlannedFault],
     resumes_tick: int = 0,
 ) -> Child:
@@ -107,10 +118,9 @@ def respawn(
         InfrastructureError: a process can't be had.
     """
     place = Place(orders, links[AGENT.identity(robot)], folder, robot)
-    child = Child(fork_server, AGENT.process(robot), AGENT.module)
     known = agent_faults(faults, robot)
-    child.tell(replace(_agent(place), rejoins=True, resumes_tick=resumes_tick, faults=known))
-    return child
+    brief = replace(_agent(place), rejoins=True, resumes_tick=resumes_tick, faults=known)
+    return _start_agent(brief, fork_server, lines)
 
 
 def ours(scenario: Scenario, deployment: Deployment) -> tuple[str, ...]:
@@ -120,7 +130,24 @@ def ours(scenario: Scenario, deployment: Deployment) -> tuple[str, ...]:
     return tuple(robot for robot in scenario.names if deployment.is_ours(robot))
 
 
-def _start_plant(brief: PlantBrief, place: Place, fork_server: ForkServer) -> Child:
+def _start_agent(brief: AgentBrief, fork_server: ForkServer, lines: RowLines) -> Child:
+    process = AGENT.process(brief.robot)
+    with lines.connect(process) as end:
+        child = Child(fork_server, process, AGENT.module, [end.fileno()])
+    child.tell(replace(brief, recorder=child.fds[0]))
+    return child
+
+
+def _start_recorder(brief: RecorderBrief, fork_server: ForkServer, lines: RowLines) -> Child:
+    child = Child(fork_server, RECORDER.name, RECORDER.module, [lines.recorders])
+    lines.given()
+    child.tell(replace(brief, sockets=child.fds[0]))
+    return child
+
+
+def _start_plant(
+    brief: PlantBrief, place: Place, fork_server: ForkServer, lines: RowLines
+) -> Child:
     """Open the listening sockets of its buses, and hand them to it."""
     orders = place.orders
     buses = list(
@@ -128,13 +155,15 @@ def _start_plant(brief: PlantBrief, place: Place, fork_server: ForkServer) -> Ch
             orders.scenario.bus_of(robot) for robot in ours(orders.scenario, orders.deployment)
         )
     )
-    with ExitStack() as listening:
+    with ExitStack() as listening, lines.connect(PLANT.name) as end:
         listeners = sockets.listen(place.folder, buses)
         for listener in listeners.values():
             listening.enter_context(listener)
         fds = [listeners[bus].fileno() for bus in buses]
-        child = Child(fork_server, PLANT.name, PLANT.module, fds)
-    child.tell(replace(brief, listeners=tuple(zip(buses, child.fds, strict=True))))
+        child = Child(fork_server, PLANT.name, PLANT.module, [*fds, end.fileno()])
+    *fds, recorder = child.fds
+    listening_at = tuple(zip(buses, fds, strict=True))
+    child.tell(replace(brief, listeners=listening_at, recorder=recorder))
     return child
 
 
@@ -182,6 +211,7 @@ def _recorder(place: Place) -> RecorderBrief:
         ticks.bus_time_ns(ticks.ticks) + AFTERWARDS_NS,
         fills_gaps=_may_have_gaps(orders),
         logged_inputs=orders.scenario.records_inputs,
+        elsewhere=orders.deployment.elsewhere(orders.scenario),
         drawing=drawing(orders.scenario),
     )
 

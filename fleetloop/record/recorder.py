@@ -6,7 +6,8 @@ outlives the launcher for as long as it takes to complete the file. Started by `
 
 import struct
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from contextlib import ExitStack
 from math import nan
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from bridge.process.lifecycle import Stop, serve
 from configs.brief import RecorderBrief
 from configs.roles import RECORDER
 from fleetloop.record.can_log import frames_of
+from fleetloop.record.ears import open_ears
 from fleetloop.record.run_record import RunRecord
 from fleetloop.record.writer import Source
 
@@ -34,8 +36,6 @@ AHEAD_TICKS = 1 << 17
 """Largest lead of a source's rows over the slowest's; they wait in memory."""
 GAPS = 8
 """Consecutive blocks after a gap from which on the missing rows count as lost."""
-ROOM_BYTES = 1 << 26
-"""Of what waits of one source: a slow disk may take its time."""
 ABSENT_BYTES = 1 << 26
 """Rows of all others that wait for those of a controller that has left and may come again, if
 that is `ABSENT_TICKS` or more of them: from then on its own count as lost."""
@@ -221,6 +221,11 @@ class _Recorder:
         for tag, _, count in dropped:
             self._refuse(tag, "more of it waited already than there is room for", count)
 
+    def note_foreign(self, refused: Mapping[str, int]) -> None:
+        """Count packets of processes whose they can't be."""
+        for process, count in refused.items():
+            self.refusals.note("block", process, "not its own", count=count)
+
     def _refuse(self, tag: str, why: str, count: int = 1) -> None:
         kind = tag.partition("/")[0]
         what = {"can": "frame block", "inputs": "block"}.get(kind, "row block")
@@ -274,6 +279,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
     The time between arrivals is the network's, so it is read from the system's clock.
     """
     with (
+        ExitStack() as opened,
         open_client(brief.network, brief.start_deadline_s) as link,
         RunRecord(
             Path(brief.path),
@@ -288,18 +294,11 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
     ):
         name = brief.network.run
         recorder = _Recorder(brief, record)
-        for robot in brief.robots if brief.logged_inputs else ():  # heard once its rows are
-            link.subscribe(keys.inputs(name, robot), f"inputs/{robot}", room_bytes=ROOM_BYTES)
-        for robot in brief.robots:
-            link.subscribe(keys.truth(name, robot), f"plant/{robot}", room_bytes=ROOM_BYTES)
-            telemetry = keys.telemetry(name, robot)
-            link.subscribe(telemetry, f"controller/{robot}", room_bytes=ROOM_BYTES)
-        for bus in brief.buses:
-            link.subscribe(keys.traffic(name, bus), f"can/{bus}", room_bytes=ROOM_BYTES)
+        ears = opened.enter_context(open_ears(brief, link))
         progress = link.publisher(keys.progress(name, RECORDER.name))
         report = link.publisher(keys.report(name, RECORDER.name))
         await_hellos(
-            link,
+            ears,
             Hellos(brief.hello_every_s),
             recorder.process,
             lambda: sorted(recorder.unheard),
@@ -311,7 +310,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
         began_ns = process_cpu_ns()
         quiet_since = now = next_report = SYSTEM_CLOCK.monotonic_s()
         while recorder.unfinished:
-            arrival = link.receive(max(next_report - now, 0.0))
+            arrival = ears.receive(max(next_report - now, 0.0))
             now = SYSTEM_CLOCK.monotonic_s()
             if arrival is not None and recorder.process(arrival):
                 quiet_since = now
@@ -326,6 +325,7 @@ def run(brief: RecorderBrief, stop: Stop) -> str:
                 progress.put(Progress(recorder.ticks, 0, 0).encode())
         recorder.end_absences()
         recorder.note_dropped(link.dropped())
+        recorder.note_foreign(ears.refused)
         lost = refused = recorder.refusals.lines()
         if recorder.unfinished:
             missing = ", ".join(sorted(recorder.unfinished))

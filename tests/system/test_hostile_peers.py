@@ -11,12 +11,13 @@ import msgpack
 import psutil
 import pytest
 from support.addresses import free_port
-from support.processes import Run
+from support.processes import Run, completed
 
 from bridge.network import keys
 from bridge.network.client import open_client
 from bridge.network.fault_orders import FaultOrder
 from bridge.network.messages import PathState, Rows
+from bridge.network.telemetry import BLOCK_TICKS
 from bridge.network.zenoh_link import ZenohLink
 from configs.connections import NetworkLink
 from configs.faults.powertrains import DriveEvent
@@ -186,6 +187,27 @@ def test_a_hearer_with_rights_that_does_not_read_stops_nobody(tmp_path, monkeypa
             subscriber.undeclare()
         ears.close()
     assert status == 0, out
+
+
+def test_what_is_said_on_the_network_for_a_process_on_this_machine_is_not_recorded(
+    tmp_path, monkeypatch
+) -> None:
+    with attacked(tmp_path, monkeypatch, "--duration", "2", "--speed", "1") as attack:
+        with attack.client(AGENT.identity("r1")) as r1:
+            # One that ends, one in every place, one that gives up the place of many.
+            for first in range(0, 4000, BLOCK_TICKS):
+                for rows in (Rows(first, 0, b"", True), Rows(first, 1, bytes(4096), False)):
+                    r1._session.put(attack.key(keys.telemetry, "r1"), rows.encode())
+        status, out = attack.run.end()
+    assert status == 0, out
+    assert "recorder" not in attack.run.summary()["notices"]
+    alone = tmp_path / "alone"
+    assert completed(alone, *SCENARIO, "--duration", "2", "--in-process")[0] == 0
+    said, true = (
+        Record.open(folder / "record.mcap").controller["r1"]
+        for folder in (attack.run.folder, alone)
+    )
+    assert said.tobytes() == true.tobytes()
 
 
 def test_only_the_launcher_orders_faults(tmp_path, monkeypatch) -> None:

@@ -20,7 +20,10 @@ given = [socket.socket(socket.AF_UNIX) for _ in range(300)]
 inodes = [os.fstat(sock.fileno()).st_ino for sock in given]
 brief, lifeline = os.pipe()
 with ForkServer(Path(sys.argv[1]), batch=False) as server:
-    forked = server.fork("plant", brief, 1, [sock.fileno() for sock in given])
+    forked = server.fork(sys.argv[2], brief, 1, [sock.fileno() for sock in given])
+    running = Path(f"/proc/{forked.pid}/cmdline")
+    while sys.argv[3].encode() not in running.read_bytes():
+        os.sched_yield()
     blocked = Path(f"/proc/{forked.pid}/status").read_text().partition("SigBlk:")[2].split()[0]
     there = [os.stat(f"/proc/{forked.pid}/fd/{fd}").st_ino for fd in forked.fds]
 os.close(brief)
@@ -42,8 +45,14 @@ with sockets.run_folder("run") as folder:
 """
 
 
-def test_three_hundred_descriptors_arrive_in_order_under_a_limit_of_a_thousand(tmp_path) -> None:
-    command = [sys.executable, "-c", FORK, str(tmp_path / "none")]
+@pytest.mark.parametrize(
+    ("module", "runs"),
+    [("plant", "fork_server"), ("fleetloop.record.recorder", "fleetloop.record.recorder")],
+)
+def test_three_hundred_descriptors_arrive_in_order_under_a_limit_of_a_thousand(
+    module: str, runs: str, tmp_path
+) -> None:
+    command = [sys.executable, "-c", FORK, str(tmp_path / "none"), module, runs]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     arrived, deaf_to_ctrl_c = json.loads(done.stdout or "[false, false]")
     assert arrived, done.stderr
