@@ -36,7 +36,7 @@ from __future__ import annotations
 
 from numba import njit
 
-_equation = njit(error_model="numpy", nogil=True)
+_equation = njit(error_model="numpy", nogil=True, forceinline=True)
 _loop = njit(error_model="numpy", nogil=True, cache=True)
 '''
 

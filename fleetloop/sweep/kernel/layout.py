@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
+from agents.laws.adaptive_dsc import AdaptiveDsc
+from configs.signals import PLANT_SIGNALS, controller_signals
+
 PAPER, ROBUST = 0, 1
 """Laws."""
 COSINE, LINE, CIRCLE, FIGURE_EIGHT, SPLINE = 0, 1, 2, 3, 4
@@ -70,7 +73,7 @@ STATE = np.dtype(
         *_fields(_FLOAT, "seen_right_rad seen_left_rad v_used omega_used o_x o_y o_theta"),
         *_fields(_FLOAT, "f_x f_y f_theta a_x a_y a_theta a_cos a_sin"),
         # coordination, and its map for a degree
-        *_fields(_FLOAT, "v_hat mu s degree v_1 v_2 v_3 mu_1 mu_2 mu_3 mu_4 mu_5 mu_6"),
+        *_fields(_FLOAT, "said_s said_v_hat v_hat mu s degree v_1 v_2 v_3 mu_1 mu_2 mu_3 mu_4 mu_5 mu_6"),
         *_fields(_FLOAT, "s_1 s_2 s_3 s_4 s_5 s_6"),
         # the law, and the limits of the host
         *_fields(_FLOAT, "alpha_theta alpha_v alpha_omega"),
@@ -79,6 +82,10 @@ STATE = np.dtype(
     ]
 )
 """What changes of one robot."""
+
+TRUTH = np.dtype([(signal.name, _FLOAT) for signal in PLANT_SIGNALS])
+TOLD = np.dtype([(signal.name, _FLOAT) for signal in controller_signals(AdaptiveDsc.SIGNALS)])
+"""The rows of the plant and of a controller: the laws that the kernel has say the same."""
 
 EDGE = np.dtype([("speaker", _WHOLE), ("weight", _FLOAT)])
 """An edge to a robot: who is heard, and a_ij."""

@@ -120,7 +120,7 @@ def _start(
         *(0.0, 0.0, 0.0, 0.0),
         *(0.0, 0.0, nan, nan, 0.0, 0.0, 0.0),
         *anchored(*where, (0.0, 0.0, 0.0)),
-        *(coordination.v_hat_0, coordination.mu_0, robot.s_0, *((nan,) * 16)),
+        *(nan, nan, coordination.v_hat_0, coordination.mu_0, robot.s_0, *((nan,) * 16)),
         *(nan, nan, nan, *gains.theta_hat_0, gains.kappa_hat_0),
         *(0.0, 0.0),
     )

@@ -45,25 +45,28 @@ class Columns(NamedTuple):
 
     signals: tuple[Signal, ...]
     numbers: NDArray[np.int64]
-    """Of the columns, of all that a source has."""
+    """Of the columns that the loop fills, of all that a source has; the last ones of its rows."""
 
     @classmethod
     def of(cls, table: Sequence[Signal], wanted: Collection[str]) -> "Columns":
         """Those of a table that are wanted."""
-        numbers = [n for n, signal in enumerate(table) if signal.name in wanted]
-        return cls(tuple(table[n] for n in numbers), np.array(numbers, np.int64))
+        numbers = [n for n, it in enumerate(table) if it.name in wanted and it.name != _TIME]
+        time = (one for one in table if one.name == _TIME)
+        return cls((*time, *(table[n] for n in numbers)), np.array(numbers, np.int64))
 
-    def rows(self, robots: int, ticks: int) -> tuple[Rows, NDArray[np.void]]:
-        """Room for the rows of all robots: as numbers, and the same as rows of a record."""
+    def rows(self, robots: int, ticks: int, period_ns: int) -> tuple[Rows, NDArray[np.void]]:
+        """Room for the rows of all robots: what the loop fills, and all of it as rows of a record."""
         rows = np.empty((robots, ticks), row_type(self.signals))
-        rows["tick"] = np.arange(ticks)
-        return rows.view(np.float64).reshape(robots, ticks, len(self.signals) + 1), rows
+        rows["tick"] = number = np.arange(ticks)
+        rows[_TIME] = number * period_ns * 1e-9
+        numbers = rows.view(np.float64).reshape(robots, ticks, len(self.signals) + 1)
+        return numbers[:, :, 2:], rows
 
 
 @lru_cache(maxsize=64)
 def columns(controller: tuple[Signal, ...], asked: frozenset[str]) -> tuple[Columns, Columns]:
     """What is kept of the plant's rows and of a controller's."""
-    wanted = {_TIME, *(made for name in asked for made in _MADE_OF.get(name, (name,)))}
+    wanted = {*(made for name in asked for made in _MADE_OF.get(name, (name,)))}
     return Columns.of(PLANT_SIGNALS, wanted), Columns.of(controller, wanted)
 
 

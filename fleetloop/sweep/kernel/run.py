@@ -5,13 +5,15 @@ from typing import Final
 
 from bridge.process.lifecycle import Stop
 from configs.scenario import Scenario
-from fleetloop.sweep.kernel import loop
+from fleetloop.sweep.kernel import layout, loop
 from fleetloop.sweep.kernel.compilation import Simulate, compiled_loop
 from fleetloop.sweep.kernel.coverage import lacks
 from fleetloop.sweep.kernel.lowering import lowered
 from fleetloop.sweep.kernel.outcome import KernelOutcome, columns, controller_table, record_of
 from fleetloop.sweep.kernel.reference import arming, referred
 
+_ROW_OF_TRUTH: Final = (0.0,) * len(layout.TRUTH)
+_ROW_TOLD: Final = (0.0,) * len(layout.TOLD)
 _LEFT: Final = {
     loop.PATH_VARIABLE: "a path variable diverged",
     loop.POSE: "a robot left the world",
@@ -53,14 +55,16 @@ def _run_one(
     if lacking := lacks(scenario):
         raise ValueError(f"{scenario.name}: the kernel has no {lacking}")
     made = lowered(scenario)
+    ticks = made.schedule
     kept = columns(controller_table(scenario), asked)
-    room = [one.rows(len(made.robots), made.schedule.ticks) for one in kept]
+    room = [one.rows(len(made.robots), ticks.ticks, ticks.period_ns) for one in kept]
     why, tick, number = simulate(
         *(made.case, made.robots, made.states, made.edges, made.leader_m_s, made.curves),
+        (layout.records(layout.TRUTH, [_ROW_OF_TRUTH]), layout.records(layout.TOLD, [_ROW_TOLD])),
         (kept[0].numbers, kept[1].numbers),
         (room[0][0], room[1][0]),
     )
     if why != loop.NOTHING:
-        where = f"{_LEFT[why]} ({scenario.names[number]}, {made.schedule.when(tick)})"
+        where = f"{_LEFT[why]} ({scenario.names[number]}, {ticks.when(tick)})"
         return referred(scenario, stop, where)
     return KernelOutcome(record_of(scenario, kept, room[0][1], room[1][1]), {}, arming(scenario))
