@@ -6,7 +6,8 @@ at all: what is added to scenarios goes to the in-process reference until the ke
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, fields
-from functools import lru_cache
+from functools import cache, lru_cache
+from importlib.util import find_spec
 from typing import Any, Final
 
 from agents.laws.gains import AdaptiveDscGains, AdaptiveDscRobustGains
@@ -17,7 +18,6 @@ from configs.host import Host
 from configs.netem import Effects
 from configs.parameters import Parameters
 from configs.plugins import LAWS, Choice
-from configs.resolve import pose_age_limit_s, schedule
 from configs.scenario import Scenario
 
 Reason = Callable[[Any], str]
@@ -125,7 +125,14 @@ _KEYS: Final[Mapping[type[Parameters], Mapping[str, Reason]]] = {
 
 def lacks(scenario: Scenario) -> str:
     """Why the kernel can't run a scenario, "" if it can."""
+    if not _has_compiler():
+        return "numba, which isn't installed: pip install 'fleetloop[sweep]'"
     return next(_reasons(scenario), "")
+
+
+@cache
+def _has_compiler() -> bool:
+    return find_spec("numba") is not None
 
 
 def _reasons(scenario: Scenario) -> Iterator[str]:
@@ -153,23 +160,16 @@ def _reasons(scenario: Scenario) -> Iterator[str]:
         yield from _of_section(robot.disturbance or scenario.disturbance)
     for body in scenario.robot_types.values():
         yield from _of_section(body)
-    yield from _of_poses(scenario)
 
 
 def _of_law(choice: Choice) -> Iterator[str]:
-    if choice.name in LAWS and type(choice.parameters) in (AdaptiveDscGains, AdaptiveDscRobustGains):
+    if choice.name in LAWS and type(choice.parameters) in (
+        AdaptiveDscGains,
+        AdaptiveDscRobustGains,
+    ):
         yield from _of_section(choice.parameters)
     else:
         yield f"the law {choice.name}"
-
-
-def _of_poses(scenario: Scenario) -> Iterator[str]:
-    """A robot stops where poses are further apart than it lets them be."""
-    if scenario.localisation.source != "odometry":
-        ticks = schedule(scenario)
-        oldest_s = (ticks.pose_delay_ticks + ticks.localise_every) * ticks.period_s
-        if oldest_s > pose_age_limit_s(scenario):
-            yield "poses that are older than host.pose_age_limit_s"
 
 
 def _of_section(section: object) -> Iterator[str]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike
+from numpy.typing import DTypeLike, NDArray
 
 from agents.laws.adaptive_dsc import AdaptiveDsc
 from configs.signals import PLANT_SIGNALS, controller_signals
@@ -73,7 +73,9 @@ STATE = np.dtype(
         *_fields(_FLOAT, "seen_right_rad seen_left_rad v_used omega_used o_x o_y o_theta"),
         *_fields(_FLOAT, "f_x f_y f_theta a_x a_y a_theta a_cos a_sin"),
         # coordination, and its map for a degree
-        *_fields(_FLOAT, "said_s said_v_hat v_hat mu s degree v_1 v_2 v_3 mu_1 mu_2 mu_3 mu_4 mu_5 mu_6"),
+        *_fields(
+            _FLOAT, "said_s said_v_hat v_hat mu s degree v_1 v_2 v_3 mu_1 mu_2 mu_3 mu_4 mu_5 mu_6"
+        ),
         *_fields(_FLOAT, "s_1 s_2 s_3 s_4 s_5 s_6"),
         # the law, and the limits of the host
         *_fields(_FLOAT, "alpha_theta alpha_v alpha_omega"),
@@ -83,14 +85,21 @@ STATE = np.dtype(
 )
 """What changes of one robot."""
 
+CONTROLLER_SIGNALS = controller_signals(AdaptiveDsc.SIGNALS)
+"""Of a controller: the laws that the kernel has say the same."""
 TRUTH = np.dtype([(signal.name, _FLOAT) for signal in PLANT_SIGNALS])
-TOLD = np.dtype([(signal.name, _FLOAT) for signal in controller_signals(AdaptiveDsc.SIGNALS)])
-"""The rows of the plant and of a controller: the laws that the kernel has say the same."""
+TOLD = np.dtype([(signal.name, _FLOAT) for signal in CONTROLLER_SIGNALS])
+"""The rows of the plant and of a controller."""
 
 EDGE = np.dtype([("speaker", _WHOLE), ("weight", _FLOAT)])
 """An edge to a robot: who is heard, and a_ij."""
 
 
-def records(layout: DTypeLike, rows: Sequence[tuple[Any, ...]]) -> Any:
-    """Rows as an array of records whose fields are attributes."""
-    return np.array(rows, layout).view(np.recarray)
+def records(layout: DTypeLike, rows: Sequence[tuple[Any, ...]]) -> NDArray[np.void]:
+    """Rows as an array; to the loop its fields are attributes, uncompiled as of `np.recarray`."""
+    return np.array(rows, layout)
+
+
+def one(layout: np.dtype[np.void]) -> NDArray[np.void]:
+    """One record of zeros."""
+    return np.zeros(1, layout)

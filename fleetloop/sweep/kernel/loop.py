@@ -1,4 +1,4 @@
-"""The closed loop of one case, tick by tick: the order of `fleetloop.in_process`, without its parts.
+"""The closed loop of one case, tick by tick, in the order of `fleetloop.in_process`.
 
     share       path variables and speed estimates, every `share_every` ticks
     per robot   truth to the record; pose, every `localise_every`; encoders as float32;
@@ -35,8 +35,8 @@ from agents.limits import limited
 from agents.localisation import along, anchored, carried, heading_then, moved, nearest_turn
 from agents.neighbours import extrapolated
 from agents.paths import (
-    PlanarJet,
     Jet,
+    PlanarJet,
     circle_jet,
     cosine_jet,
     cosine_reference,
@@ -57,11 +57,10 @@ from fleetloop.sweep.kernel.layout import (
     ODOMETRY,
     ROBUST,
     STRUCTURE,
-    VARYING,
     WORLD,
 )
 from fleetloop.sweep.kernel.primitives import FLOAT32_MOST, float32
-from plant.body import body_rates, disturbance_torques, rolling_speeds
+from plant.body import body_rates, rolling_speeds
 from plant.exact import shaft_motion
 from plant.integrate import net_torques, runge_kutta, within_bounds
 
@@ -73,8 +72,8 @@ MOST_TURN_RAD = 1e15
 """Whole turns beyond are no whole numbers any more."""
 
 
-def simulate(
-    case: Any,
+def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are given cost time
+    cases: Any,
     robots: Any,
     states: Any,
     edges: Any,
@@ -87,7 +86,7 @@ def simulate(
     """Run one case from tick 0 to its end, or to the tick at which it leaves the ordinary course.
 
     Args:
-        case: a record of `layout.CASE`.
+        cases: one record of `layout.CASE`.
         robots: records of `layout.ROBOT`.
         states: of `layout.STATE`, at tick 0; at the end those of the end.
         edges: of `layout.EDGE`, those to each robot together, in the order of speakers' names.
@@ -100,7 +99,7 @@ def simulate(
     Returns:
         why it left the ordinary course, `NOTHING` if it didn't; the tick; the robot's number.
     """
-    count, ticks = len(robots), case.ticks
+    case, count, ticks = cases[0], len(robots), cases[0].ticks
     (truths, tolds), (kept_truth, kept_told), (plant_room, controller_room) = rows, kept, room
     truth, told = truths[0], tolds[0]
     truth_row, told_row = truths.view(np.float64), tolds.view(np.float64)
@@ -158,9 +157,18 @@ def simulate(
                     sum_v += weight * v_j
             s = state.s
             told.t_s, told.neighbours = t_s, neighbours
-            told.s, told.mu, told.v_r_hat, told.s_dot = s, state.mu, state.v_hat, state.mu + state.v_hat
+            told.s, told.mu, told.v_r_hat, told.s_dot = (
+                s,
+                state.mu,
+                state.v_hat,
+                state.mu + state.v_hat,
+            )
             v_r = leader_m_s[tick] if robot.follows_leader else 0.0
-            _coordinate(case, robot, state, degree, sum_s, sum_v, v_r)
+            if degree != state.degree:
+                _take_map(case, robots, states, i, degree)
+            state.v_hat, state.mu, state.s = advanced(
+                _kept_map(state), state.v_hat, state.mu, s, sum_s, sum_v, v_r
+            )
             if case.path == COSINE and robot.offset == WORLD:
                 reference = _cosine(robot, s)
             else:
@@ -199,9 +207,7 @@ def _tell_truth(truth: Any, t_s: float, robot: Any, state: Any) -> None:
 
 def _measure(robot: Any, state: Any) -> None:
     """Encoders, as the bus carries them; odometry and speeds from them."""
-    speeds = rolling_speeds(
-        state.v, state.omega, robot.half_track, robot.inv_right, robot.inv_left
-    )
+    speeds = rolling_speeds(state.v, state.omega, robot.half_track, robot.inv_right, robot.inv_left)
     right_rev, right_rev_s = shaft_motion(state.right_wheel_rad, speeds[0], robot.gear_right)
     left_rev, left_rev_s = shaft_motion(state.left_wheel_rad, speeds[1], robot.gear_left)
     right_rad = float32(right_rev + 0.0) * robot.wheel_rad_per_rev_right  # + the offset of a drive
@@ -244,16 +250,15 @@ def _fix(
 # --- the controller -------------------------------------------------------------------------------
 
 
-def _coordinate(
-    case: Any, robot: Any, state: Any, degree: float, sum_s: float, sum_v: float, v_r: float
-) -> None:
-    """The next state of the coordination."""
-    if degree != state.degree:
-        state.degree = degree
-        _keep_map(state, period_map(case.p, case.q, degree, robot.h, case.period_s))
-    state.v_hat, state.mu, state.s = advanced(
-        _kept_map(state), state.v_hat, state.mu, state.s, sum_s, sum_v, v_r
-    )
+def _take_map(case: Any, robots: Any, states: Any, i: int, degree: float) -> None:
+    """Take the coordination's map of another degree, from a robot that has it, or a new one."""
+    state, h = states[i], robots[i].h
+    state.degree = degree
+    for other in range(len(robots)):
+        if other != i and states[other].degree == degree and robots[other].h == h:
+            _keep_map(state, _kept_map(states[other]))
+            return
+    _keep_map(state, period_map(case.p, case.q, degree, h, case.period_s))
 
 
 def _keep_map(state: Any, rows: Map) -> None:
@@ -273,7 +278,11 @@ def _kept_map(state: Any) -> Map:
 
 
 def _control(
-    case: Any, robot: Any, state: Any, told: Any, reference: tuple[float, float, float, float, float]
+    case: Any,
+    robot: Any,
+    state: Any,
+    told: Any,
+    reference: tuple[float, float, float, float, float],
 ) -> int:
     """Torques to the drives, by what the controller knows; why it can't go on."""
     if case.localisation == EXTERNAL:

@@ -1,13 +1,13 @@
-"""A scenario as the numbers of one case: what the briefs and the constructors of its parts make of it.
+"""A scenario as the numbers of one case, as its briefs and the constructors of its parts make them.
 
-Numbers that equations need once are computed by the functions that the parts call, too. What cases of
-a sweep have in common is computed once and looked up by its value.
+Numbers that equations need once are computed by the functions that those parts call. What cases of
+a sweep have in common is computed once, and looked up by its value.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from math import inf, nan
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from configs.brief import Schedule, WheelDisturbance, Wheels
 from configs.curves import SplinePath, VaryingOffset, formation_offset, reference_path
 from configs.graph import Graph
 from configs.leader_speed import speed_at
-from configs.parameters import Parameters, extended
+from configs.parameters import Parameters, changed, extended
 from configs.resolve import schedule, speed_changes, substeps
 from configs.scenario import Scenario
 from fleetloop.sweep.kernel import layout
@@ -35,7 +35,9 @@ _SOURCES: Final = {
     "odometry": layout.ODOMETRY,
 }
 _UNDISTURBED: Final = WheelDisturbance(amplitude_wheel_N_m=0.0, rate_rad_s=0.0, phase_rad=0.0)
+_P = TypeVar("_P", bound=Parameters)
 Numbers = tuple[float, ...]
+Records = NDArray[np.void]
 Curves = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
@@ -43,10 +45,10 @@ class Case(NamedTuple):
     """What `loop.simulate` is given of one case."""
 
     schedule: Schedule
-    case: Any
-    robots: Any
-    states: Any
-    edges: Any
+    cases: Records
+    robots: Records
+    states: Records
+    edges: Records
     leader_m_s: NDArray[np.float64]
     curves: Curves
 
@@ -56,14 +58,16 @@ def lowered(scenario: Scenario) -> Case:
     ticks, graph = schedule(scenario), _shared_graph(scenario)
     curves = _Splines()
     centre_kind, centre = _centre(scenario.path, curves)
-    robots, states, edges = [], [], []
+    robots, states = [], []
+    edges: list[tuple[int, float]] = []
     numbers = {name: number for number, name in enumerate(scenario.names)}
     for number, robot in enumerate(scenario.robot):
         heard = graph.hears[robot.name]
         first_edge = len(edges)
         edges += [(numbers[edge.speaker], edge.weight) for edge in heard]
         link = graph.links.get(robot.name)
-        body, choice = scenario.body_of(robot), scenario.control_of(robot)
+        body, choice = _body_of(scenario, robot), scenario.control_of(robot)
+        drives = _drives(_changed(scenario.mounting, robot.mounting))
         h = 0.0 if link is None else link.weight
         offset_kind, place, knots = _offset(scenario.path, robot.offset, curves)
         disturbed, waves = _waves(robot.disturbance or scenario.disturbance, number + 1)
@@ -74,14 +78,14 @@ def lowered(scenario: Scenario) -> Case:
                 *(law, limits, link is not None, disturbed),
                 *(first_edge, len(edges), offset_kind, *knots),
                 *(*of_law, *limit, *place, h),
-                *(*_localiser(body), *_drives(scenario.mounting_of(robot)), *_body(body), *waves),
+                *(*_localiser(body), *drives, *_body(body), *waves),
             )
         )
-        states.append(_start(robot, scenario.coordination, choice.parameters))
-    case = layout.records(layout.CASE, [_case(scenario, ticks, centre_kind, centre, curves)])
+        states.append(_start(robot, scenario.coordination, choice.parameters, drives))
+    case = _case(scenario, ticks, centre_kind, centre, curves)
     return Case(
         ticks,
-        case[0],
+        layout.records(layout.CASE, [case]),
         layout.records(layout.ROBOT, robots),
         layout.records(layout.STATE, states),
         layout.records(layout.EDGE, edges),
@@ -109,7 +113,7 @@ def _case(
 
 
 def _start(
-    robot: sections.Robot, coordination: sections.Coordination, gains: Any
+    robot: sections.Robot, coordination: sections.Coordination, gains: Any, drives: Numbers
 ) -> tuple[float, ...]:
     """The state of a robot at tick 0, after a countdown in which its drives were armed."""
     pose = robot.pose
@@ -117,7 +121,12 @@ def _start(
     return (
         0,
         *(*where, robot.v_m_s, robot.omega_rad_s, 0.0, 0.0),
-        *(0.0, 0.0, 0.0, 0.0),
+        *(
+            0.0 * drives[0],
+            0.0 * drives[1],
+            0.0,
+            0.0,
+        ),  # torque 0 was sent last: -0 to a mirror image
         *(0.0, 0.0, nan, nan, 0.0, 0.0, 0.0),
         *anchored(*where, (0.0, 0.0, 0.0)),
         *(nan, nan, coordination.v_hat_0, coordination.mu_0, robot.s_0, *((nan,) * 16)),
@@ -126,12 +135,27 @@ def _start(
     )
 
 
+def _body_of(scenario: Scenario, robot: sections.Robot) -> sections.Body:
+    """As `Scenario.body_of`."""
+    body: sections.Body = _changed(scenario.robot_types.get(robot.type, _BODY), robot.body)
+    return body
+
+
+_BODY: Final = sections.Body()
+
+
+@lru_cache(maxsize=4096)
+def _changed(section: _P, changes: Parameters) -> _P:
+    """As `configs.parameters.changed`, once for all cases."""
+    return changed(section, changes)
+
+
 # --- the graph and the leader ---------------------------------------------------------------------
 
 
 def _shared_graph(scenario: Scenario) -> Graph:
     """The graph of a scenario, computed once for all that have it."""
-    made = scenario.__dict__.get("topology")
+    made: Graph | None = scenario.__dict__.get("topology")
     if made is None:
         key = (
             *(scenario.graph, scenario.names, scenario.clock.control_period_s),
@@ -143,7 +167,7 @@ def _shared_graph(scenario: Scenario) -> Graph:
                 _GRAPHS.clear()
             made = _GRAPHS[key] = scenario.topology
         scenario.__dict__["topology"] = made
-    return made  # type: ignore[no-any-return]
+    return made
 
 
 _MOST_GRAPHS: Final = 4096

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from configs.events import Event
-from configs.resolve import signals_of
 from configs.scenario import Scenario
 from configs.signals import DISTANCE, PATH_DISTANCE, PLANT_SIGNALS, SPREAD, Signal
 from fleetloop.record.reader import Record
 from fleetloop.record.schema import row_type
+from fleetloop.sweep.kernel.layout import CONTROLLER_SIGNALS
 
 _MADE_OF: Final[Mapping[str, tuple[str, ...]]] = {
     SPREAD: ("s",),
@@ -55,7 +55,7 @@ class Columns(NamedTuple):
         return cls((*time, *(table[n] for n in numbers)), np.array(numbers, np.int64))
 
     def rows(self, robots: int, ticks: int, period_ns: int) -> tuple[Rows, NDArray[np.void]]:
-        """Room for the rows of all robots: what the loop fills, and all of it as rows of a record."""
+        """Room for the rows of all robots: what the loop fills, and the rows that it is of."""
         rows = np.empty((robots, ticks), row_type(self.signals))
         rows["tick"] = number = np.arange(ticks)
         rows[_TIME] = number * period_ns * 1e-9
@@ -64,21 +64,10 @@ class Columns(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def columns(controller: tuple[Signal, ...], asked: frozenset[str]) -> tuple[Columns, Columns]:
+def columns(asked: frozenset[str]) -> tuple[Columns, Columns]:
     """What is kept of the plant's rows and of a controller's."""
-    wanted = {*(made for name in asked for made in _MADE_OF.get(name, (name,)))}
-    return Columns.of(PLANT_SIGNALS, wanted), Columns.of(controller, wanted)
-
-
-def controller_table(scenario: Scenario) -> tuple[Signal, ...]:
-    """The signals of the controllers' rows: those of the laws that the kernel has are the same."""
-    return _table(signals_of(scenario, scenario.robot[0]))
-
-
-@lru_cache(maxsize=16)
-def _table(signals: tuple[Signal, ...]) -> tuple[Signal, ...]:
-    """The one object of equal tables: it is looked up by."""
-    return signals
+    wanted = {made for name in asked for made in _MADE_OF.get(name, (name,))}
+    return Columns.of(PLANT_SIGNALS, wanted), Columns.of(CONTROLLER_SIGNALS, wanted)
 
 
 def record_of(

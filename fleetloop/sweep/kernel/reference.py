@@ -41,11 +41,8 @@ def arming(scenario: Scenario) -> list[Event]:
     Raises:
         InfrastructureError: the drives were not armed when control had to start.
     """
-    return [
-        event._replace(source=robot)
-        for robot in scenario.names
-        for event in _armed(_Countdown(scenario))
-    ]
+    events = _armed(_Countdown(scenario))
+    return [event._replace(source=robot) for robot in scenario.names for event in events]
 
 
 class _Countdown:

@@ -9,11 +9,9 @@ from fleetloop.sweep.kernel import layout, loop
 from fleetloop.sweep.kernel.compilation import Simulate, compiled_loop
 from fleetloop.sweep.kernel.coverage import lacks
 from fleetloop.sweep.kernel.lowering import lowered
-from fleetloop.sweep.kernel.outcome import KernelOutcome, columns, controller_table, record_of
+from fleetloop.sweep.kernel.outcome import KernelOutcome, columns, record_of
 from fleetloop.sweep.kernel.reference import arming, referred
 
-_ROW_OF_TRUTH: Final = (0.0,) * len(layout.TRUTH)
-_ROW_TOLD: Final = (0.0,) * len(layout.TOLD)
 _LEFT: Final = {
     loop.PATH_VARIABLE: "a path variable diverged",
     loop.POSE: "a robot left the world",
@@ -23,9 +21,7 @@ _LEFT: Final = {
 }
 
 
-def run(
-    scenarios: Sequence[Scenario], signals: Collection[str], stop: Stop
-) -> list[KernelOutcome]:
+def run(scenarios: Sequence[Scenario], signals: Collection[str], stop: Stop) -> list[KernelOutcome]:
     """Run cases; with a stop, those before it.
 
     A case in which a robot stops itself or diverges is run again by the in-process reference, from
@@ -56,11 +52,11 @@ def _run_one(
         raise ValueError(f"{scenario.name}: the kernel has no {lacking}")
     made = lowered(scenario)
     ticks = made.schedule
-    kept = columns(controller_table(scenario), asked)
+    kept = columns(asked)
     room = [one.rows(len(made.robots), ticks.ticks, ticks.period_ns) for one in kept]
     why, tick, number = simulate(
-        *(made.case, made.robots, made.states, made.edges, made.leader_m_s, made.curves),
-        (layout.records(layout.TRUTH, [_ROW_OF_TRUTH]), layout.records(layout.TOLD, [_ROW_TOLD])),
+        *(made.cases, made.robots, made.states, made.edges, made.leader_m_s, made.curves),
+        (layout.one(layout.TRUTH), layout.one(layout.TOLD)),
         (kept[0].numbers, kept[1].numbers),
         (room[0][0], room[1][0]),
     )
