@@ -13,9 +13,10 @@ from typing import Any, Final
 from agents.laws.gains import AdaptiveDscGains, AdaptiveDscRobustGains
 from configs import paths, sections
 from configs.drives import DEFAULT, Drive
+from configs.edges import LEADER
 from configs.graph_section import GraphSection
 from configs.host import Host
-from configs.netem import Effects
+from configs.netem import LOCALISATION, EdgeEffects, Effects
 from configs.parameters import Parameters
 from configs.plugins import LAWS, Choice
 from configs.scenario import Scenario
@@ -58,6 +59,20 @@ _DRIVE: Final[Mapping[str, Reason]] = {
     **_all_of("position_gain_1_s under_voltage_V over_voltage_V derate_from_C derate_to_C"),
     **_all_of("spinout_power_W firmware boot_s calibration_s estop_blocks_arming"),
 }
+
+
+def _between_robots(edges: tuple[str, ...]) -> str:
+    sources = {text.partition("->")[0].strip() for text in edges}
+    if others := sources & {LEADER, LOCALISATION}:
+        return f"an emulated edge from the {min(others)}"
+    return ""
+
+
+_EFFECTS: Final = {
+    **_all_of("delay reordering loss duplication bandwidth_bit_s message_bytes queue_messages"),
+    "partitions": _any,
+    "distance": _only(None, "losses by distance"),
+}
 _KEYS: Final[Mapping[type[Parameters], Mapping[str, Reason]]] = {
     sections.Clock: {
         "mode": _only("lockstep", "real time"),
@@ -75,8 +90,7 @@ _KEYS: Final[Mapping[type[Parameters], Mapping[str, Reason]]] = {
     sections.Leader: _all_of("speed_m_s steps"),
     sections.SpeedStep: _all_of("t_s speed_m_s ramp_s"),
     GraphSection: {
-        **_all_of("edges generator adjacency file weights max_in_degree seed leader"),
-        "switch": _only((), "a graph that switches"),
+        **_all_of("edges generator adjacency file weights max_in_degree seed leader switch"),
     },
     AdaptiveDscGains: _GAINS,
     AdaptiveDscRobustGains: {**_GAINS, **_all_of("v_bar_limit_m_s torque_limit_wheel_N_m")},
@@ -104,8 +118,7 @@ _KEYS: Final[Mapping[type[Parameters], Mapping[str, Reason]]] = {
     sections.Disturbance: _all_of("amplitude_wheel_N_m rate_rad_s"),
     sections.Network: {
         "endpoint": _any,
-        "default": _only(Effects(), "an emulated network"),
-        "edge": _only((), "an emulated network"),
+        **_all_of("default edge"),  # looked at for themselves
     },
     sections.Robot: {
         **_all_of("name type pose v_m_s omega_rad_s s_0 bus right_node left_node"),
@@ -113,6 +126,8 @@ _KEYS: Final[Mapping[type[Parameters], Mapping[str, Reason]]] = {
         "joins_at_s": _only(0.0, "robots that join later"),
         "leaves_at_s": _only(None, "robots that leave"),
     },
+    Effects: _EFFECTS,
+    EdgeEffects: {**_EFFECTS, "edges": _between_robots},
     sections.Pose: _all_of("x_m y_m theta_rad"),
     sections.Body: _all_of(
         "wheel_radius_m half_track_m com_offset_m body_mass_kg wheel_mass_kg body_inertia_kg_m2"
@@ -121,6 +136,11 @@ _KEYS: Final[Mapping[type[Parameters], Mapping[str, Reason]]] = {
     ),
 }
 """By the section's type and key."""
+
+
+def network_acts(network: sections.Network) -> bool:
+    """Whether edges between robots are emulated."""
+    return network.default != Effects() or bool(network.edge)
 
 
 def lacks(scenario: Scenario) -> str:
@@ -146,6 +166,7 @@ def _reasons(scenario: Scenario) -> Iterator[str]:
         *(scenario.clock, scenario.path, scenario.leader, *scenario.leader.steps),
         *(scenario.graph, scenario.coordination, scenario.localisation, scenario.bus),
         *(scenario.mounting, scenario.host, scenario.disturbance, scenario.network),
+        *(scenario.network.default, *scenario.network.edge),
     ):
         yield from _of_section(section)
     if scenario.drive_choice.name == DEFAULT:

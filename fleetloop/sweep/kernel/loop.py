@@ -53,8 +53,10 @@ from fleetloop.sweep.kernel.layout import (
     COSINE,
     EXTERNAL,
     FIGURE_EIGHT,
+    HEARD,
     LINE,
     ODOMETRY,
+    OWN_ESTIMATE,
     ROBUST,
     STRUCTURE,
     WORLD,
@@ -77,6 +79,7 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
     robots: Any,
     states: Any,
     edges: Any,
+    changes: Any,
     leader_m_s: Any,
     curves: Any,
     rows: tuple[Any, Any],
@@ -89,8 +92,10 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
         cases: one record of `layout.CASE`.
         robots: records of `layout.ROBOT`.
         states: of `layout.STATE`, at tick 0; at the end those of the end.
-        edges: of `layout.EDGE`, those to each robot together, in the order of speakers' names.
-        leader_m_s: v_r by tick.
+        edges: of `layout.EDGE`, those to each robot together, in the order of speakers' names, and
+            the leader links.
+        changes: of edges that change: from this tick on, this share counts.
+        leader_m_s: v_r by tick, 0 where there is none to be heard.
         curves: knots of all splines; and their coefficients, twice: x and y, or ahead and left.
         rows: records of `layout.TRUTH` and of `layout.TOLD`, one each, to write in.
         kept: numbers of the columns of these that are kept.
@@ -105,8 +110,10 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
     truth_row, told_row = truths.view(np.float64), tolds.view(np.float64)
     slots = case.pose_delay_ticks + 1
     pasts = np.zeros((count, slots, 6))  # odometry and pose, by tick, the last ones
+    shares = -(-ticks // case.share_every)
+    said = np.zeros((shares, count, 2))  # s and v̂ of all, by share
     step_s = case.period_s / case.substeps
-    said_ns = 0
+    share = 0
     for tick in range(ticks):
         t_ns = tick * case.period_ns
         t_s = t_ns * 1e-9
@@ -115,13 +122,12 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
         fixes = fix_tick >= 0 and fix_tick % case.localise_every == 0
         slot, fix_slot = tick % slots, fix_tick % slots
         if tick % case.share_every == 0:
-            said_ns = t_ns
+            share = tick // case.share_every
             for i in range(count):
                 state = states[i]
-                state.said_s, state.said_v_hat = state.s, state.v_hat
+                said[share, i, 0], said[share, i, 1] = state.s, state.v_hat
                 if not _is_reached(case, t_s, state.s, state.v_hat):
                     return PATH_VARIABLE, tick, i
-        age_s = (t_ns - said_ns) * 1e-9
         for i in range(count):
             robot, state = robots[i], states[i]
             if len(kept_truth):
@@ -143,18 +149,40 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
                     return TURN, tick, i
 
             neighbours, degree, sum_s, sum_v = 0, 0.0, 0.0, 0.0
-            if age_s <= case.silence_limit_s:
-                counted_s = min(age_s, case.age_limit_s)
-                for number in range(robot.first_edge, robot.last_edge):
-                    edge = edges[number]
-                    speaker, weight = states[edge.speaker], edge.weight
-                    s_j, v_j = speaker.said_s, speaker.said_v_hat
-                    if case.extrapolates:
-                        s_j = extrapolated(s_j, v_j, counted_s, case.half_period_s)
-                    neighbours += 1
-                    degree += weight
-                    sum_s += weight * s_j
-                    sum_v += weight * v_j
+            for number in range(robot.first_edge, robot.last_edge):
+                edge = edges[number]
+                counts = share
+                if not edge.steady:
+                    while edge.next_change < edge.last_change:
+                        if changes[edge.next_change, 0] > tick:
+                            break
+                        edge.counts = changes[edge.next_change, 1]
+                        edge.next_change += 1
+                    counts = edge.counts
+                age_s = (t_ns - counts * case.share_every * case.period_ns) * 1e-9
+                if counts < 0 or age_s > case.silence_limit_s:
+                    continue
+                age_s = min(age_s, case.age_limit_s)
+                s_j, v_j, weight = (
+                    said[counts, edge.speaker, 0],
+                    said[counts, edge.speaker, 1],
+                    edge.weight,
+                )
+                if case.extrapolates:
+                    s_j = extrapolated(s_j, v_j, age_s, case.half_period_s)
+                neighbours += 1
+                degree += weight
+                sum_s += weight * s_j
+                sum_v += weight * v_j
+            h = 0.0
+            if robot.link >= 0:
+                edge = edges[robot.link]
+                while edge.next_change < edge.last_change:
+                    if changes[edge.next_change, 0] > tick:
+                        break
+                    edge.counts = changes[edge.next_change, 1]
+                    edge.next_change += 1
+                h = edge.weight if edge.counts else 0.0
             s = state.s
             told.t_s, told.neighbours = t_s, neighbours
             told.s, told.mu, told.v_r_hat, told.s_dot = (
@@ -163,9 +191,13 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
                 state.v_hat,
                 state.mu + state.v_hat,
             )
-            v_r = leader_m_s[tick] if robot.follows_leader else 0.0
-            if degree != state.degree:
-                _take_map(case, robots, states, i, degree)
+            v_r = 0.0
+            if robot.leader == HEARD:
+                v_r = leader_m_s[tick]
+            elif robot.leader == OWN_ESTIMATE:
+                v_r = state.v_hat
+            if degree != state.degree or h != state.h:
+                _take_map(case, states, i, degree, h)
             state.v_hat, state.mu, state.s = advanced(
                 _kept_map(state), state.v_hat, state.mu, s, sum_s, sum_v, v_r
             )
@@ -250,12 +282,12 @@ def _fix(
 # --- the controller -------------------------------------------------------------------------------
 
 
-def _take_map(case: Any, robots: Any, states: Any, i: int, degree: float) -> None:
-    """Take the coordination's map of another degree, from a robot that has it, or a new one."""
-    state, h = states[i], robots[i].h
-    state.degree = degree
-    for other in range(len(robots)):
-        if other != i and states[other].degree == degree and robots[other].h == h:
+def _take_map(case: Any, states: Any, i: int, degree: float, h: float) -> None:
+    """Take the coordination's map of another d and h, from a robot that has it, or a new one."""
+    state = states[i]
+    state.degree, state.h = degree, h
+    for other in range(len(states)):
+        if other != i and states[other].degree == degree and states[other].h == h:
             _keep_map(state, _kept_map(states[other]))
             return
     _keep_map(state, period_map(case.p, case.q, degree, h, case.period_s))

@@ -4,14 +4,22 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from configs.events import Event
 from configs.scenario import Scenario
-from configs.signals import DISTANCE, PATH_DISTANCE, PLANT_SIGNALS, SPREAD, Signal
+from configs.signals import (
+    DISTANCE,
+    PATH_DISTANCE,
+    PLANT_SIGNALS,
+    SPREAD,
+    USED_SIGNALS,
+    Signal,
+    age_signals,
+)
 from fleetloop.record.reader import Record
 from fleetloop.record.schema import row_type
 from fleetloop.sweep.kernel.layout import CONTROLLER_SIGNALS
@@ -72,19 +80,33 @@ def columns(asked: frozenset[str]) -> tuple[Columns, Columns]:
 
 def record_of(
     scenario: Scenario,
-    kept: tuple[Columns, Columns],
     plant: NDArray[np.void],
-    controller: NDArray[np.void],
+    controller: Mapping[str, NDArray[np.void]],
+    tables: Mapping[str, tuple[Signal, ...]],
 ) -> Record:
-    """Rows by robot and tick as a record that was read."""
+    """Rows by robot and tick as a record that was read; `tables` are those of the controllers."""
     robots = scenario.names
-    signals: dict[str, Any] = dict.fromkeys(robots, kept[1].signals)
     return Record(
         Path("record of the kernel"),
         robots,
         dict(zip(robots, plant, strict=True)),
-        dict(zip(robots, controller, strict=True)),
-        signals,
+        dict(controller),
+        dict(tables),
         "",
         "",
     )
+
+
+def with_ages(
+    rows: NDArray[np.void], signals: tuple[Signal, ...], ages: Mapping[str, NDArray[np.float64]]
+) -> tuple[NDArray[np.void], tuple[Signal, ...]]:
+    """The rows of a controller with ages of what it heard, in a record's order; their table."""
+    used = {signal.name for signal in USED_SIGNALS}
+    before = [signal for signal in signals if signal.name in used]
+    table = (*before, *age_signals(tuple(ages)), *signals[len(before) :])
+    made = np.empty(len(rows), row_type(table))
+    for name in rows.dtype.names or ():
+        made[name] = rows[name]
+    for signal, values in zip(age_signals(tuple(ages)), ages.values(), strict=True):
+        made[signal.name] = values
+    return made, table

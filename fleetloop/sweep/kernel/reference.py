@@ -15,6 +15,7 @@ from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, si
 from configs.scenario import Scenario
 from fleetloop.in_process.run import InProcessRun
 from fleetloop.record.memory import MemoryRecord
+from fleetloop.sweep.kernel.layout import CONTROLLER_SIGNALS
 from fleetloop.sweep.kernel.outcome import KernelOutcome
 
 _NETWORK: Final = NetworkLink("in-process", "", "", "")
@@ -69,10 +70,10 @@ def _armed(countdown: _Countdown) -> tuple[Event, ...]:
     scenario = countdown.scenario
     plant = plant_brief(scenario, network=_NETWORK)
     agent = agent_brief(scenario, scenario.names[0], network=_NETWORK, bus=())
-    alone = replace(agent, hears=(), channels=())
+    alone = replace(agent, hears=(), channels=(), signals=CONTROLLER_SIGNALS, logs_inputs=False)
     run = InProcessRun(
         replace(plant, robots=plant.robots[:1], traffic=False),
-        [replace(alone, logs_inputs=False)],
+        [alone],
         leader_brief(scenario),
         MemoryRecord(),
         lambda _: None,

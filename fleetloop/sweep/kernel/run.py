@@ -5,11 +5,13 @@ from typing import Final
 
 from bridge.process.lifecycle import Stop
 from configs.scenario import Scenario
+from configs.signals import AGE_PREFIX, age_signals
 from fleetloop.sweep.kernel import layout, loop
 from fleetloop.sweep.kernel.compilation import Simulate, compiled_loop
 from fleetloop.sweep.kernel.coverage import lacks
+from fleetloop.sweep.kernel.hearing import ages_s
 from fleetloop.sweep.kernel.lowering import lowered
-from fleetloop.sweep.kernel.outcome import KernelOutcome, columns, record_of
+from fleetloop.sweep.kernel.outcome import KernelOutcome, columns, record_of, with_ages
 from fleetloop.sweep.kernel.reference import arming, referred
 
 _LEFT: Final = {
@@ -55,7 +57,8 @@ def _run_one(
     kept = columns(asked)
     room = [one.rows(len(made.robots), ticks.ticks, ticks.period_ns) for one in kept]
     why, tick, number = simulate(
-        *(made.cases, made.robots, made.states, made.edges, made.leader_m_s, made.curves),
+        *(made.cases, made.robots, made.states, made.edges, made.changes),
+        *(made.leader_m_s, made.curves),
         (layout.one(layout.TRUTH), layout.one(layout.TOLD)),
         (kept[0].numbers, kept[1].numbers),
         (room[0][0], room[1][0]),
@@ -63,4 +66,15 @@ def _run_one(
     if why != loop.NOTHING:
         where = f"{_LEFT[why]} ({scenario.names[number]}, {ticks.when(tick)})"
         return referred(scenario, stop, where)
-    return KernelOutcome(record_of(scenario, kept, room[0][1], room[1][1]), {}, arming(scenario))
+    controller = dict(zip(scenario.names, room[1][1], strict=True))
+    tables = dict.fromkeys(scenario.names, kept[1].signals)
+    if scenario.ages_vary and any(name.startswith(AGE_PREFIX) for name in asked):
+        for robot, rows in controller.items():
+            ages = {
+                speaker: ages_s(made.heard[robot][speaker], ticks)
+                for speaker in scenario.aged(robot)
+                if age_signals((speaker,))[0].name in asked
+            }
+            controller[robot], tables[robot] = with_ages(rows, kept[1].signals, ages)
+    record = record_of(scenario, room[0][1], controller, tables)
+    return KernelOutcome(record, {}, arming(scenario))
