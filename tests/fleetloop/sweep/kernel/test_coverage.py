@@ -15,8 +15,13 @@ NOT_COVERED = {
     "bit timing of buses": ['bus.timing="wire"'],
     "drives with limits or motors of their own": ['drive.preset="limited"'],
     "real time": ['clock.mode="realtime"'],
-    "an emulated network": ["network.default.delay={kind='constant',delay_s=0.1}"],
-    "a graph that switches": ["graph.switch=[{at_s=1.0,edges=['r1 -> r2','r1 -> r3','r1 -> r4']}]"],
+    "an emulated edge from the leader": [
+        "network.edge=[{edges=['leader -> r1'],loss={kind='bernoulli',probability=0.5}}]"
+    ],
+    "an emulated edge from the localisation": [
+        "network.edge=[{edges=['localisation -> *'],loss={kind='bernoulli',probability=0.5}}]"
+    ],
+    "losses by distance": ["network.default.distance={range_m=3.0}"],
     "robots that join later": ["robot.r2.joins_at_s=1.0"],
     "robots that leave": ["robot.r4.leaves_at_s=1.0"],
     "the law fixed_dsc": ['robot.r2.control.law="fixed_dsc"'],
@@ -37,6 +42,7 @@ def test_what_is_not_covered_is_named(reason: str) -> None:
 def test_every_shipped_scenario_is_covered_or_has_a_reason() -> None:
     covered = {name for name in shipped() if not lacks(load(name))}
     assert {"paper", "paper_ring", "paper_star", "paper_tree", "paper_extra"} <= covered
+    assert {"delay_ring", "lossy_chain", "switching", "rotating_counterexample"} <= covered
     assert not {"realistic", "realtime_100hz", "paper_backstepping"} & covered
 
 

@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 from bridge.process.lifecycle import Stop
 from configs.loading import load
 from configs.scenario import Scenario
-from configs.signals import PLANT_SIGNALS
+from configs.signals import PLANT_SIGNALS, age_signals
 from fleetloop.sweep.kernel import KernelOutcome, lacks, run
 from fleetloop.sweep.kernel.layout import CONTROLLER_SIGNALS
 from fleetloop.sweep.kernel.reference import referred
 
-ALL = {signal.name for signal in (*PLANT_SIGNALS, *CONTROLLER_SIGNALS)}
+AGES = age_signals(("r1", "r2", "r3", "r4", "r5"))
+ALL = {signal.name for signal in (*PLANT_SIGNALS, *CONTROLLER_SIGNALS, *AGES)}
 
 
 def of_kernel(scenario: Scenario) -> KernelOutcome:
@@ -58,6 +59,10 @@ SHIPPED = {
     "figure_eight": 0.15,
     "spline_gate": 0.15,
     "twelve": 0.2,
+    "delay_ring": 0.5,
+    "lossy_chain": 0.5,
+    "switching": 0.6,
+    "rotating_counterexample": 0.6,
     "hundred_tree": 0.03,
 }
 
@@ -116,6 +121,31 @@ VARIANTS = {
     "neighbours as received": ['coordination.compensation="hold"', "coordination.v_hat_0=0.6"],
     "neighbours that age": ["clock.share_period_s=0.2", "coordination.age_limit_s=0.05"],
     "weights": ["graph.weights={'r1 -> r2' = 0.5, 'leader -> r1' = 2.0}"],
+    "lognormal delays and bursts of losses": [
+        "network.default.delay={kind='lognormal',mean_s=0.03,std_s=0.05}",
+        "network.default.loss={kind='gilbert_elliott',good_to_bad=0.2,bad_to_good=0.4}",
+        "coordination.v_hat_0=0.6",
+    ],
+    "copies, a narrow band and a cut": [
+        "network.default.delay={kind='uniform',min_s=0.0,max_s=0.05}",
+        "network.default.duplication=0.4",
+        "network.default.bandwidth_bit_s=40000.0",
+        "network.edge=[{edges=['r2 -> r3'],reordering=false,partitions=[{from_s=0.05,to_s=0.09}]}]",
+    ],
+    "one emulated edge": [
+        "network.edge=[{edges=['r1 -> r2'],delay={kind='constant',delay_s=0.0305}}]",
+        "coordination.compensation='hold'",
+    ],
+    "neighbours that fall silent": [
+        "network.edge=[{edges=['r1 -> r2'],partitions=[{from_s=0.04,to_s=0.12}]}]",
+        "coordination.silence_limit_s=0.05",
+        "coordination.age_limit_s=0.03",
+    ],
+    "a graph that switches under delays": [
+        "graph.switch=[{at_s=0.045,edges=['r1 -> r2','r1 -> r3','r3 -> r4'],leader=['r2']},"
+        "{at_s=0.1,edges=['r4 -> r2','r1 -> r3','r3 -> r4','r1 -> r4'],leader=['r1']}]",
+        "network.default.delay={kind='constant',delay_s=0.03}",
+    ],
     "a leader that moves": [
         "leader.steps=[{t_s=0.1,speed_m_s=-0.4,ramp_s=0.15},{t_s=0.2,speed_m_s=0.3}]",
         "coordination.v_hat_0=0.6",
