@@ -1,4 +1,4 @@
-"""The batch kernel of sweeps: robot-steps per second on one core, and what a case costs beside them.
+"""The batch kernel of sweeps: robot-steps per second on one core, and what cases cost beside them.
 
     C            the same closed loop written in C (`sweep_kernel.c`), four signals kept
     kernel       `fleetloop.sweep.kernel`, the same scenario and signals, one call

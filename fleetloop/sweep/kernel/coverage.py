@@ -208,20 +208,26 @@ def _section_reason(section: Parameters) -> str:
 
 def _reason_of(section: Parameters) -> str:
     kind = type(section)
-    keys = _DRIVE if isinstance(section, Drive) else _KEYS.get(kind)
-    if keys is None:
+    looks = _looks_of(kind)  # type: ignore[arg-type] - classes hash
+    if looks is None:
         return f"a section of the type {kind.__name__}"
-    for field in fields(section):
-        value = getattr(section, field.name)
-        reason = keys.get(field.name)
-        if reason is not None:
-            said = reason(value)
-            if said:
-                return said
-            continue
+    for name, reason in looks:
+        if said := reason(getattr(section, name)):
+            return said
+    return ""
+
+
+@lru_cache(maxsize=256)
+def _looks_of(kind: type[Parameters]) -> tuple[tuple[str, Reason], ...] | None:
+    """The keys of a type of section that can't have any value; None: no such section is covered."""
+    keys = _DRIVE if issubclass(kind, Drive) else _KEYS.get(kind)
+    if keys is None:
+        return None
+    looks = []
+    for field in fields(kind):
         default = field.default
         if default is MISSING and field.default_factory is not MISSING:
             default = field.default_factory()
-        if value != default:
-            return f"the key {field.name} of {kind.__name__}"
-    return ""
+        unknown = _only(default, f"the key {field.name} of {kind.__name__}")
+        looks.append((field.name, keys.get(field.name, unknown)))
+    return tuple(look for look in looks if look[1] is not _any)

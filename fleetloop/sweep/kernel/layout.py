@@ -4,10 +4,12 @@ Fields are the symbols of the modules whose functions they are given to.
 """
 
 from collections.abc import Sequence
+from functools import cache
+from struct import Struct
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from agents.laws.adaptive_dsc import AdaptiveDsc
 from configs.signals import PLANT_SIGNALS, controller_signals
@@ -102,9 +104,17 @@ EDGE = np.dtype(
 that are next, and the share that counts now. Of a leader link 1 or 0 counts: whether it exists."""
 
 
-def records(layout: DTypeLike, rows: Sequence[tuple[Any, ...]]) -> NDArray[np.void]:
+def records(layout: np.dtype[np.void], rows: Sequence[tuple[Any, ...]]) -> NDArray[np.void]:
     """Rows as an array; to the loop its fields are attributes, uncompiled as of `np.recarray`."""
-    return np.array(rows, layout)
+    pack = _packing(layout).pack
+    return np.frombuffer(bytearray().join([pack(*row) for row in rows]), layout)
+
+
+@cache
+def _packing(layout: np.dtype[np.void]) -> Struct:
+    """The record as `struct` makes it: faster than numpy by a multiple."""
+    kinds = {np.dtype(_FLOAT): "d", np.dtype(_WHOLE): "q"}
+    return Struct("<" + "".join(kinds[layout[n]] for n in range(len(layout.names or ()))))
 
 
 def one(layout: np.dtype[np.void]) -> NDArray[np.void]:

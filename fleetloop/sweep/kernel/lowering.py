@@ -25,7 +25,7 @@ from configs.edges import InEdge
 from configs.graph import Graph
 from configs.leader_speed import speed_at
 from configs.parameters import Parameters, changed, extended
-from configs.resolve import channels, schedule, speed_changes, substeps
+from configs.resolve import channels, speed_changes, substeps
 from configs.scenario import Scenario
 from fleetloop.sweep.kernel import layout
 from fleetloop.sweep.kernel.coverage import network_acts
@@ -47,7 +47,6 @@ Curves = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 class Case(NamedTuple):
     """What `loop.simulate` is given of one case."""
 
-    schedule: Schedule
     cases: Records
     robots: Records
     states: Records
@@ -59,9 +58,9 @@ class Case(NamedTuple):
     """By robot and in-neighbour: the share that counts; None: always the newest."""
 
 
-def lowered(scenario: Scenario) -> Case:
-    """A scenario of which `coverage.lacks` says nothing, as numbers."""
-    ticks, graph = schedule(scenario), _shared_graph(scenario)
+def lowered(scenario: Scenario, ticks: Schedule) -> Case:
+    """A scenario of which `coverage.lacks` says nothing, as numbers; `ticks` are its schedule."""
+    graph = _shared_graph(scenario)
     curves = _Splines()
     centre_kind, centre = _centre(scenario.path, curves)
     robots, states = [], []
@@ -85,7 +84,6 @@ def lowered(scenario: Scenario) -> Case:
         states.append(_start(robot, scenario.coordination, choice.parameters, drives))
     case = _case(scenario, ticks, centre_kind, centre, curves)
     return Case(
-        ticks,
         layout.records(layout.CASE, [case]),
         layout.records(layout.ROBOT, robots),
         layout.records(layout.STATE, states),

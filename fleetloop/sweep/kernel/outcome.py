@@ -31,6 +31,7 @@ _MADE_OF: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """Recorded signals of which those are made that expectations may be about."""
 _TIME: Final = "t_s"
+_PATH: Final = Path("record of the kernel")
 Rows = NDArray[np.float64]
 
 
@@ -65,10 +66,18 @@ class Columns(NamedTuple):
     def rows(self, robots: int, ticks: int, period_ns: int) -> tuple[Rows, NDArray[np.void]]:
         """Room for the rows of all robots: what the loop fills, and the rows that it is of."""
         rows = np.empty((robots, ticks), row_type(self.signals))
-        rows["tick"] = number = np.arange(ticks)
-        rows[_TIME] = number * period_ns * 1e-9
+        rows[:] = _blank(self.signals, ticks, period_ns)
         numbers = rows.view(np.float64).reshape(robots, ticks, len(self.signals) + 1)
         return numbers[:, :, 2:], rows
+
+
+@lru_cache(maxsize=8)
+def _blank(signals: tuple[Signal, ...], ticks: int, period_ns: int) -> NDArray[np.void]:
+    """The rows of one robot, with tick and time."""
+    rows = np.zeros(ticks, row_type(signals))
+    rows["tick"] = number = np.arange(ticks)
+    rows[_TIME] = number * period_ns * 1e-9
+    return rows
 
 
 @lru_cache(maxsize=64)
@@ -87,7 +96,7 @@ def record_of(
     """Rows by robot and tick as a record that was read; `tables` are those of the controllers."""
     robots = scenario.names
     return Record(
-        Path("record of the kernel"),
+        _PATH,
         robots,
         dict(zip(robots, plant, strict=True)),
         dict(controller),

@@ -9,9 +9,10 @@ from functools import lru_cache
 from typing import Final
 
 from bridge.process.lifecycle import Stop
+from configs.brief import Schedule
 from configs.connections import NetworkLink
 from configs.events import Event
-from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of
+from configs.resolve import agent_brief, leader_brief, plant_brief, signals_of
 from configs.scenario import Scenario
 from fleetloop.in_process.run import InProcessRun
 from fleetloop.record.memory import MemoryRecord
@@ -36,21 +37,20 @@ def referred(scenario: Scenario, stop: Stop, left_course: str) -> KernelOutcome:
     return KernelOutcome(memory.record(signals, ""), run.stopped_robots, run.events, left_course)
 
 
-def arming(scenario: Scenario) -> list[Event]:
+def arming(scenario: Scenario, ticks: Schedule) -> list[Event]:
     """The events of all robots before tick 0.
 
     Raises:
         InfrastructureError: the drives were not armed when control had to start.
     """
-    events = _armed(_Countdown(scenario))
+    events = _armed(_Countdown(scenario, ticks))
     return [event._replace(source=robot) for robot in scenario.names for event in events]
 
 
 class _Countdown:
     """A scenario, equal to all others whose drives are armed alike."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        ticks = schedule(scenario)
+    def __init__(self, scenario: Scenario, ticks: Schedule) -> None:
         self.scenario = scenario
         self._key = (
             *(ticks.period_ns, ticks.countdown_ticks),

@@ -8,6 +8,7 @@ import pytest
 
 from bridge.process.lifecycle import Stop
 from configs.loading import load
+from configs.resolve import schedule
 from fleetloop.sweep.kernel import compilation, layout, linking, loop, run
 from fleetloop.sweep.kernel.linking import Linker, LinkError
 from fleetloop.sweep.kernel.lowering import lowered
@@ -48,13 +49,14 @@ def test_equations_are_compiled_as_they_stand_in_their_sources(file: str) -> Non
 def test_the_compiled_loop_does_what_the_same_text_does_uncompiled() -> None:
     scenario = load("paper", ["until_s=0.05"])
     (compiled,) = run([scenario], {"x_m", "tau_right_wheel_N_m", "kappa_hat"}, Stop())
-    made = lowered(scenario)
+    ticks = schedule(scenario)
+    made = lowered(scenario, ticks)
     kept = columns(frozenset({"x_m", "tau_right_wheel_N_m", "kappa_hat"}))
-    room = [one.rows(4, 50, made.schedule.period_ns) for one in kept]
+    room = [one.rows(4, 50, ticks.period_ns) for one in kept]
     with np.errstate(all="raise"):
         result = loop.simulate(
-            *(it.view(np.recarray) for it in made[1:5]),
-            *(made.leader_m_s, made.curves),
+            *(it.view(np.recarray) for it in made[:4]),
+            *(made.changes, made.leader_m_s, made.curves),
             tuple(layout.one(it).view(np.recarray) for it in (layout.TRUTH, layout.TOLD)),
             (kept[0].numbers, kept[1].numbers),
             (room[0][0], room[1][0]),
