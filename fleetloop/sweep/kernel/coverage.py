@@ -207,8 +207,8 @@ def _section_reason(section: Parameters) -> str:
 
 
 def _reason_of(section: Parameters) -> str:
-    kind = type(section)
-    looks = _looks_of(kind)  # type: ignore[arg-type] - classes hash
+    kind: Any = type(section)
+    looks = _looks_of(kind)
     if looks is None:
         return f"a section of the type {kind.__name__}"
     for name, reason in looks:
@@ -217,8 +217,8 @@ def _reason_of(section: Parameters) -> str:
     return ""
 
 
-@lru_cache(maxsize=256)
-def _looks_of(kind: type[Parameters]) -> tuple[tuple[str, Reason], ...] | None:
+@cache
+def _looks_of(kind: Any) -> tuple[tuple[str, Reason], ...] | None:
     """The keys of a type of section that can't have any value; None: no such section is covered."""
     keys = _DRIVE if issubclass(kind, Drive) else _KEYS.get(kind)
     if keys is None:
