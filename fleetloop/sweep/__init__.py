@@ -1,0 +1,1 @@
+"""Sweeps: many runs that differ in some factors, and what comes of them."""
