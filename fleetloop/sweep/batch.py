@@ -1,0 +1,228 @@
+"""Cases to rows: each by the batch kernel if that can do it, else by the in-process reference.
+
+Both bring the same record; which one it was, and why not the kernel, is in the row. Nothing that is
+wrong with one case touches another: values that make no valid scenario, or a law that fails, are
+the row of that case.
+
+    invalid    its values make no valid scenario
+    error      it brought no result: an exception, or too much time
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import lru_cache
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.lifecycle import Stop
+from configs.errors import FleetloopError
+from configs.events import Event
+from configs.scenario import Scenario
+from fleetloop.in_process.whole import run_in_memory
+from fleetloop.record.reader import Record
+from fleetloop.sweep.cases import Case, Cases
+from fleetloop.sweep.dataset import Row
+
+KERNEL, REFERENCE = "kernel", "in process"
+NO_KERNEL = "the batch kernel isn't there"
+
+
+class Brought(Protocol):
+    """What a run came to, by whichever engine."""
+
+    @property
+    def record(self) -> Record:
+        """At least the signals that were asked for."""
+
+    @property
+    def stopped(self) -> Mapping[str, str]:
+        """Robots that stopped themselves or diverged, and why."""
+
+    @property
+    def events(self) -> Sequence[Event]:
+        """All of the run."""
+
+
+class Kernel(NamedTuple):
+    """The batch kernel: many cases in one call."""
+
+    lacks: Callable[[Scenario], str]
+    """Why it can't run a scenario; "" if it can."""
+    run: Callable[[Sequence[Scenario], Collection[str], Stop], Sequence[Brought]]
+
+
+class Valid(NamedTuple):
+    """A case with its scenario."""
+
+    case: Case
+    scenario: Scenario
+
+
+@lru_cache(maxsize=1)
+def kernel_here() -> Kernel | None:
+    """The batch kernel, if it and its compiler are installed."""
+    name = "fleetloop.sweep.kernel"
+    if find_spec(name) is None:
+        return None
+    try:
+        module = import_module(name)
+    except ImportError:
+        return None
+    return Kernel(module.lacks, module.run)
+
+
+def rows_of(
+    cases: Cases,
+    numbers: Sequence[int],
+    stop: Stop,
+    kernel: Kernel | None = None,
+    on_case: Callable[[int], None] = lambda _: None,
+) -> list[Row]:
+    """The rows of these cases; less of them if told to stop.
+
+    Args:
+        cases: of the study.
+        numbers: of the cases.
+        stop: ends it.
+        kernel: the batch kernel, if it is to be used.
+        on_case: told of each case that the reference begins, or of the first that the kernel does.
+    """
+    rows: dict[int, Row] = {}
+    valid: list[Valid] = []
+    for number in numbers:
+        case = cases.case(number)
+        try:
+            valid.append(Valid(case, cases.scenario(case)))
+        except FleetloopError as error:
+            rows[number] = _row(cases, case, "invalid", _one_line(error))
+        except Exception as error:
+            rows[number] = _row(cases, case, "error", _described(error))
+    why_not = {one.case.number: NO_KERNEL if kernel is None else "" for one in valid}
+    if kernel is not None:
+        why_not = {one.case.number: _lacks(kernel, one.scenario) for one in valid}
+        able = [one for one in valid if not why_not[one.case.number]]
+        if able:
+            on_case(able[0].case.number)
+            made, failure = _by_kernel(cases, able, kernel, stop)
+            rows |= made
+            if failure:
+                why_not |= {one.case.number: failure for one in able}
+    for one in valid:
+        if one.case.number not in rows and not stop.requested:
+            on_case(one.case.number)
+            rows |= _by_reference(cases, one, why_not[one.case.number], stop)
+    return [rows[number] for number in numbers if number in rows]
+
+
+def _lacks(kernel: Kernel, scenario: Scenario) -> str:
+    try:
+        return kernel.lacks(scenario)
+    except Exception as error:
+        return f"the kernel failed: {_described(error)}"
+
+
+def _by_kernel(
+    cases: Cases, valid: Sequence[Valid], kernel: Kernel, stop: Stop
+) -> tuple[dict[int, Row], str]:
+    """Rows, and why there are none: then the reference shows which case is at fault."""
+    began_s = SYSTEM_CLOCK.monotonic_s()
+    try:
+        scenarios = [one.scenario for one in valid]
+        brought = kernel.run(scenarios, cases.quantities.signals, stop)
+    except Exception as error:
+        return {}, f"the kernel failed: {_described(error)}"
+    if stop.requested:
+        return {}, ""
+    share_s = (SYSTEM_CLOCK.monotonic_s() - began_s) / len(valid)
+    rows = {
+        one.case.number: _judged(cases, one, outcome, KERNEL, "", share_s)
+        for one, outcome in zip(valid, brought, strict=True)
+    }
+    return rows, ""
+
+
+def _by_reference(cases: Cases, one: Valid, why_not: str, stop: Stop) -> dict[int, Row]:
+    """The row of a case; none if told to stop."""
+    began_s = SYSTEM_CLOCK.monotonic_s()
+    number = one.case.number
+    try:
+        outcome = run_in_memory(one.scenario, stop)
+    except Exception as error:
+        told = _one_line(error) if isinstance(error, FleetloopError) else _described(error)
+        wall_s = SYSTEM_CLOCK.monotonic_s() - began_s
+        return {number: _row(cases, one.case, "error", told, one.scenario, REFERENCE, wall_s)}
+    if stop.requested:
+        return {}
+    wall_s = SYSTEM_CLOCK.monotonic_s() - began_s
+    return {number: _judged(cases, one, outcome, REFERENCE, why_not, wall_s)}
+
+
+def _judged(
+    cases: Cases, one: Valid, outcome: Brought, engine: str, why_not: str, wall_s: float
+) -> Row:
+    try:
+        found = cases.quantities.find(outcome.record, one.scenario, outcome.stopped, outcome.events)
+    except Exception as error:
+        told = f"its run can't be judged: {_described(error)}"
+        return _row(cases, one.case, "error", told, one.scenario, engine, wall_s)
+    return Row(
+        one.case.number,
+        cases.shown(one.case),
+        found.values,
+        found.verdict,
+        found.reason,
+        found.margin,
+        engine,
+        why_not,
+        one.scenario.seed,
+        wall_s,
+        cases.command(one.case),
+    )
+
+
+def row_without_result(cases: Cases, number: int, verdict: str, reason: str) -> Row:
+    """The row of a case that brought nothing."""
+    return _row(cases, cases.case(number), verdict, reason)
+
+
+def _row(
+    cases: Cases,
+    case: Case,
+    verdict: str,
+    reason: str,
+    scenario: Scenario | None = None,
+    engine: str = "",
+    wall_s: float = 0.0,
+) -> Row:
+    shown = cases.shown(case)
+    seed = shown.get("seed") if scenario is None else scenario.seed
+    return Row(
+        case.number,
+        shown,
+        {},
+        verdict,
+        reason,
+        None,
+        engine,
+        "",
+        seed if isinstance(seed, int) else None,
+        wall_s,
+        cases.command(case),
+    )
+
+
+def _one_line(error: Exception) -> str:
+    return "; ".join(str(error).splitlines())
+
+
+def _described(error: Exception) -> str:
+    """An exception that is nobody's message: its kind, its text, where it was raised."""
+    place = ""
+    trace = error.__traceback__
+    while trace is not None:
+        code = trace.tb_frame.f_code
+        place = f" ({Path(code.co_filename).name}:{trace.tb_lineno})"
+        trace = trace.tb_next
+    return f"{type(error).__name__}: {_one_line(error)}{place}"
