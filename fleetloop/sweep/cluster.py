@@ -9,6 +9,9 @@ Dask's own messages go to a file in the study's folder, never to the terminal.
 
 import logging
 import os
+import re
+import signal
+import socket
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -17,11 +20,13 @@ from pathlib import Path
 from typing import Any
 
 from configs.errors import InfrastructureError, ScenarioError
+from fleetloop.sweep import worker_start
 from fleetloop.sweep.versions import mismatch, versions_here
 
 LOG = "dask.log"
 NEEDS = "fleetloop sweep needs Dask: pip install 'fleetloop[sweep]'"
 START_S, ANSWER_S, CLOSE_S = 60.0, 10.0, 5.0
+_ADDRESS = re.compile(r"(tcp|tls)://(?P<host>\[[^]]+\]|[^:/]+):(?P<port>\d{1,5})")
 _SETTINGS: dict[str, Any] = {
     "logging.distributed": "error",
     # What a worker is killed for is said, and its cases are computed again; a worker that only
@@ -99,20 +104,23 @@ def _here(distributed: Any, place: Place, folder: Path, stack: ExitStack) -> Any
     security = distributed.Security.temporary()
     scratch = folder / ".dask"
     try:
-        cluster = distributed.LocalCluster(
-            n_workers=place.workers,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            protocol="tls://",
-            security=security,
-            silence_logs=False,
-            dashboard_address="127.0.0.1:0",
-            scheduler_kwargs={"dashboard": False},
-            memory_limit=place.memory,
-            local_directory=str(scratch),
-            death_timeout=START_S,
-        )
+        with _without_ctrl_c():
+            cluster = distributed.LocalCluster(
+                n_workers=place.workers,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                protocol="tls://",
+                security=security,
+                silence_logs=False,
+                dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False},
+                memory_limit=place.memory,
+                local_directory=str(scratch),
+                death_timeout=START_S,
+                preload=[worker_start.__name__],
+                env={worker_start.LOG: str((folder / LOG).resolve())},
+            )
     except ValueError as error:
         raise ScenarioError(f"--memory {place.memory}: {error}") from error
     except (OSError, RuntimeError) as error:
@@ -124,7 +132,18 @@ def _here(distributed: Any, place: Place, folder: Path, stack: ExitStack) -> Any
     return client
 
 
+@contextmanager
+def _without_ctrl_c() -> Iterator[None]:
+    """Threads and processes that begin meanwhile never get Ctrl-C; this thread gets it later."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _elsewhere(distributed: Any, place: Place, address: str, stack: ExitStack) -> Any:
+    _check_address(address)
     security = None
     if place.tls.given:
         for path in (place.tls.ca, place.tls.certificate, place.tls.key):
@@ -141,14 +160,32 @@ def _elsewhere(distributed: Any, place: Place, address: str, stack: ExitStack) -
             address, timeout=ANSWER_S, security=security, set_as_default=False
         )
     except (OSError, TimeoutError) as error:
-        why = "" if isinstance(error, TimeoutError) else f": {error}"
         raise InfrastructureError(
-            f"--scheduler {address}: no scheduler answers there within {ANSWER_S:g} s{why}"
+            f"--scheduler {address}: answers, but not as a Dask scheduler: {error}"
         ) from error
     except (ValueError, TypeError, RuntimeError) as error:
         raise ScenarioError(f"--scheduler {address}: {error}") from error
     stack.callback(_close, client)
     return client
+
+
+def _check_address(address: str) -> None:
+    """Refuse what is no address, or where nobody listens.
+
+    Raises:
+        ScenarioError: it is none.
+        InfrastructureError: nobody answers.
+    """
+    found = _ADDRESS.fullmatch(address)
+    if found is None:
+        remedy = "must be tcp://HOST:PORT or tls://HOST:PORT, for example tcp://192.168.1.2:8786"
+        raise ScenarioError(f"--scheduler {address}: {remedy}")
+    try:
+        place = (found["host"].strip("[]"), int(found["port"]))
+        socket.create_connection(place, timeout=ANSWER_S).close()
+    except (OSError, OverflowError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise InfrastructureError(f"--scheduler {address}: no scheduler there: {why}") from error
 
 
 def _check_versions(client: Any) -> None:

@@ -53,15 +53,21 @@ class Pace:
     """How many cases a chunk has, by what the last ones took."""
 
     size: int = 1
-    busy_s: float = 0.0
-    """Of all workers together."""
     cases: int = 0
+    idle_s: float = 0.0
+    """Of all workers together, between two chunks."""
+    followed: int = 0
+    """Cases of the chunks before which these waits were."""
+    _ended_s: dict[int, float] = field(default_factory=dict)
 
-    def take(self, cases: int, busy_s: float) -> None:
-        """A chunk of so many cases took so long."""
-        self.busy_s += busy_s
+    def take(self, cases: int, done: Done) -> None:
+        """A chunk of so many cases is done."""
         self.cases += cases
-        each_s = max(busy_s / cases, 1e-9)
+        if (last_s := self._ended_s.get(done.process)) is not None:
+            self.idle_s += max(0.0, done.began_s - last_s)
+            self.followed += cases
+        self._ended_s[done.process] = done.ended_s
+        each_s = max(done.busy_s / cases, 1e-9)
         fitting = max(int(CHUNK_S / each_s), min(int(LONGEST_S / each_s), FEW_CASES))
         self.size = max(1, min(fitting, max(self.size, cases) * FASTEST_GROWTH, MOST_CASES))
 
@@ -191,7 +197,7 @@ class Engine:
             except (OSError, TimeoutError):  # its worker ended meanwhile
                 self._again.append(chunk)
                 return False
-            self.pace.take(len(chunk.numbers), done.busy_s)
+            self.pace.take(len(chunk.numbers), done)
             return self.on_rows(done.rows)
         if future.status != "error":
             raise InfrastructureError(f"the scheduler has dropped a task ({future.status})")
