@@ -24,11 +24,11 @@ from fleetloop.sweep import worker_start
 from fleetloop.sweep.versions import mismatch, versions_here
 
 LOG = "dask.log"
+_LOGGERS = ("distributed", "tornado")
 NEEDS = "fleetloop sweep needs Dask: pip install 'fleetloop[sweep]'"
-START_S, ANSWER_S, CLOSE_S = 60.0, 10.0, 5.0
+START_S, ANSWER_S, CLOSE_S = 60.0, 10.0, 15.0
 _ADDRESS = re.compile(r"(tcp|tls)://(?P<host>\[[^]]+\]|[^:/]+):(?P<port>\d{1,5})")
 _SETTINGS: dict[str, Any] = {
-    "logging.distributed": "error",
     # What a worker is killed for is said, and its cases are computed again; a worker that only
     # pauses would stand still for ever.
     "distributed.worker.memory.target": False,
@@ -81,15 +81,12 @@ def client_of(place: Place, folder: Path) -> Iterator[Any]:
     """
     try:
         import dask
+        import distributed  # before its settings are changed: it brings its own
     except ImportError:
         raise ScenarioError(NEEDS) from None
     with ExitStack() as stack:
-        stack.enter_context(dask.config.set(_SETTINGS))
-        try:
-            import distributed
-        except ImportError:
-            raise ScenarioError(NEEDS) from None
         stack.enter_context(_logged(folder / LOG))
+        stack.enter_context(dask.config.set(_SETTINGS))
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore")  # of Dask; what matters is checked below
         if place.scheduler is None:
@@ -218,25 +215,25 @@ def _check_versions(client: Any) -> None:
 
 @contextmanager
 def _logged(path: Path) -> Iterator[None]:
-    """Dask's messages go to a file while this lasts."""
-    names = [
-        name for name in logging.root.manager.loggerDict if name.split(".")[0] == "distributed"
-    ]
-    loggers = [logging.getLogger(name) for name in {*names, "distributed"}]
-    before = [(one, one.handlers[:], one.propagate, one.level) for one in loggers]
+    """Dask's messages go to a file while this lasts, and nowhere afterwards.
+
+    What is said when all is over, as of a worker that was about to start, is of no use to anybody.
+    """
+    known = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in _LOGGERS]
+    for name in {*known, *_LOGGERS}:
+        logger = logging.getLogger(name)
+        logger.handlers = []
+        logger.propagate = name not in _LOGGERS
+        logger.setLevel(logging.WARNING if name in _LOGGERS else logging.NOTSET)
     handler = logging.FileHandler(path, delay=True)
     handler.setFormatter(logging.Formatter("%(asctime)s %(name)s %(levelname)s %(message)s"))
-    for logger in loggers:
-        logger.handlers = []
-        logger.propagate = logger.name != "distributed"
-        logger.setLevel(logging.WARNING if logger.name == "distributed" else logging.NOTSET)
-    logging.getLogger("distributed").handlers = [handler]
+    for name in _LOGGERS:
+        logging.getLogger(name).handlers = [handler]
     try:
         yield
     finally:
-        for logger, handlers, propagate, level in before:
-            logger.handlers, logger.propagate = handlers, propagate
-            logger.setLevel(level)
+        for name in _LOGGERS:
+            logging.getLogger(name).handlers = [logging.NullHandler()]
         handler.close()
 
 

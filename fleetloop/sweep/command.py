@@ -157,7 +157,7 @@ class _Work:
                 finally:
                     self.wall_s = SYSTEM_CLOCK.monotonic_s() - began_s
                     self.pace = engine.pace
-                    self.workers = engine.threads
+                    self.workers = engine.most_threads
 
     def take(self, batch: Any) -> bool:
         """Keep rows that came; whether that's enough."""

@@ -92,7 +92,8 @@ class Engine:
     clock: Clock = SYSTEM_CLOCK
     pace: Pace = field(default_factory=Pace)
     threads: int = 1
-    """Of all workers."""
+    """Of all workers now."""
+    most_threads: int = 1
     _running: dict[Any, Chunk] = field(default_factory=dict)
     _again: deque[Chunk] = field(default_factory=deque)
     _suspects: deque[Chunk] = field(default_factory=deque)
@@ -199,8 +200,9 @@ class Engine:
                 return False
             self.pace.take(len(chunk.numbers), done)
             return self.on_rows(done.rows)
-        if future.status != "error":
-            raise InfrastructureError(f"the scheduler has dropped a task ({future.status})")
+        if future.status != "error":  # done, and lost with its worker before it was fetched
+            self._again.append(chunk)
+            return False
         error = future.exception(timeout=ANSWER_S)
         if isinstance(error, VersionMismatchError):
             raise InfrastructureError(f"a worker has other versions: {error}")
@@ -247,6 +249,7 @@ class Engine:
             raise InfrastructureError(f"the scheduler has gone: {error}") from error
         if threads:
             self.threads, self._seen_s = threads, now_s
+            self.most_threads = max(self.most_threads, threads)
         elif now_s - self._seen_s > NO_WORKER_S:
             raise InfrastructureError(f"no worker for {NO_WORKER_S:g} s")
 
