@@ -25,7 +25,6 @@ from fleetloop.sweep.versions import mismatch, versions_here
 
 LOG = "dask.log"
 _LOGGERS = ("distributed", "tornado")
-NEEDS = "fleetloop sweep needs Dask: pip install 'fleetloop[sweep]'"
 START_S, ANSWER_S, CLOSE_S = 60.0, 10.0, 15.0
 _ADDRESS = re.compile(r"(tcp|tls)://(?P<host>\[[^]]+\]|[^:/]+):(?P<port>\d{1,5})")
 _SETTINGS: dict[str, Any] = {
@@ -76,14 +75,12 @@ def client_of(place: Place, folder: Path) -> Iterator[Any]:
     """A Dask client whose workers are there, with this program's versions.
 
     Raises:
-        ScenarioError: Dask isn't there, or the address or a file is none.
+        ScenarioError: the address or a file is none.
         InfrastructureError: the scheduler doesn't answer, or workers have other versions.
     """
-    try:
-        import dask
-        import distributed  # before its settings are changed: it brings its own
-    except ImportError:
-        raise ScenarioError(NEEDS) from None
+    import dask
+    import distributed  # before its settings are changed: it brings its own
+
     with ExitStack() as stack:
         stack.enter_context(_logged(folder / LOG))
         stack.enter_context(dask.config.set(_SETTINGS))

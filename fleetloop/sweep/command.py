@@ -27,6 +27,7 @@ from fleetloop.sweep.cases import Cases
 from fleetloop.sweep.cluster import Place, client_of
 from fleetloop.sweep.dataset import PARTS, Dataset, read
 from fleetloop.sweep.engine import Engine, Pace
+from fleetloop.sweep.extra import PACKAGES, require
 from fleetloop.sweep.plan import STUDY, Plan
 from fleetloop.sweep.progress import Meter
 from fleetloop.sweep.stopping import Tally, decided
@@ -57,6 +58,7 @@ def begin(source: str, cases: int | None, seed: int | None, out: Path | None, wa
         ScenarioError: the study, its base or an option is wrong; nothing was started.
         InfrastructureError: a file, a process or a cluster can't be had.
     """
+    require(*PACKAGES)
     plan = Plan.of(source, cases=cases, seed=seed)
     checked = Cases(plan, source)
     name = f"{Path(source).stem}-sweep"
@@ -92,6 +94,7 @@ def resume(folder: Path, cases: int | None, seed: int | None, ways: Ways) -> int
         ScenarioError: there is none, or an option doesn't go with it.
         InfrastructureError: a file, a process or a cluster can't be had.
     """
+    require(*PACKAGES)
     plan = Plan.resume(folder)
     if seed is not None and seed != plan.study.seed:
         raise ScenarioError(f"--seed {seed}: this study was begun with seed {plan.study.seed}")

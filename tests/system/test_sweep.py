@@ -1,5 +1,6 @@
 """Sweeps over real processes, killed here and there: no case is lost, none is done twice."""
 
+import json
 import os
 import re
 import shutil
@@ -212,3 +213,49 @@ def test_where_no_scheduler_is_nothing_is_begun(folder: Path) -> None:
         said == "fleetloop: --scheduler tcp://127.0.0.1:1: no scheduler there: Connection refused"
     )
     assert not sweep.out.exists()
+
+
+RATE = """
+schema = 1
+title = "short"
+base = "two_robots"
+design = "random"
+cases = 400
+set = ["until_s=0.1", "expect.0.from_s=0.05", "expect.1.from_s=0.05"]
+{more}
+[[factor]]
+key = "expect.0.max_abs"
+uniform = [{least}, 0.2]
+[keep]
+quantities = []
+[stop]
+failure_rate_within = 0.2
+least_cases = 10
+"""
+
+
+def test_a_study_ends_when_its_failure_rate_is_known_and_goes_on_when_asked(folder: Path) -> None:
+    (folder / "rate.toml").write_text(RATE.format(more="", least=0.0), "utf-8")
+    with sweeping(folder, "rate.toml", "--json") as sweep:
+        status, out = sweep.end()
+    told = json.loads(out)
+    least, most = told["failure_rate_interval"]
+    assert status == 0
+    assert told["done"] < told["cases"] == 400
+    assert told["ended"].startswith("the failure rate is ")
+    assert 0.5 * (most - least) <= 0.2
+    assert least < 0.5 < most  # |x_e| is 0.1 m, the bound is drawn from 0 to 0.2 m
+    assert told["counts"]["failed"] + told["counts"]["held"] == told["done"]
+    assert len(cases_in(sweep.out)) == told["done"]
+    assert json.loads((sweep.out / "sweep.json").read_text())["done"] == told["done"]
+
+
+def test_an_invalid_case_ends_a_study_that_asks_for_that(folder: Path) -> None:
+    text = RATE.format(more='invalid = "stop"', least=-5.0)
+    (folder / "rate.toml").write_text(text, "utf-8")
+    with sweeping(folder, "rate.toml") as sweep:
+        status, _ = sweep.end()
+    said = sweep.errors.read_text().splitlines()[-1]
+    assert status == 2
+    assert re.match(r"fleetloop: case \d+: max_abs = -\d\.\d+: must be 0 or more", said)
+    assert cases_in(sweep.out)
