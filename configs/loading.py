@@ -43,7 +43,7 @@ def load(source: str | Path, overrides: Sequence[str | Override] = ()) -> Scenar
     """
     if not isinstance(source, str | Path):
         raise TypeError(f"load({source!r}): the path of a scenario file, or a shipped name")
-    name, text = _read(str(source))
+    name, text = read(str(source))
     return loads(name, text, overrides, folder=folder_of(source))
 
 
@@ -76,7 +76,7 @@ def loads(
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{name}: not a TOML file: {error}") from error
-    return _of_data(name, data, overrides, folder, recorded=recorded)
+    return of_data(name, data, overrides, folder, recorded=recorded)
 
 
 def changed(scenario: Scenario, changes: Iterable[tuple[str, object]]) -> Scenario:
@@ -89,10 +89,10 @@ def changed(scenario: Scenario, changes: Iterable[tuple[str, object]]) -> Scenar
     if origin is None:  # not from a file: then with all defaults
         origin = Origin(scenario.name, "", tomllib.loads(to_toml(scenario)))
     data = copy.deepcopy(dict(origin.data))
-    return _of_data(origin.source, data, overrides_of(changes, data), origin.folder)
+    return of_data(origin.source, data, overrides_of(changes, data), origin.folder)
 
 
-def _of_data(
+def of_data(
     name: str,
     data: dict[str, Any],
     overrides: Sequence[str | Override],
@@ -100,6 +100,11 @@ def _of_data(
     *,
     recorded: bool = False,
 ) -> Scenario:
+    """Load a scenario from parsed TOML, which becomes its own: overrides change it.
+
+    Raises:
+        ScenarioError: all that is wrong with it, a line each.
+    """
     found: list[Complaint] = []
     applied: list[Override] = []
     for override in overrides:
@@ -127,7 +132,12 @@ def json_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
-def _read(source: str) -> tuple[str, str]:
+def read(source: str) -> tuple[str, str]:
+    """The name of a scenario's file in messages, and its text; by path or shipped name.
+
+    Raises:
+        ScenarioError: there is none.
+    """
     if source in shipped():
         return f"{source}.toml", resources.files("configs").joinpath(f"{source}.toml").read_text(
             "utf-8"

@@ -3,11 +3,14 @@
 A complaint about such a value names the option, not the file.
 """
 
+import re
 import tomllib
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from configs.errors import Complaint
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 class Override(NamedTuple):
@@ -92,6 +95,26 @@ def _names(items: Sequence[Any]) -> list[str]:
         str(item.get("name", n)) if isinstance(item, dict) else str(n)
         for n, item in enumerate(items)
     ]
+
+
+def inline(value: object) -> str:
+    """A value as TOML has it on one line, as `--set` takes it."""
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case str():
+            escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+            return f'"{escaped}"'
+        case dict():
+            pairs = (f"{_inline_key(key)}={inline(item)}" for key, item in value.items())
+            return "{" + ", ".join(pairs) + "}"
+        case list() | tuple():
+            return "[" + ", ".join(map(inline, value)) + "]"
+    return repr(value)
+
+
+def _inline_key(key: str) -> str:
+    return key if _BARE.fullmatch(key) else inline(key)
 
 
 Overrides = tuple[Override | str, ...]

@@ -39,6 +39,7 @@ from fleetloop.campaign.matrix import (
 )
 from fleetloop.campaign.verdicts import Outcome, Result, kept_from_s, verdict_of
 from fleetloop.in_process.run import InProcessRun
+from fleetloop.in_process.whole import run_in_memory
 from fleetloop.jobs.job import Tell, Told
 from fleetloop.record.memory import MemoryRecord
 from fleetloop.record.reader import Record
@@ -125,20 +126,19 @@ class Branches:
 
 def baseline_of(scenario: Scenario, tell: Tell, stop: Stop) -> Baseline | None:
     """Run a scenario as it is; None if it was told to stop."""
-    memory = MemoryRecord()
-    run = _run_of(scenario, _briefs(scenario, ""), scenario, memory, tell)
     try:
-        run.run(stop)
+        with settled_memory():
+            outcome = run_in_memory(scenario, stop, tell)
     except FleetloopError as error:
         latest = tuple(expect.from_s for expect in scenario.expect)
         return Baseline(scenario.seed, "aborted", str(error), latest)
     if stop.requested:
         return None
-    record = _record(memory, scenario)
-    expected = [judge(expect, record, scenario, run.events) for expect in scenario.expect]
-    verdict = expectations.verdict(expected, stopped=bool(run.stopped_robots), cut_short=False)
+    record, stopped = outcome.record, outcome.stopped
+    expected = [judge(expect, record, scenario, outcome.events) for expect in scenario.expect]
+    verdict = expectations.verdict(expected, stopped=bool(stopped), cut_short=False)
     reasons = [claim(one) for one in expected if not one["held"]]
-    reasons += [f"{robot}: {reason}" for robot, reason in run.stopped_robots.items()]
+    reasons += [f"{robot}: {reason}" for robot, reason in stopped.items()]
     kept = [
         kept_from_s(replace(expect, from_s=0.0), expect.from_s, record, scenario)
         if may_begin_later(expect)

@@ -27,7 +27,7 @@ from configs.faults.base import Fault
 from configs.faults.kinds import KINDS
 from configs.faults.messages import LinkFault
 from configs.loading import loads, to_toml
-from configs.overrides import Override
+from configs.overrides import Override, inline
 from configs.scenario import Scenario
 
 NONE = "none"
@@ -213,23 +213,8 @@ def command(source: str, given: Sequence[str], made: Scenario, *, in_process: bo
     words += ["--seed", str(made.seed), "--duration", f"{made.ends_at_s:.12g}"]
     for text in given:
         words += ["--set", text]
-    words += ["--set", f"fault={_inline(data['fault'])}"]
+    words += ["--set", f"fault={inline(data['fault'])}"]
     for n, expect in enumerate(made.expect):
         if may_begin_later(expect):
-            words += ["--set", f"expect.{n}.from_s={_inline(expect.from_s)}"]
+            words += ["--set", f"expect.{n}.from_s={inline(expect.from_s)}"]
     return shlex.join(words)
-
-
-def _inline(value: object) -> str:
-    """A value as TOML has it on one line."""
-    match value:
-        case bool():
-            return "true" if value else "false"
-        case str():
-            escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-            return f'"{escaped}"'
-        case dict():
-            return "{" + ", ".join(f"{key}={_inline(item)}" for key, item in value.items()) + "}"
-        case list() | tuple():
-            return "[" + ", ".join(map(_inline, value)) + "]"
-    return repr(value)

@@ -45,8 +45,8 @@ Judged = dict[str, Any]
 """
 
 
-class _Series(NamedTuple):
-    """Values by tick, from tick 0 on."""
+class Series(NamedTuple):
+    """Values of a signal by tick, from tick 0 on."""
 
     robots: tuple[str, ...]
     member: Membership  # when it counts
@@ -57,7 +57,7 @@ class _Series(NamedTuple):
 class _Part(NamedTuple):
     """A series and what was found of it."""
 
-    series: _Series
+    series: Series
     first: int  # tick of the first value that counts
     finding: Finding
 
@@ -85,7 +85,7 @@ def judge(
     if expect.event is not None:
         return judged | _judge_events(expect, record, window, period_s, events)
     parts, seen = [], []
-    for series in _series(expect, record, scenario):
+    for series in series_of(expect.signal or "", expect.robots or (), record, scenario):
         first = max(window.first, series.member.joins_tick)
         behind = min(window.last + 1, series.member.leaves_tick)
         # A window that begins after the end of the run counts a robot that is a member then.
@@ -110,7 +110,7 @@ def _all_held(held: Sequence[bool | None]) -> bool | None:
 # --- signals --------------------------------------------------------------------------------------
 
 
-def _find(expect: Expect, series: _Series, first: int, behind: int, period_s: float) -> Finding:
+def _find(expect: Expect, series: Series, first: int, behind: int, period_s: float) -> Finding:
     """What the ticks from `first` to before `behind` say."""
     g = robustness.slack(
         series.values[first:behind],
@@ -176,7 +176,7 @@ def _seen_to_s(lengths: Sequence[int], period_s: float) -> float:
     return round(max((min(lengths, default=0) - 1) * period_s, 0.0), 9)
 
 
-def _farthest(series: _Series, tick: int, record: Record) -> list[str]:
+def _farthest(series: Series, tick: int, record: Record) -> list[str]:
     """The robots whose path variables are farthest apart."""
     s = {robot: record.controller[robot]["s"][tick] for robot in series.robots}
     known = {robot: value for robot, value in s.items() if not isnan(value)}
@@ -192,37 +192,36 @@ def _unit(expect: Expect, record: Record) -> str:
     return units.get(expect.signal or "", "")
 
 
-def _series(expect: Expect, record: Record, scenario: Scenario) -> Iterator[_Series]:
-    """The series that an expectation is about."""
-    robots, members = expect.robots or record.robots, scenario.members
-    match expect.signal:
-        case None:
-            return
-        case _ if expect.signal == SPREAD:
-            yield _spread(robots, record, members)
-        case _ if expect.signal == DISTANCE:
-            for one, other in combinations(dict.fromkeys(robots), 2):
-                values = distance(record.plant[one], record.plant[other])
-                both = Membership(
-                    max(members[one].joins_tick, members[other].joins_tick),
-                    min(members[one].leaves_tick, members[other].leaves_tick),
-                )
-                yield _Series((one, other), both, values, np.ones(len(values), dtype=bool))
-        case signal:
-            for robot in robots:
-                if (found := _of_robot(signal, robot, record, scenario)) is not None:
-                    values, known = found
-                    yield _Series((robot,), members[robot], values, known)
+def series_of(
+    signal: str, robots: Sequence[str], record: Record, scenario: Scenario
+) -> Iterator[Series]:
+    """A signal of each of these robots, of each pair, or of all together; all if none is named."""
+    robots, members = robots or record.robots, scenario.members
+    if signal == SPREAD:
+        yield _spread(robots, record, members)
+    elif signal == DISTANCE:
+        for one, other in combinations(dict.fromkeys(robots), 2):
+            values = distance(record.plant[one], record.plant[other])
+            both = Membership(
+                max(members[one].joins_tick, members[other].joins_tick),
+                min(members[one].leaves_tick, members[other].leaves_tick),
+            )
+            yield Series((one, other), both, values, np.ones(len(values), dtype=bool))
+    else:
+        for robot in robots:
+            if (found := _of_robot(signal, robot, record, scenario)) is not None:
+                values, known = found
+                yield Series((robot,), members[robot], values, known)
 
 
-def _spread(robots: Sequence[str], record: Record, members: Mapping[str, Membership]) -> _Series:
+def _spread(robots: Sequence[str], record: Record, members: Mapping[str, Membership]) -> Series:
     rows = {robot: record.controller[robot] for robot in robots}
     values = spread(rows, members)
     known = np.ones(len(values), dtype=bool)
     for robot, part in rows.items():
         member = members[robot]
         known &= (counted(part, member) | ~mask(member, len(part)))[: len(values)]
-    return _Series(tuple(robots), ALWAYS, values, known)
+    return Series(tuple(robots), ALWAYS, values, known)
 
 
 def _of_robot(

@@ -1,1 +1,1 @@
-"""Sweeps: many runs that differ in some factors, and what comes of them."""
+"""`fleetloop sweep`: one scenario in thousands of cases, their results in one dataset."""

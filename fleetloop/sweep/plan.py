@@ -1,0 +1,112 @@
+"""A study with its base scenario: all that decides its cases, wherever they are computed.
+
+A plan travels to other processes and is kept in the study's folder, so that a study that goes on
+has the base that it was begun with.
+
+    study.toml   the study, all defaults written out
+    base.toml    the text of its base scenario
+    base.json    where that came from
+"""
+
+import json
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from configs.errors import InfrastructureError, ScenarioError
+from configs.loading import folder_of, read, shipped
+from fleetloop.results import run_folder
+from fleetloop.sweep import study as studies
+from fleetloop.sweep.study import Study
+
+STUDY, BASE, ORIGIN = "study.toml", "base.toml", "base.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Base:
+    """The scenario that a study varies."""
+
+    source: str
+    """Its file, or its name, as a command names it."""
+    name: str
+    """Of its file, in messages."""
+    text: str
+    folder: str
+    """Where its own laws and shapes are."""
+
+    @classmethod
+    def beside(cls, study: str, base: str) -> "Base":
+        """The base that a study's file names.
+
+        Raises:
+            ScenarioError: there is none.
+        """
+        source = base
+        if base not in shipped() and study not in studies.shipped():
+            source = str(Path(study).parent / base)
+        name, text = read(source)
+        return cls(source, name, text, folder_of(source))
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A study and its base."""
+
+    text: str
+    """Of the study."""
+    base: Base
+
+    @classmethod
+    def of(cls, source: str, *, cases: int | None = None, seed: int | None = None) -> "Plan":
+        """Of a study's file or name.
+
+        Raises:
+            ScenarioError: it, or its base, isn't there or is wrong.
+        """
+        study = studies.load(source, cases=cases, seed=seed)
+        return cls(study.to_toml(), Base.beside(source, study.base))
+
+    @classmethod
+    def resume(cls, folder: Path) -> "Plan":
+        """Of a folder in which a study was begun.
+
+        Raises:
+            ScenarioError: none was.
+            InfrastructureError: its files can't be read.
+        """
+        try:
+            texts = [(folder / name).read_text("utf-8") for name in (STUDY, BASE, ORIGIN)]
+            origin = json.loads(texts[2])
+            base = Base(origin["source"], origin["name"], texts[1], origin["folder"])
+        except FileNotFoundError as error:
+            missing = Path(error.filename).name
+            raise ScenarioError(f"{folder}: no study was begun there: no {missing}") from None
+        except OSError as error:
+            raise InfrastructureError(f"{folder}: {error.strerror or error}") from error
+        except (ValueError, KeyError, TypeError) as error:
+            raise ScenarioError(f"{folder / ORIGIN}: not a study's: {error!r}") from error
+        plan = cls(texts[0], base)
+        _study(plan.text, str(folder / STUDY))
+        return plan
+
+    def save(self, folder: Path) -> None:
+        """Write its files.
+
+        Raises:
+            InfrastructureError: one can't be written.
+        """
+        base = self.base
+        origin = {"source": base.source, "name": base.name, "folder": base.folder}
+        run_folder.write(folder / BASE, base.text)
+        run_folder.write(folder / ORIGIN, json.dumps(origin, indent=2) + "\n")
+        run_folder.write(folder / STUDY, self.text)
+
+    @property
+    def study(self) -> Study:
+        """The study."""
+        return _study(self.text, STUDY)
+
+
+@lru_cache(maxsize=8)
+def _study(text: str, name: str) -> Study:
+    return studies.loads(name, text)
