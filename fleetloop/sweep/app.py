@@ -7,6 +7,7 @@ import typer
 
 from configs.errors import ScenarioError
 from fleetloop.numbers import OurWords
+from fleetloop.sweep.report.app import report
 
 _RUN = "run"
 
@@ -134,3 +135,6 @@ def run(
     if study is None:
         raise ScenarioError("name a study, or --resume FOLDER")
     raise typer.Exit(command.begin(study, cases, seed, out, ways))
+
+
+app.command()(report)
