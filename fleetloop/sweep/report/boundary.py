@@ -10,8 +10,9 @@ between places at which it is computed. What isn't on an axis is as in some case
 with the least and the greatest value of each factor: of several boundaries the outermost are drawn.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite, log, sqrt
 
 import numpy as np
@@ -29,9 +30,11 @@ from fleetloop.sweep.report.columns import Column, Series
 from fleetloop.sweep.report.derived import LEFT, RIGHT
 from fleetloop.sweep.report.results import Results
 
-PLACES, COARSE, MOST_OTHERS = 33, 13, 5
+PLACES, COARSE, MOST_OTHERS = 25, 11, 4
 """Of a solved boundary along its axis; of a contour along each; cases for what is on no axis."""
 _SAME = 1e-6
+_QUICK = re.compile(r"coordination\.[pq]|control\.\w+")
+"""Keys that are set without loading a scenario anew."""
 _DELAY = "network.default.delay.delay_s"
 
 
@@ -45,6 +48,8 @@ class Criterion:
     """ln(limit / value): it holds above 0; NaN: not known."""
     solved: Mapping[str, Callable[[Scenario], float]]
     """By key, its value on the boundary, with the rest of a scenario; NaN: there is none."""
+    about: str = ".*"
+    """Keys, as a regular expression, of which one at least is on an axis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +159,13 @@ _SYNCHRONISATION = Criterion(
     {"coordination.p": _p, "coordination.q": _q},
 )
 _DIAGONAL = Criterion("(46)", "p²/q = max Im(ζ)²/Re(ζ)", _synchronisation, {})
-_AGE = Criterion("delay margin of (45)", "mean age of path states < T", _age, {_DELAY: _delay_s})
+_AGE = Criterion(
+    "delay margin of (45)",
+    "mean age of path states < T",
+    _age,
+    {_DELAY: _delay_s},
+    r"network\..*|clock\.share_period_s",
+)
 
 
 # --- on a map -------------------------------------------------------------------------------------
@@ -169,10 +180,13 @@ class _Map:
         self._at = names.index(x.name), names.index(y.name)
         self._keys = tuple(cases.factors[n].keys for n in self._at)
         self._axes = x, y
+        self._known: dict[Case, Scenario] = {}
         self._others = _others(results, {x.name, y.name})
 
     def boundary(self, criterion: Criterion) -> Boundary | None:
         """Of one criterion; None if it has nothing to do with these axes."""
+        if not any(re.fullmatch(criterion.about, keys[0]) for keys in self._keys):
+            return None
         for n in (1, 0):
             key = self._keys[n][0]
             if len(self._keys[n]) == 1 and key in criterion.solved:
@@ -194,12 +208,12 @@ class _Map:
             at = {1 - solved: self._middle(1 - solved), solved: middle}
             margin = self._asked(criterion.margin, self._others[0], at)
             return None if np.isnan(margin) else Boundary(criterion, (), margin > 0.0)
-        with np.errstate(invalid="ignore"):
-            lines = [np.nanmin(curves, axis=0), np.nanmax(curves, axis=0)]
-        if np.allclose(lines[0], lines[1], rtol=_SAME, equal_nan=True):
+        there = ~np.isnan(curves).all(axis=0)  # elsewhere no scenario is valid
+        along, known = along[there], np.array(curves)[:, there]
+        lines = [np.nanmin(known, axis=0), np.nanmax(known, axis=0)]
+        if np.allclose(lines[0], lines[1], rtol=_SAME):
             del lines[1]
-        known = [(along[there], line[there]) for line in lines if (there := ~np.isnan(line)).any()]
-        pairs = tuple((a, line) if solved else (line, a) for a, line in known)
+        pairs = tuple((along, line) if solved else (line, along) for line in lines)
         return Boundary(criterion, pairs, cases=len(curves))
 
     def _contour(self, criterion: Criterion) -> Boundary | None:
@@ -235,13 +249,39 @@ class _Map:
     ) -> float:
         """What a scenario answers whose axes have these values; NaN: it is invalid."""
         values = list(self._cases.case(number).values)
+        quick: dict[str, float] = {}
         for n, value in at.items():
+            if _QUICK.fullmatch(self._keys[n][0]) and len(self._keys[n]) == 1:
+                quick[self._keys[n][0]] = value
+                value = self._middle(n)  # noqa: PLW2901
             whole = isinstance(values[self._at[n]], int)
             values[self._at[n]] = round(value) if whole else value
         try:
-            return float(ask(self._cases.scenario(Case(number, tuple(values)))))
-        except (FleetloopError, ValueError, ArithmeticError, np.linalg.LinAlgError):
+            scenario = self._loaded(Case(number, tuple(values)))
+            for key, value in quick.items():
+                scenario = _with_gain(scenario, *key.split("."), value)
+            return float(ask(scenario))
+        except (FleetloopError, ValueError, TypeError, ArithmeticError, np.linalg.LinAlgError):
             return np.nan
+
+    def _loaded(self, case: Case) -> Scenario:
+        if case not in self._known:
+            self._known[case] = self._cases.scenario(case)
+        return self._known[case]
+
+
+def _with_gain(scenario: Scenario, section: str, name: str, value: float) -> Scenario:
+    """A scenario with another gain, which no other key depends on: loading takes ten times longer.
+
+    Raises:
+        ValueError, TypeError: it has no such gain, or not of this value.
+    """
+    if section == "coordination":
+        gains = replace(scenario.coordination, **{name: value})
+        return scenario.model_copy(update={"coordination": gains})
+    control = scenario.control
+    control = replace(control, parameters=replace(control.parameters, **{name: value}))
+    return scenario.model_copy(update={"control": control})
 
 
 def _others(results: Results, axes: set[str]) -> list[int]:
