@@ -103,7 +103,7 @@ def _switching(scenario: Scenario) -> list[Finding]:
 
 def synchronisation(graph: Graph, p: float, q: float) -> Finding:
     """Inequality (46), both sides; of a graph that switches, of each graph that exists in turn."""
-    left, right = p * p / q, _right_side(graph)
+    left, right = p * p / q, right_side(graph)
     title, value, limit = "p²/q > max Im(ζ)²/Re(ζ)", f"{left:g}", f"> {right:.4g}"
     if graph.switches:
         title += ", at each time"
@@ -155,10 +155,11 @@ def _positive(graph: Graph, p: float, q: float) -> bool:
     return p * p >= POSITIVE * q * graph.max_in_degree
 
 
-def _right_side(graph: Graph) -> float:
+def right_side(graph: Graph) -> float:
+    """max Im(ζ)²/Re(ζ) of (46); of a graph that switches the largest of its graphs."""
     if graph.switches:
         instants = {one.edges: one for _, one in islice(graph.phases(), _MOST_INSTANTS)}
-        return max(map(_right_side, instants.values()))
+        return max(map(right_side, instants.values()))
     eigenvalues = np.linalg.eigvals(graph.laplacian())
     largest = np.abs(eigenvalues).max()
     sides = [z.imag**2 / z.real for z in eigenvalues if z.real > 1e-9 * largest]

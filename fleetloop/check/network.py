@@ -147,6 +147,13 @@ def data_delay_margin_s(graph: Graph, p: float, q: float) -> float:
     return min(margins)
 
 
+def age_margin_s(scenario: Scenario) -> float:
+    """The mean age at which (45) oscillates, by its compensation; NaN: the fleet is too large."""
+    gains, graph = scenario.coordination, scenario.topology
+    margin = data_delay_margin_s if gains.compensation == "both" else delay_margin_s
+    return margin(graph, gains.p, gains.q)
+
+
 @dataclass(frozen=True, slots=True)
 class Bias:
     """(3): what held values leave in the end."""
@@ -242,9 +249,7 @@ def _come_and_go(scenario: Scenario, parts: dict[Edge, float]) -> Iterator[Findi
 def _margin(scenario: Scenario, ahead: Forecast, ages_s: dict[Edge, float]) -> Finding:
     """The delay at which (45) oscillates, against the ages; exact for equal constant delays."""
     gains, graph = scenario.coordination, scenario.topology
-    both = gains.compensation == "both"
-    margin = data_delay_margin_s if both else delay_margin_s
-    margin_s = margin(graph, gains.p, gains.q)
+    both, margin_s = gains.compensation == "both", age_margin_s(scenario)
     title = f"delay margin with {gains.compensation}"
     basis = "T* of the spectrum" if both else "p² ≥ 2 q d_max, or frequency sweep of (45)"
     most_s = max(ages_s.values())

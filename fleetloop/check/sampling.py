@@ -108,6 +108,19 @@ def torque_delay_s(scenario: Scenario) -> float:
     return delay_s
 
 
+def speed_loop_gains(scenario: Scenario, robot: Robot) -> tuple[float, float] | None:
+    """K = k_4 h / min(m̄) of a robot and the K up to which (34) sampled is stable.
+
+    None: its law tells no speed gain.
+    """
+    of_law = speed_gain(scenario.control_of(robot))
+    if of_law is None or of_law <= 0.0:
+        return None
+    h = schedule(scenario).period_s
+    gain, delay = of_law * h / min(inertias(scenario.body_of(robot))), torque_delay_s(scenario) / h
+    return gain, bisect(lambda k: speed_loop_radius(k, delay) < 1.0, 0.0, 4.0, 24)
+
+
 def _arcs(course: Course) -> Arcs:
     """(v̄_d, ω̄_d, ṡ) of the straightest and of the most curved place, at the final speed."""
     turn = np.abs(course.omega_bar)
@@ -119,12 +132,13 @@ def _arcs(course: Course) -> Arcs:
 def _speed_loop(scenario: Scenario, robot: Robot, control: Choice) -> Iterator[Finding]:
     """The speed gain against rate and delay; limited torques swing, others grow without end."""
     of_law, name = speed_gain(control), speed_gain_key(control)
-    if of_law is None or of_law <= 0.0:
+    found = speed_loop_gains(scenario, robot)
+    if of_law is None or found is None:
         return
+    gain, most = found
     h, late_s = schedule(scenario).period_s, torque_delay_s(scenario)
     inertia = min(inertias(scenario.body_of(robot)))
-    gain, delay = of_law * h / inertia, late_s / h
-    most = bisect(lambda k: speed_loop_radius(k, delay) < 1.0, 0.0, 4.0, 24)
+    delay = late_s / h
     title = f"sampled speed loop {name or 'k'} h / min(m̄)"
     late = f" with torques {1e3 * late_s:.2g} ms late" if delay else ""
     said, limit = f"{gain:.3g}", f"< {most:.3g}{late}"

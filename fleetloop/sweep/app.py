@@ -7,6 +7,7 @@ import typer
 
 from configs.errors import ScenarioError
 from fleetloop.numbers import OurWords
+from fleetloop.sweep.report.app import report
 
 _RUN = "run"
 
@@ -143,3 +144,6 @@ def schema() -> None:
     from fleetloop.terminal import say_json
 
     say_json(json_schema())
+
+
+app.command()(report)

@@ -67,6 +67,18 @@ def worst_of(folder: Path, most: int) -> list[int]:
     """Numbers of the worst cases of a study, the worst first."""
     table = read(folder, ["case", "verdict", "margin"])
     columns = [table.column(name).to_pylist() for name in ("case", "verdict", "margin")]
+    return worst_in(*columns, most=most)
+
+
+def worst_in(
+    numbers: Sequence[int],
+    verdicts: Sequence[str],
+    margins: Sequence[float | None],
+    *,
+    most: int,
+) -> list[int]:
+    """Numbers of the worst of these cases, the worst first."""
+    columns = numbers, verdicts, margins
     judged = [row for row in zip(*columns, strict=True) if row[1] in _JUDGED]
 
     def rank(row: tuple[int, str, float | None]) -> tuple[bool, float, int]:
@@ -76,11 +88,16 @@ def worst_of(folder: Path, most: int) -> list[int]:
     return [number for number, *_ in sorted(judged, key=rank)[:most]]
 
 
+def folder_of(folder: Path, number: int) -> Path:
+    """Where the whole run of a case is, if it was kept."""
+    return folder / FOLDER / f"case-{number:06d}"
+
+
 def keep_worst(
     plan: Plan, folder: Path, numbers: Sequence[int], stop: Stop, on_look: Callable[[], None]
 ) -> list[str]:
     """Run the worst cases whose folders aren't there yet; what went wrong, a line each."""
-    jobs = [WholeRun(plan, number, folder / FOLDER / f"case-{number:06d}") for number in numbers]
+    jobs = [WholeRun(plan, number, folder_of(folder, number)) for number in numbers]
     left = [job for job in jobs if not job.folder.exists()]
     done = pool.work(left, stop, lambda *_: on_look())
     return [

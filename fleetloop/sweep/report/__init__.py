@@ -1,0 +1,1 @@
+"""`fleetloop sweep report`: a study's dataset as a page, figures and tables."""
