@@ -16,6 +16,12 @@ from typing import Final
 FORGET_S: Final = 0.2
 
 
+def limited(torque: float, before: float, limit: float, step: float) -> float:
+    """Equation (1) at one wheel: `step` is τ'_max h."""
+    torque = min(max(torque, before - step), before + step)
+    return min(max(torque, -limit), limit)
+
+
 class TorqueLimiter:
     """Equation (1) for both wheels. Infinite limits change nothing."""
 
@@ -31,17 +37,16 @@ class TorqueLimiter:
     def __call__(self, right: float, left: float) -> tuple[float, float]:
         """The limited torques [N·m], at the wheels."""
         before_right, before_left = self._last
-        self._last = self._limited(right, before_right), self._limited(left, before_left)
+        most, step = self._limit, self._step
+        self._last = (
+            limited(right, before_right, most, step),
+            limited(left, before_left, most, step),
+        )
         return self._last
 
     def reset(self) -> None:
         """Start from torque 0."""
         self._last = (0.0, 0.0)
-
-    def _limited(self, torque: float, before: float) -> float:
-        limit, step = self._limit, self._step
-        torque = min(max(torque, before - step), before + step)
-        return min(max(torque, -limit), limit)
 
 
 class EncoderCheck:

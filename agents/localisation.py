@@ -25,6 +25,50 @@ from configs.brief import Wheels
 _new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
+Planar = tuple[float, float, float]
+"""x, y [m], θ [rad]."""
+Anchor = tuple[float, float, float, float, float, float, float, float]
+"""A fix, the odometry at its instant, and the turn from odometry's axes to the world's."""
+AT_START: Final[Anchor] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+
+def along(right: float, left: float, half: float, half_over_b: float) -> tuple[float, float]:
+    """Of the body from the wheels: d and φ from angles, v and ω from speeds; `half` is r/2."""
+    return half * (right + left), half_over_b * (right - left)
+
+
+def moved(odometry: Planar, distance: float, turn: float) -> Planar:
+    """Odometry after one period, from d and φ."""
+    x, y, theta = odometry
+    middle = theta + 0.5 * turn
+    return x + distance * cos(middle), y + distance * sin(middle), theta + turn
+
+
+def nearest_turn(theta: float, near: float) -> float:
+    """The angle of the direction θ that is nearest to another one."""
+    return theta + 2.0 * pi * round((near - theta) / (2.0 * pi))
+
+
+def heading_then(anchor: Anchor, odometry: Planar) -> float:
+    """The heading at an instant of this odometry, by an anchor."""
+    return anchor[2] + (odometry[2] - anchor[5])
+
+
+def anchored(x: float, y: float, theta: float, odometry: Planar) -> Anchor:
+    """The anchor of a fix at an instant of this odometry."""
+    o_x, o_y, o_theta = odometry
+    turned = theta - o_theta
+    return x, y, theta, o_x, o_y, o_theta, cos(turned), sin(turned)
+
+
+def carried(anchor: Anchor, odometry: Planar) -> Planar:
+    """F ⊕ (P ⊖ O): the pose now by an anchor and the odometry now."""
+    f_x, f_y, f_theta, o_x, o_y, o_theta, c, s = anchor
+    x, y, theta = odometry
+    dx, dy = x - o_x, y - o_y
+    return f_x + (c * dx - s * dy), f_y + (s * dx + c * dy), f_theta + (theta - o_theta)
+
+
 class Localiser:
     """The pose estimator of one robot. Per period: `wheels` first, then `fix`."""
 
@@ -50,11 +94,10 @@ class Localiser:
         self._left = 0.0
         self._fixed = False
         self._speeds = (0.0, 0.0)
-        self._odometry = (0.0, 0.0, 0.0)
+        self._odometry: Planar = (0.0, 0.0, 0.0)
         self._past = deque([self._odometry] * (delay_ticks + 1), maxlen=delay_ticks + 1)
         self._held = mode == "external"
-        # Fix, odometry at its instant, and the turn from odometry's axes to the world's.
-        self._anchor = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+        self._anchor = AT_START
 
     def remember(self, delay_ticks: int) -> None:
         """Keep the odometry of so many periods from now on; what isn't kept already is unknown."""
@@ -66,43 +109,29 @@ class Localiser:
     ) -> RobotMotion:
         """Update by wheel angles [rad] and speeds [rad/s]; return the motion now."""
         if self._right is not None:
-            x, y, theta = self._odometry
             right, left = right_wheel_rad - self._right, left_wheel_rad - self._left
-            distance = self._half * (right + left)
-            turn = self._half_over_b * (right - left)
-            middle = theta + 0.5 * turn
-            self._odometry = (
-                x + distance * cos(middle),
-                y + distance * sin(middle),
-                theta + turn,
-            )
+            distance, turn = along(right, left, self._half, self._half_over_b)
+            self._odometry = moved(self._odometry, distance, turn)
         self._right, self._left = right_wheel_rad, left_wheel_rad
         self._past.append(self._odometry)
-        self._speeds = (
-            self._half * (right_speed + left_speed),
-            self._half_over_b * (right_speed - left_speed),
-        )
+        self._speeds = along(right_speed, left_speed, self._half, self._half_over_b)
         return self._motion()
 
     def fix(self, x: float, y: float, theta: float, ticks_ago: int = 0) -> RobotMotion:
         """Update by a pose of now or of some periods ago; return the motion now."""
         if self._fixed and self._mode == "odometry":
             return self._motion()
-        o_x, o_y, o_theta = self._past[-1 - ticks_ago]
+        odometry = self._past[-1 - ticks_ago]
         if self._fixed:
-            then = self._anchor[2] + (o_theta - self._anchor[5])
-            theta += 2.0 * pi * round((then - theta) / (2.0 * pi))
+            theta = nearest_turn(theta, heading_then(self._anchor, odometry))
         self._fixed = True
-        turned = theta - o_theta
-        self._anchor = (x, y, theta, o_x, o_y, o_theta, cos(turned), sin(turned))
+        self._anchor = anchored(x, y, theta, odometry)
         return self._motion()
 
     def _motion(self) -> RobotMotion:
-        f_x, f_y, f_theta, o_x, o_y, o_theta, c, s = self._anchor
         v, omega = self._speeds
         if self._held:
-            return _new(RobotMotion, (f_x, f_y, f_theta, v, omega))
-        x, y, theta = self._odometry
-        dx, dy = x - o_x, y - o_y
-        x, y, theta = f_x + (c * dx - s * dy), f_y + (s * dx + c * dy), f_theta + (theta - o_theta)
+            x, y, theta = self._anchor[:3]
+        else:
+            x, y, theta = carried(self._anchor, self._odometry)
         return _new(RobotMotion, (x, y, theta, v, omega))

@@ -30,6 +30,11 @@ from configs.sections import Coordination
 _new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
+def extrapolated(s: float, v_hat: float, age_s: float, half_s: float) -> float:
+    """s_j in the middle of the coming period, of half length h/2, by what was said an age ago."""
+    return s + v_hat * (age_s + half_s)
+
+
 class Sums(NamedTuple):
     """d = Σ a_ij, Σ a_ij s_j, Σ a_ij v̂_j over the neighbours that are not silent."""
 
@@ -117,7 +122,7 @@ class Neighbours:
             count += 1
             degree += weight
             if extrapolates:
-                sum_s += weight * (neighbour.s + neighbour.v_hat * (age + half))
+                sum_s += weight * extrapolated(neighbour.s, neighbour.v_hat, age, half)
             elif past is None:
                 sum_s += weight * neighbour.s
             else:

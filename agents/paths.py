@@ -10,6 +10,9 @@ primes are derivatives by s. A shape gives a point and its first three derivativ
 offset that turns with the path needs θ_d0''. A user's own shape is a dataclass of parameters with a
 method `jet(s)` that returns the jets of x and y; for an offset, those of ahead and left. It raises
 `ShapeError` where this fails or gives anything else than finite numbers.
+
+The shapes' equations are functions of numbers, which the batch kernel of sweeps compiles as they
+stand; closures bind them to the parameters of a scenario.
 """
 
 from bisect import bisect_right
@@ -43,6 +46,9 @@ class PlanarJet(NamedTuple):
 
 
 _Curve = Callable[[float], PlanarJet]
+Knots = Sequence[float]
+Pieces = Sequence[Sequence[float]]
+"""Coefficients of a spline: six a segment, lowest power first."""
 
 
 def robot_path(path: ReferencePath, offset: FormationOffset) -> RobotPath:
@@ -63,7 +69,8 @@ def robot_path(path: ReferencePath, offset: FormationOffset) -> RobotPath:
             return _turning(centre, own_curve(offset))
 
 
-def _reference(x: Jet, y: Jet) -> Reference:
+def reference_of(x: Jet, y: Jet) -> Reference:
+    """(1), (10), (11) of a point and its derivatives."""
     square = x.d1 * x.d1 + y.d1 * y.d1
     omega_bar = (x.d1 * y.d2 - x.d2 * y.d1) / square
     return Reference(x.value, y.value, atan2(y.d1, x.d1), sqrt(square), omega_bar)
@@ -74,80 +81,107 @@ def _reference(x: Jet, y: Jet) -> Reference:
 
 def _shifted_cosine(path: Cosine, offset: World) -> RobotPath:
     """The paper's case, written out: it is evaluated at every tick."""
-    x_0, y_0 = path.start_m[0] + offset.x_m, path.start_m[1] + offset.y_m
-    a, k = path.amplitude_m, path.wavenumber_rad_m
-    ak, akk = a * k, a * k * k
+    x_0, y_0, a, k, ak, akk = cosine_numbers(path, offset)
 
     def reference_at(s: float) -> Reference:
-        c = cos(k * s)
-        dy = -ak * sin(k * s)
-        square = 1.0 + dy * dy
-        there = (x_0 + s, y_0 + a * c, atan2(dy, 1.0), sqrt(square), -akk * c / square)
-        return _new(Reference, there)
+        return _new(Reference, cosine_reference(s, x_0, y_0, a, k, ak, akk))
 
     return reference_at
+
+
+def cosine_numbers(
+    path: Cosine, offset: World
+) -> tuple[float, float, float, float, float, float]:
+    """What `cosine_reference` takes beside s."""
+    a, k = path.amplitude_m, path.wavenumber_rad_m
+    x_0, y_0 = path.start_m[0] + offset.x_m, path.start_m[1] + offset.y_m
+    return x_0, y_0, a, k, a * k, a * k * k
+
+
+def cosine_reference(
+    s: float, x_0: float, y_0: float, a: float, k: float, ak: float, akk: float
+) -> tuple[float, float, float, float, float]:
+    """`Reference` on the cosine; `ak` and `akk` are a k and a k²."""
+    c = cos(k * s)
+    dy = -ak * sin(k * s)
+    square = 1.0 + dy * dy
+    return x_0 + s, y_0 + a * c, atan2(dy, 1.0), sqrt(square), -akk * c / square
 
 
 def _shifted(centre: _Curve, x_m: float, y_m: float) -> RobotPath:
     def reference_at(s: float) -> Reference:
-        x, y, theta, v_bar, omega_bar = _reference(*centre(s))
-        return Reference(x + x_m, y + y_m, theta, v_bar, omega_bar)
+        return shifted_reference(centre(s), x_m, y_m)
 
     return reference_at
+
+
+def shifted_reference(centre: PlanarJet, x_m: float, y_m: float) -> Reference:
+    """Of a robot whose offset is fixed in world axes."""
+    x, y, theta, v_bar, omega_bar = reference_of(centre.x, centre.y)
+    return Reference(x + x_m, y + y_m, theta, v_bar, omega_bar)
 
 
 def _turning(centre: _Curve, offset: _Curve) -> RobotPath:
     """Γ_0 + R(θ) l with θ = θ_d0(s), differentiated twice; R' = θ' R J, J a quarter turn."""
 
     def reference_at(s: float) -> Reference:
-        x, y = centre(s)
-        l_x, l_y = offset(s)
-        square = x.d1 * x.d1 + y.d1 * y.d1
-        cross = x.d1 * y.d2 - x.d2 * y.d1
-        turn = cross / square  # θ'
-        turn_rate = (  # θ''
-            x.d1 * y.d3 - x.d3 * y.d1 - 2.0 * turn * (x.d1 * x.d2 + y.d1 * y.d2)
-        ) / square
-        norm = sqrt(square)
-        c, n = x.d1 / norm, y.d1 / norm
-        # In the turning axes: l, l' + θ' J l, l'' + 2 θ' J l' + θ'' J l − θ'² l.
-        u1 = l_x.d1 - turn * l_y.value
-        w1 = l_y.d1 + turn * l_x.value
-        u2 = l_x.d2 - 2.0 * turn * l_y.d1 - turn_rate * l_y.value - turn * turn * l_x.value
-        w2 = l_y.d2 + 2.0 * turn * l_x.d1 + turn_rate * l_x.value - turn * turn * l_y.value
-        return _reference(
-            Jet(
-                x.value + c * l_x.value - n * l_y.value,
-                x.d1 + c * u1 - n * w1,
-                x.d2 + c * u2 - n * w2,
-                0.0,
-            ),
-            Jet(
-                y.value + n * l_x.value + c * l_y.value,
-                y.d1 + n * u1 + c * w1,
-                y.d2 + n * u2 + c * w2,
-                0.0,
-            ),
-        )
+        return turning_reference(centre(s), offset(s))
 
     return reference_at
+
+
+def turning_reference(centre: PlanarJet, offset: PlanarJet) -> Reference:
+    """Of a robot whose offset turns with the path."""
+    x, y = centre.x, centre.y
+    l_x, l_y = offset.x, offset.y
+    square = x.d1 * x.d1 + y.d1 * y.d1
+    cross = x.d1 * y.d2 - x.d2 * y.d1
+    turn = cross / square  # θ'
+    turn_rate = (  # θ''
+        x.d1 * y.d3 - x.d3 * y.d1 - 2.0 * turn * (x.d1 * x.d2 + y.d1 * y.d2)
+    ) / square
+    norm = sqrt(square)
+    c, n = x.d1 / norm, y.d1 / norm
+    # In the turning axes: l, l' + θ' J l, l'' + 2 θ' J l' + θ'' J l − θ'² l.
+    u1 = l_x.d1 - turn * l_y.value
+    w1 = l_y.d1 + turn * l_x.value
+    u2 = l_x.d2 - 2.0 * turn * l_y.d1 - turn_rate * l_y.value - turn * turn * l_x.value
+    w2 = l_y.d2 + 2.0 * turn * l_x.d1 + turn_rate * l_x.value - turn * turn * l_y.value
+    return reference_of(
+        Jet(
+            x.value + c * l_x.value - n * l_y.value,
+            x.d1 + c * u1 - n * w1,
+            x.d2 + c * u2 - n * w2,
+            0.0,
+        ),
+        Jet(
+            y.value + n * l_x.value + c * l_y.value,
+            y.d1 + n * u1 + c * w1,
+            y.d2 + n * u2 + c * w2,
+            0.0,
+        ),
+    )
 
 
 def _varying(offset: VaryingOffset) -> _Curve:
     knots = offset.knots_m
     ahead, left = offset.ahead_coefficients, offset.left_coefficients
-    first, last = knots[0], knots[-1]
 
     def jet_at(s: float) -> PlanarJet:
-        inside = min(max(s, first), last)
-        n = min(bisect_right(knots, inside), len(ahead)) - 1
-        u = inside - knots[n]
-        x, y = _polynomial(ahead[n], u), _polynomial(left[n], u)
-        if inside != s:
-            return PlanarJet(Jet(x.value, 0.0, 0.0, 0.0), Jet(y.value, 0.0, 0.0, 0.0))
-        return PlanarJet(x, y)
+        return varying_jet(s, knots, ahead, left)
 
     return jet_at
+
+
+def varying_jet(s: float, knots: Knots, ahead: Pieces, left: Pieces) -> PlanarJet:
+    """The jets of an offset that changes along the path."""
+    inside = min(max(s, knots[0]), knots[-1])
+    n = min(bisect_right(knots, inside), len(ahead)) - 1
+    u = inside - knots[n]
+    x, y = _polynomial(ahead[n], u), _polynomial(left[n], u)
+    if inside != s:
+        return PlanarJet(Jet(x.value, 0.0, 0.0, 0.0), Jet(y.value, 0.0, 0.0, 0.0))
+    return PlanarJet(x, y)
 
 
 # --- paths of the centre --------------------------------------------------------------------------
@@ -202,73 +236,111 @@ def own_curve(choice: Choice) -> Callable[[float], PlanarJet]:
 
 
 def _line(path: Line) -> _Curve:
-    c, n = cos(path.heading_rad), sin(path.heading_rad)
-
-    x_0, y_0 = path.start_m
+    (x_0, y_0), (c, n) = path.start_m, line_tangent(path)
 
     def jet_at(s: float) -> PlanarJet:
-        return PlanarJet(Jet(x_0 + s * c, c, 0.0, 0.0), Jet(y_0 + s * n, n, 0.0, 0.0))
+        return line_jet(s, x_0, y_0, c, n)
 
     return jet_at
+
+
+def line_tangent(path: Line) -> tuple[float, float]:
+    """The tangent of a line."""
+    return cos(path.heading_rad), sin(path.heading_rad)
+
+
+def line_jet(s: float, x_0: float, y_0: float, c: float, n: float) -> PlanarJet:
+    """The jets of a line with the tangent (c, n)."""
+    return PlanarJet(Jet(x_0 + s * c, c, 0.0, 0.0), Jet(y_0 + s * n, n, 0.0, 0.0))
 
 
 def _cosine(path: Cosine) -> _Curve:
+    (x_0, y_0), a, k = path.start_m, path.amplitude_m, path.wavenumber_rad_m
+
     def jet_at(s: float) -> PlanarJet:
-        return PlanarJet(
-            Jet(path.start_m[0] + s, 1.0, 0.0, 0.0),
-            _add(path.start_m[1], _wave(path.amplitude_m, path.wavenumber_rad_m, s, 1)),
-        )
+        return cosine_jet(s, x_0, y_0, a, k)
 
     return jet_at
+
+
+def cosine_jet(s: float, x_0: float, y_0: float, a: float, k: float) -> PlanarJet:
+    """The jets of a cosine of amplitude a and wave number k."""
+    return PlanarJet(Jet(x_0 + s, 1.0, 0.0, 0.0), _add(y_0, _wave(a, k, s, 1)))
 
 
 def _circle(path: Circle) -> _Curve:
-    rate = (-1.0 if path.clockwise else 1.0) / path.radius_m
+    (x_0, y_0), radius = path.centre_m, path.radius_m
+    rate = circle_rate(path)
+    start = path.start_angle_rad / rate
 
     def jet_at(s: float) -> PlanarJet:
-        turned = s + path.start_angle_rad / rate
-        return PlanarJet(
-            _add(path.centre_m[0], _wave(path.radius_m, rate, turned, 1)),
-            _add(path.centre_m[1], _wave(path.radius_m, rate, turned, 0)),
-        )
+        return circle_jet(s, x_0, y_0, radius, rate, start)
 
     return jet_at
+
+
+def circle_rate(path: Circle) -> float:
+    """Angle per metre of arc [rad/m]."""
+    return (-1.0 if path.clockwise else 1.0) / path.radius_m
+
+
+def circle_jet(
+    s: float, x_0: float, y_0: float, radius: float, rate: float, start: float
+) -> PlanarJet:
+    """The jets of a circle; `start`: the arc up to where s is 0."""
+    turned = s + start
+    return PlanarJet(
+        _add(x_0, _wave(radius, rate, turned, 1)), _add(y_0, _wave(radius, rate, turned, 0))
+    )
 
 
 def _figure_eight(path: FigureEight) -> _Curve:
-    rate = 1.0 / path.half_length_m
+    (x_0, y_0), length, width = path.centre_m, path.half_length_m, path.half_width_m
+    rate = 1.0 / length
 
     def jet_at(s: float) -> PlanarJet:
-        return PlanarJet(
-            _add(path.centre_m[0], _wave(path.half_length_m, rate, s, 0)),
-            _add(path.centre_m[1], _wave(path.half_width_m, 2.0 * rate, s, 0)),
-        )
+        return figure_eight_jet(s, x_0, y_0, length, width, rate)
 
     return jet_at
+
+
+def figure_eight_jet(
+    s: float, x_0: float, y_0: float, length: float, width: float, rate: float
+) -> PlanarJet:
+    """The jets of a figure eight of half this length and width."""
+    return PlanarJet(
+        _add(x_0, _wave(length, rate, s, 0)), _add(y_0, _wave(width, 2.0 * rate, s, 0))
+    )
 
 
 def _spline(path: SplinePath) -> _Curve:
-    knots = path.knots_m
-    first, last = knots[0], knots[-1]
+    knots, x, y, closed = path.knots_m, path.x_coefficients, path.y_coefficients, path.closed
 
     def jet_at(s: float) -> PlanarJet:
-        if path.closed:
-            inside = first + (s - first) % (last - first)
-        else:
-            inside = min(max(s, first), last)
-        n = min(bisect_right(knots, inside), len(knots) - 1) - 1
-        u = inside - knots[n]
-        x = _polynomial(path.x_coefficients[n], u)
-        y = _polynomial(path.y_coefficients[n], u)
-        if path.closed or inside == s:
-            return PlanarJet(x, y)
-        beyond = s - inside
-        return PlanarJet(
-            Jet(x.value + beyond * x.d1, x.d1, 0.0, 0.0),
-            Jet(y.value + beyond * y.d1, y.d1, 0.0, 0.0),
-        )
+        return spline_jet(s, knots, x, y, closed)
 
     return jet_at
+
+
+def spline_jet(
+    s: float, knots: Knots, x_pieces: Pieces, y_pieces: Pieces, closed: bool
+) -> PlanarJet:
+    """The jets of a spline, closed or with straight ends."""
+    first, last = knots[0], knots[-1]
+    if closed:
+        inside = first + (s - first) % (last - first)
+    else:
+        inside = min(max(s, first), last)
+    n = min(bisect_right(knots, inside), len(knots) - 1) - 1
+    u = inside - knots[n]
+    x, y = _polynomial(x_pieces[n], u), _polynomial(y_pieces[n], u)
+    if closed or inside == s:
+        return PlanarJet(x, y)
+    beyond = s - inside
+    return PlanarJet(
+        Jet(x.value + beyond * x.d1, x.d1, 0.0, 0.0),
+        Jet(y.value + beyond * y.d1, y.d1, 0.0, 0.0),
+    )
 
 
 def _wave(amplitude: float, k: float, s: float, quarters: int) -> Jet:
@@ -290,9 +362,9 @@ def _add(constant: float, jet: Jet) -> Jet:
 def _polynomial(coefficients: Sequence[float], u: float) -> Jet:
     """Horner's rule for Σ c_m u^m and its first three derivatives."""
     value = d1 = d2 = d3 = 0.0
-    for c in reversed(coefficients):
+    for m in range(len(coefficients) - 1, -1, -1):
         d3 = d3 * u + 3.0 * d2
         d2 = d2 * u + 2.0 * d1
         d1 = d1 * u + value
-        value = value * u + c
+        value = value * u + coefficients[m]
     return Jet(value, d1, d2, d3)

@@ -41,6 +41,14 @@ def within_world(x_m: float, y_m: float, theta_rad: float) -> bool:
     return here and abs(theta_rad) <= HEADING_LIMIT_RAD
 
 
+def reached(
+    t_s: float, s_min_m: float, s_max_m: float, v_min_m_s: float, v_max_m_s: float
+) -> tuple[float, float]:
+    """The bounds of s at a scenario time [m]."""
+    since_s = max(t_s, 0.0)
+    return s_min_m + v_min_m_s * since_s, s_max_m + v_max_m_s * since_s
+
+
 @dataclass(frozen=True, slots=True)
 class Reach:
     """The bounds of one scenario."""
@@ -53,8 +61,8 @@ class Reach:
 
     def beyond(self, t_s: float, s: float, v_hat: float) -> str | None:
         """Why no robot can say this of a time, None if one can. What isn't finite is beyond."""
-        since_s = max(t_s, 0.0)
-        low, high = self.s_min_m + self.v_min_m_s * since_s, self.s_max_m + self.v_max_m_s * since_s
+        ends = self.s_min_m, self.s_max_m
+        low, high = reached(t_s, *ends, self.v_min_m_s, self.v_max_m_s)
         if not low <= s <= high:
             return f"s = {s:.6g} m at {t_s:.6g} s, where this scenario has {low:.6g} to {high:.6g}"
         return self.too_fast(v_hat, "v̂")

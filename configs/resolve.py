@@ -196,6 +196,11 @@ def _or_none(limit: float | None) -> float:
     return inf if limit is None else limit
 
 
+def substeps(clock: sections.Clock, period_ns: int) -> int:
+    """Integration steps per control period."""
+    return max(1, -(-period_ns // _ns(clock.plant_step_s)))
+
+
 def plant_brief(
     scenario: Scenario,
     *,
@@ -208,7 +213,7 @@ def plant_brief(
     return PlantBrief(
         robots=robot_briefs(scenario),
         schedule=ticks,
-        substeps=max(1, -(-ticks.period_ns // round(scenario.clock.plant_step_s * 1e9))),
+        substeps=substeps(scenario.clock, ticks.period_ns),
         speed=speed,
         seed=scenario.seed,
         wire=wire_model(scenario),
@@ -239,9 +244,13 @@ def wire_model(scenario: Scenario) -> WireModel | None:
 
 def leader_brief(scenario: Scenario) -> LeaderBrief:
     """The speed of the virtual leader from the start on, and its changes."""
-    leader = scenario.leader
+    return LeaderBrief(speed_changes(scenario.leader))
+
+
+def speed_changes(leader: sections.Leader) -> tuple[SpeedChange, ...]:
+    """v_r(t), in order of time."""
     later = (SpeedChange(_ns(one.t_s), one.speed_m_s, _ns(one.ramp_s)) for one in leader.steps)
-    return LeaderBrief((SpeedChange(0, leader.speed_m_s), *later))
+    return (SpeedChange(0, leader.speed_m_s), *later)
 
 
 def _robot(scenario: Scenario, number: int, robot: sections.Robot) -> RobotBrief:

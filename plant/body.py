@@ -30,7 +30,7 @@ a wheel drives, else 1: E' ≤ F v + T ω + Σ n_i ν_i, so slip creates no ener
 x, y [m]   θ [rad]   v [m/s]   ω [rad/s]   ν wheel speeds [rad/s]   τ, Δ [N·m] at the wheels
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import cos, sin
 from typing import Any, NamedTuple
 
@@ -40,7 +40,8 @@ from plant.divergence import FASTEST_WHEEL_RAD_S
 
 NO_SLIP = (1.0, 1.0)
 NO_PUSH = (0.0, 0.0)
-Accelerations = Callable[[float, float, float, float], tuple[float, float]]
+Rates = Callable[[Sequence[float], float, float, float, float], tuple[float, float]]
+"""Constants of the equations, v, ω, net torques right, left [N·m] ↦ v', ω'."""
 
 
 class State(NamedTuple):
@@ -104,19 +105,23 @@ class RigidBody:
         )
         """No wheel turns less than this, whatever the other one does."""
         if rolled == NO_SLIP and push == NO_PUSH:
-            self.accelerations = self._equations()
+            self.rates: Rates = body_rates
+            self.constants = self._constants()
         else:
+            self.rates = general_rates
             load = body.body_mass_kg * a
-            self.accelerations = self._general_equations((mass, inertia, axle, load), push)
-        """(v, ω, right, left) ↦ (v', ω') under net wheel torques τ − Δ [N·m]."""
+            self.constants = self._general_constants((mass, inertia, axle, load), push)
+        """The equations under net wheel torques τ − Δ, and their constants."""
         self.disturbed = disturbance.amplitude_wheel_N_m != 0.0
-        self._amplitude = disturbance.amplitude_wheel_N_m
-        self._rate, self._phase = disturbance.rate_rad_s, disturbance.phase_rad
+        self.disturbs: Waves = (
+            disturbance.amplitude_wheel_N_m,
+            disturbance.rate_rad_s,
+            disturbance.phase_rad,
+        )
 
     def wheel_speeds(self, v: Any, omega: Any) -> tuple[Any, Any]:
         """(right, left) wheel speeds ν [rad/s], equation (3) or (3')."""
-        turn = self.b * omega
-        return (v + turn) * self.inv_right, (v - turn) * self.inv_left
+        return rolling_speeds(v, omega, self.b, self.inv_right, self.inv_left)
 
     def wheel_torques(self, v: Any, omega: Any, v_rate: Any, omega_rate: Any) -> tuple[Any, Any]:
         """(right, left) wheel torques τ − Δ [N·m] that give these accelerations: (4) inverted.
@@ -134,56 +139,92 @@ class RigidBody:
 
     def disturbance(self, t_s: float) -> tuple[float, float]:
         """Δ(t) at the (right, left) wheel [N·m]; zero before t = 0."""
-        if not self.disturbed or t_s < 0.0:
+        if not self.disturbed:
             return 0.0, 0.0
-        angle = self._rate * t_s + self._phase
-        return self._amplitude * sin(angle), self._amplitude * cos(angle)
+        return disturbance_torques(t_s, self.disturbs)
 
     def net(self, right: float, left: float, t_s: float) -> tuple[float, float]:
         """τ − Δ(t) at the (right, left) wheel [N·m]."""
         d_right, d_left = self.disturbance(t_s)
         return right - d_right, left - d_left
 
-    def _equations(self) -> Accelerations:
-        """(v', ω') of (4), its constants bound once."""
-        centrifugal, coriolis = self.c * self.b / self.mbar_1, self.c / self.b / self.mbar_2
-        d11, d12, d21, d22 = self._damping
-        g1 = 0.5 * self.r / self.mbar_1
-        g2 = 0.5 * self.r / self.b / self.mbar_2
+    def accelerations(
+        self, v: float, omega: float, right: float, left: float
+    ) -> tuple[float, float]:
+        """(v', ω') under net wheel torques τ − Δ [N·m]."""
+        return self.rates(self.constants, v, omega, right, left)
 
-        def accelerations(v: float, omega: float, right: float, left: float) -> tuple[float, float]:
-            return (
-                centrifugal * omega * omega - d11 * v - d12 * omega + g1 * (right + left),
-                -coriolis * v * omega - d21 * v - d22 * omega + g2 * (right - left),
-            )
+    def _constants(self) -> tuple[float, ...]:
+        """Those of (4), for `body_rates`."""
+        return (
+            *(self.c * self.b / self.mbar_1, self.c / self.b / self.mbar_2),
+            *self._damping,
+            0.5 * self.r / self.mbar_1,
+            0.5 * self.r / self.b / self.mbar_2,
+        )
 
-        return accelerations
-
-    def _general_equations(
+    def _general_constants(
         self,
         inertias: tuple[float, float, float, float],
         push: tuple[float, float],
-    ) -> Accelerations:
-        """(v', ω') of (4'): `inertias` are m, I, I_w and m_c a."""
+    ) -> tuple[float, ...]:
+        """Those of (4'), for `general_rates`: `inertias` are m, I, I_w and m_c a."""
         mass, inertia, axle, load = inertias
         b, inv_r, inv_right, inv_left = self.b, 1.0 / self.r, self.inv_right, self.inv_left
         j_right, j_left = axle * inv_right * inv_right, axle * inv_left * inv_left
         along, across = mass + j_right + j_left, b * (j_right - j_left)
         turning = inertia + b * b * (j_right + j_left)
         determinant = along * turning - across * across
-        d_right, d_left = self.damping_wheel_N_m_s
-        force, torque = push
+        return (
+            *(along, across, turning, determinant, load),
+            *(b, inv_r, inv_right, inv_left),
+            *self.damping_wheel_N_m_s,
+            *push,
+        )
 
-        def accelerations(v: float, omega: float, right: float, left: float) -> tuple[float, float]:
-            nu_right, nu_left = (v + b * omega) * inv_right, (v - b * omega) * inv_left
-            net_right, net_left = right - d_right * nu_right, left - d_left * nu_left
-            drive_right = net_right * (inv_r if net_right * nu_right > 0.0 else inv_right)
-            drive_left = net_left * (inv_r if net_left * nu_left > 0.0 else inv_left)
-            f = load * omega * omega + drive_right + drive_left + force
-            t = b * (drive_right - drive_left) - load * v * omega + torque
-            return (
-                (turning * f - across * t) / determinant,
-                (along * t - across * f) / determinant,
-            )
 
-        return accelerations
+def rolling_speeds(
+    v: Any, omega: Any, half_track: float, inv_right: float, inv_left: float
+) -> tuple[Any, Any]:
+    """(right, left) wheel speeds ν [rad/s] by (3) or (3'), of numbers or of arrays of them."""
+    turn = half_track * omega
+    return (v + turn) * inv_right, (v - turn) * inv_left
+
+
+Waves = tuple[float, float, float]
+"""Amplitude [N·m], rate [rad/s] and phase [rad] of Δ."""
+
+
+def disturbance_torques(t_s: float, waves: Waves) -> tuple[float, float]:
+    """Δ(t) at the (right, left) wheel [N·m]; zero before t = 0."""
+    if t_s < 0.0:
+        return 0.0, 0.0
+    amplitude, rate, phase = waves
+    angle = rate * t_s + phase
+    return amplitude * sin(angle), amplitude * cos(angle)
+
+
+def body_rates(
+    constants: Sequence[float], v: float, omega: float, right: float, left: float
+) -> tuple[float, float]:
+    """(v', ω') of (4) under net wheel torques."""
+    centrifugal, coriolis, d11, d12, d21, d22, g1, g2 = constants
+    return (
+        centrifugal * omega * omega - d11 * v - d12 * omega + g1 * (right + left),
+        -coriolis * v * omega - d21 * v - d22 * omega + g2 * (right - left),
+    )
+
+
+def general_rates(
+    constants: Sequence[float], v: float, omega: float, right: float, left: float
+) -> tuple[float, float]:
+    """(v', ω') of (4') under net wheel torques."""
+    along, across, turning, determinant, load, b, inv_r, inv_right, inv_left = constants[:9]
+    d_right, d_left, force, torque = constants[9:]
+    nu_right, nu_left = (v + b * omega) * inv_right, (v - b * omega) * inv_left
+    net_right, net_left = right - d_right * nu_right, left - d_left * nu_left
+    drive_right = net_right * (inv_r if net_right * nu_right > 0.0 else inv_right)
+    drive_left = net_left * (inv_r if net_left * nu_left > 0.0 else inv_left)
+    f = load * omega * omega + drive_right + drive_left + force
+    t = b * (drive_right - drive_left) - load * v * omega + torque
+    return (turning * f - across * t) / determinant, (along * t - across * f) / determinant

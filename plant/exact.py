@@ -15,9 +15,16 @@ from random import Random
 from configs import powertrain
 from configs.brief import PowertrainModel
 from plant.effects import RobotEffects, WheelEffects
+from plant.encoder import PER_RADIAN
 
 Pair = tuple[float, float]
-"""Of the (right, left) wheel."""
+"""Two numbers, such as those of the (right, left) wheel."""
+
+
+def shaft_motion(angle_wheel_rad: float, speed_wheel_rad_s: float, gear: float) -> Pair:
+    """Angle [rev] and speed [rev/s] of a shaft, by those of its wheel."""
+    per_radian = PER_RADIAN * gear
+    return angle_wheel_rad * per_radian, speed_wheel_rad_s * per_radian
 
 
 class ExactMotor:

@@ -27,7 +27,7 @@ from plant.body import RigidBody, State
 from plant.divergence import Divergence
 from plant.effects import RobotEffects
 from plant.encoder import PER_RADIAN, Encoder
-from plant.exact import ExactEncoder, ExactPowertrain
+from plant.exact import ExactEncoder, ExactPowertrain, shaft_motion
 from plant.integrate import rk4
 from plant.localisation import FaultyLocalisation
 from plant.powertrain import powertrain
@@ -92,9 +92,8 @@ class EmulatedRobot:
         """Hand both drives the position and speed of their encoders."""
         state = self.state
         right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
-        right, left = PER_RADIAN * self._gear_right, PER_RADIAN * self._gear_left
-        of_right = state.right_wheel_rad * right, right_speed * right
-        of_left = state.left_wheel_rad * left, left_speed * left
+        of_right = shaft_motion(state.right_wheel_rad, right_speed, self._gear_right)
+        of_left = shaft_motion(state.left_wheel_rad, left_speed, self._gear_left)
         if self._faulty is not None:
             right_encoder, left_encoder = self._faulty.encoders
             of_right, of_left = right_encoder.read(*of_right), left_encoder.read(*of_left)

@@ -18,12 +18,13 @@
     B = (1/r) [[1, b], [1, −b]]: from body to (right, left) wheel
     sgn(e) is tanh(e / width), so that the torque is continuous
 
-Filters and κ̂ are advanced exactly, Θ̂ by Euler's rule. `proj` is in `agents.laws.dsc_terms`, as is
+Filters and κ̂ are advanced exactly, Θ̂ by Euler's rule; the equations are functions of numbers, which
+the batch kernel of sweeps compiles as they stand. `proj` is in `agents.laws.dsc_terms`, as is
 σ(ṡ), 1 wherever ṡ ≥ 0: the paper has none, and needs ṡ > 0.
 """
 
 from collections.abc import Sequence
-from math import atan, cos, exp, hypot, inf, tanh
+from math import atan, cos, exp, inf, sqrt, tanh
 from typing import Any, ClassVar, Final, NamedTuple
 
 from mypy_extensions import mypyc_attr
@@ -55,6 +56,98 @@ from agents.laws.interface import (
 from agents.laws.path_errors import path_errors
 
 _new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
+Filters = tuple[float, float, float]
+"""α_θ, α_v, α_ω."""
+Constants = tuple[Row, Filters, Filters, Filters, tuple[float, float]]
+"""k_1 … k_4; γ_1 … γ_3; what the filters move by in a period; of κ̂ what is kept, what ‖e‖ adds, and
+the width of sgn; r, b."""
+Surface = tuple[float, float, Filters, Row, Row, float, float]
+"""τ right, τ left, the filters after the period, F_1, F_2, e_1, e_2."""
+
+
+def law_constants(gains: AdaptiveDscGains, wheels: Wheels, period_s: float) -> Constants:
+    """What (15)-(36) need of the gains and the robot, for one control period."""
+    g, keep = gains, exp(-gains.eta * gains.rho * period_s)
+    moves = (
+        smoothing(period_s, g.gamma_1_s),
+        smoothing(period_s, g.gamma_2_s),
+        smoothing(period_s, g.gamma_3_s),
+    )
+    return (
+        (g.k1, g.k2, g.k3, g.k4),
+        (g.gamma_1_s, g.gamma_2_s, g.gamma_3_s),
+        moves,
+        (keep, (1.0 - keep) / g.rho, g.sgn_width),
+        (wheels.radius_m, wheels.half_track_m),
+    )
+
+
+def adaptation_rates(gains: AdaptiveDscGains, period_s: float) -> tuple[Row, Row]:
+    """The gains h K_5 of both rows of Ω."""
+    h, k = period_s, gains.k5
+    return (h * k[0], h * k[1], h * k[2], h * k[3]), (h * k[4], h * k[5], h * k[6], h * k[7])
+
+
+def approach(x_e: float, y_e: float, k1: float, k2: float) -> tuple[float, float]:
+    """The part of (15) that closes x_e, and (17)."""
+    return -k1 * x_e, -atan(k2 * y_e)
+
+
+def virtual_controls(
+    closing: float,
+    bar_theta: float,
+    theta_e: float,
+    s_dot: float,
+    v_bar_d: float,
+    omega_bar_d: float,
+    k3: float,
+) -> tuple[float, float]:
+    """v̄ of (15), and ω̄ of (25) without α_θ'; `closing` is the part of (15) that closes x_e."""
+    bar_v = closing + v_bar_d * s_dot * cos(theta_e)
+    turn = -k3 * (theta_e - bar_theta) + omega_bar_d * s_dot
+    return bar_v, turn
+
+
+def surface(
+    constants: Constants,
+    v: float,
+    omega: float,
+    bar_theta: float,
+    bar_v: float,
+    turn: float,
+    filters: Filters,
+    theta_1: Row,
+    theta_2: Row,
+    kappa: float,
+) -> Surface:
+    """(19)-(34): torques from the virtual controls, the filters and the estimates."""
+    (_, _, _, k4), (g1, g2, g3), (a1, a2, a3), (_, _, width), (r, b) = constants
+    alpha_theta, alpha_v, alpha_omega = filters
+    rate_theta = (bar_theta - alpha_theta) / g1  # (19)
+    rate_v = (bar_v - alpha_v) / g2  # (20)
+    bar_omega = turn + rate_theta  # (25)
+    rate_omega = (bar_omega - alpha_omega) / g3  # (27)
+    e_1, e_2 = v - alpha_v, omega - alpha_omega  # (30)
+    f_1 = (omega * omega, -v, -omega, -rate_v)  # (32)
+    f_2 = (-v * omega, -v, -omega, -rate_omega)
+    t1, t2, t3, t4 = theta_1
+    t5, t6, t7, t8 = theta_2
+    known_1 = f_1[0] * t1 - v * t2 - omega * t3 - rate_v * t4
+    known_2 = f_2[0] * t5 - v * t6 - omega * t7 - rate_omega * t8
+    u_1 = -k4 * e_1 - known_1 - kappa * tanh(e_1 / width)  # (34)
+    u_2 = -k4 * e_2 - known_2 - kappa * tanh(e_2 / width)
+    tau_right, tau_left = wheel_torques(u_1, u_2, r, b)  # (3)
+    after = (
+        alpha_theta + a1 * (bar_theta - alpha_theta),
+        alpha_v + a2 * (bar_v - alpha_v),
+        alpha_omega + a3 * (bar_omega - alpha_omega),
+    )
+    return tau_right, tau_left, after, f_1, f_2, e_1, e_2
+
+
+def bound_estimate(kappa: float, e_1: float, e_2: float, keep: float, gain: float) -> float:
+    """κ̂ after one period of (36)."""
+    return keep * kappa + gain * sqrt(e_1 * e_1 + e_2 * e_2)
 
 
 class DscState(NamedTuple):
@@ -98,62 +191,42 @@ class AdaptiveDsc(Law):
         period_s: float,
         path: RobotPath,  # noqa: ARG002 - the reference at the present s is enough
     ) -> None:
-        h, g = period_s, gains
-        rates = tuple(h * k for k in g.k5)
-        self._rates_1: Row = (rates[0], rates[1], rates[2], rates[3])
-        self._rates_2: Row = (rates[4], rates[5], rates[6], rates[7])
-        self._bounds = Projection.of(g.sigma_max, g.sigma_margin)
+        self._rates_1, self._rates_2 = adaptation_rates(gains, period_s)
+        self._bounds = Projection.of(gains.sigma_max, gains.sigma_margin)
         self.estimates: tuple[Row, Row, float] = (
-            g.theta_hat_0[:4],
-            g.theta_hat_0[4:],
-            g.kappa_hat_0,
+            gains.theta_hat_0[:4],
+            gains.theta_hat_0[4:],
+            gains.kappa_hat_0,
         )
         """At the start: the rows of Θ̂, and κ̂."""
-        keep = exp(-g.eta * g.rho * h)
-        self._constants = (
-            *(g.k1, g.k2, g.k3, g.k4),
-            *(g.gamma_1_s, g.gamma_2_s, g.gamma_3_s),
-            *(smoothing(h, gamma) for gamma in (g.gamma_1_s, g.gamma_2_s, g.gamma_3_s)),
-            *(keep, (1.0 - keep) / g.rho, g.sgn_width),
-            *(wheels.radius_m, wheels.half_track_m),
-        )
+        self._constants = law_constants(gains, wheels, period_s)
 
     def step(
         self, state: DscState | None, motion: RobotMotion, reference: Reference, along: PathVariable
     ) -> LawOutput:
         """One period of (8)-(36)."""
-        k1, k2, k3, k4, g1, g2, g3, a1, a2, a3, keep, gain, width, r, b = self._constants
+        constants = self._constants
+        (k1, k2, k3, k4), _, _, (keep, gain, _), _ = constants
         x, y, theta, v, omega = motion
         x_d, y_d, theta_d, v_bar_d, omega_bar_d = reference
         s_dot = along[1]
         x_e, y_e, theta_e = path_errors(x, y, theta, x_d, y_d, theta_d)  # (8)
-        approach, bar_theta = self._approach(x_e, sense(s_dot) * y_e, k1, k2)  # (17)
-        bar_v = approach + v_bar_d * s_dot * cos(theta_e)  # (15)
-        turn = -k3 * (theta_e - bar_theta) + omega_bar_d * s_dot
+        closing, bar_theta = self._approach(x_e, sense(s_dot) * y_e, k1, k2)  # (17)
+        bar_v, turn = virtual_controls(  # (15), (25)
+            closing, bar_theta, theta_e, s_dot, v_bar_d, omega_bar_d, k3
+        )
         if state is None:
             state = DscState(bar_theta, bar_v, turn, *self.estimates)
         alpha_theta, alpha_v, alpha_omega, theta_1, theta_2, kappa = state
-        rate_theta = (bar_theta - alpha_theta) / g1  # (19)
-        rate_v = (bar_v - alpha_v) / g2  # (20)
-        bar_omega = turn + rate_theta  # (25)
-        rate_omega = (bar_omega - alpha_omega) / g3  # (27)
-        e_1, e_2 = v - alpha_v, omega - alpha_omega  # (30)
-        f_1 = (omega * omega, -v, -omega, -rate_v)  # (32)
-        f_2 = (-v * omega, -v, -omega, -rate_omega)
-        t1, t2, t3, t4 = theta_1
-        t5, t6, t7, t8 = theta_2
-        known_1 = f_1[0] * t1 - v * t2 - omega * t3 - rate_v * t4
-        known_2 = f_2[0] * t5 - v * t6 - omega * t7 - rate_omega * t8
-        u_1 = -k4 * e_1 - known_1 - kappa * tanh(e_1 / width)  # (34)
-        u_2 = -k4 * e_2 - known_2 - kappa * tanh(e_2 / width)
-        tau_right, tau_left = wheel_torques(u_1, u_2, r, b)  # (3)
+        filters = (alpha_theta, alpha_v, alpha_omega)
+        tau_right, tau_left, moved, f_1, f_2, e_1, e_2 = surface(  # (19)-(34)
+            constants, v, omega, bar_theta, bar_v, turn, filters, theta_1, theta_2, kappa
+        )
         after = (
-            alpha_theta + a1 * (bar_theta - alpha_theta),
-            alpha_v + a2 * (bar_v - alpha_v),
-            alpha_omega + a3 * (bar_omega - alpha_omega),
+            *moved,
             self._learn(theta_1, f_1, e_1, self._rates_1, k4),  # (35)
             self._learn(theta_2, f_2, e_2, self._rates_2, k4),
-            keep * kappa + gain * hypot(e_1, e_2),  # (36)
+            bound_estimate(kappa, e_1, e_2, keep, gain),  # (36)
         )
         signals = (x_e, y_e, theta_e, alpha_theta, alpha_v, alpha_omega, e_1, e_2)
         said = (*signals, *theta_1, *theta_2, kappa)
@@ -161,7 +234,7 @@ class AdaptiveDsc(Law):
 
     def _approach(self, x_e: float, y_e: float, k1: float, k2: float) -> tuple[float, float]:
         """The part of (15) that closes x_e, and (17)."""
-        return -k1 * x_e, -atan(k2 * y_e)
+        return approach(x_e, y_e, k1, k2)
 
     def _learn(self, row: Row, regressor: Row, error: float, rates: Row, _k4: float) -> Row:
         """One period of (35) for one row of Ω."""

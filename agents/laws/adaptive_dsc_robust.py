@@ -16,7 +16,7 @@ from typing import Any
 from mypy_extensions import mypyc_attr
 
 from agents.laws.adaptive_dsc import AdaptiveDsc, DscState, loop_elements
-from agents.laws.dsc_terms import Row, adapt
+from agents.laws.dsc_terms import Projection, Row, adapt, clip
 from agents.laws.gains import AdaptiveDscRobustGains
 from agents.laws.interface import (
     AdaptationLimit,
@@ -29,6 +29,29 @@ from agents.laws.interface import (
     Theta,
     Wheels,
 )
+
+
+def bounded_approach(
+    x_e: float, y_e: float, k1: float, k2: float, limit: float
+) -> tuple[float, float]:
+    """The part of (15) that closes x_e, with V = `limit`, and (17)."""
+    return -limit * tanh(k1 * x_e / limit), -atan(k2 * y_e / (1.0 + k2 * abs(x_e)))
+
+
+def adapt_normalised(
+    row: Row, regressor: Row, error: float, rates: Row, bounds: Projection, k4: float
+) -> Row:
+    """One period of (35), normalised, for one row of Ω."""
+    f1, f2, f3, f4 = regressor
+    r1, r2, r3, r4 = rates
+    size = r1 * f1 * f1 + r2 * f2 * f2 + r3 * f3 * f3 + r4 * f4 * f4
+    normalised = error * (1.0 / (1.0 + size / (0.25 * k4)))
+    return adapt(row, regressor, normalised, rates, bounds)
+
+
+def at_limit(right: float, left: float, limit: float) -> bool:
+    """Whether a wheel's torque is beyond its limit: Θ̂ and κ̂ hold still."""
+    return abs(right) > limit or abs(left) > limit
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -54,21 +77,16 @@ class AdaptiveDscRobust(AdaptiveDsc):
         """One period; at the torque limit the estimates hold still."""
         out = super().step(state, motion, reference, along)
         limit, right, left = self._tau_limit, out[0], out[1]
-        if abs(right) > limit or abs(left) > limit:
-            right, left = min(max(right, -limit), limit), min(max(left, -limit), limit)
+        if at_limit(right, left, limit):
+            right, left = clip(right, limit), clip(left, limit)
             return LawOutput(right, left, self.hold(state, out.state), out.signals)
         return out
 
     def _approach(self, x_e: float, y_e: float, k1: float, k2: float) -> tuple[float, float]:
-        limit = self._v_limit
-        return -limit * tanh(k1 * x_e / limit), -atan(k2 * y_e / (1.0 + k2 * abs(x_e)))
+        return bounded_approach(x_e, y_e, k1, k2, self._v_limit)
 
     def _learn(self, row: Row, regressor: Row, error: float, rates: Row, k4: float) -> Row:
-        f1, f2, f3, f4 = regressor
-        r1, r2, r3, r4 = rates
-        size = r1 * f1 * f1 + r2 * f2 * f2 + r3 * f3 * f3 + r4 * f4 * f4
-        normalised = error * (1.0 / (1.0 + size / (0.25 * k4)))
-        return adapt(row, regressor, normalised, rates, self._bounds)
+        return adapt_normalised(row, regressor, error, rates, self._bounds, k4)
 
     # --- what follows from the equations, for `fleetloop check` ---------------------------------
 

@@ -90,7 +90,7 @@ def adapt(row: Row, regressor: Row, error: float, gains: Row, bounds: Projection
         t3 += g3 * project(f3 * error, t3, bounds)
         t4 += g4 * project(f4 * error, t4, bounds)
     limit = bounds.limit
-    return _clip(t1, limit), _clip(t2, limit), _clip(t3, limit), _clip(t4, limit)
+    return clip(t1, limit), clip(t2, limit), clip(t3, limit), clip(t4, limit)
 
 
 def wheel_torques(u_1: float, u_2: float, radius: float, half_track: float) -> tuple[float, float]:
@@ -99,5 +99,6 @@ def wheel_torques(u_1: float, u_2: float, radius: float, half_track: float) -> t
     return (u_1 + turn) / radius, (u_1 - turn) / radius
 
 
-def _clip(value: float, limit: float) -> float:
+def clip(value: float, limit: float) -> float:
+    """The nearest value in ±limit."""
     return min(max(value, -limit), limit)

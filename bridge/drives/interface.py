@@ -5,6 +5,7 @@ at the motor's shaft. Both are pure: frames in, frames out, told the time.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from math import pi
 from typing import NamedTuple, Protocol
 
 from bridge.frame import Frame
@@ -13,6 +14,16 @@ from configs.drives import Drive
 
 Motion = tuple[float, float, float, float]
 """(right, left) wheel angle [rad], then (right, left) wheel speed [rad/s]."""
+
+
+def wheel_rad_per_shaft_rev(sign: int, gear_ratio: float) -> float:
+    """Wheel angle [rad] per revolution of the shaft, of a drive mounted with this sign."""
+    return 2.0 * pi * sign / gear_ratio
+
+
+def torque_factors(sign: int, gear_ratio: float) -> tuple[float, float]:
+    """Torque at the shaft per torque at the wheel, and the other way."""
+    return sign / gear_ratio, sign * gear_ratio
 
 
 class DriveMeasurements(NamedTuple):

@@ -9,9 +9,9 @@
 Requests of other hosts are counted, so that their answers don't count as those of a second sender.
 """
 
-from math import pi
 from typing import Final
 
+from bridge.drives.interface import torque_factors, wheel_rad_per_shaft_rev
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.cadence import LIMIT, Cadence
 from bridge.drives.odrive.frames import AxisError, AxisState, Command, ProcedureResult
@@ -55,11 +55,10 @@ class RemoteAxis:
         ratio = link.mounting.gear_ratio
         self.name = f"{name} drive (node {node})"
         self.node = node
-        self.wheel_rad_per_shaft_rev = 2.0 * pi * sign / ratio
+        self.wheel_rad_per_shaft_rev = wheel_rad_per_shaft_rev(sign, ratio)
         """Wheel angle per shaft revolution."""
-        self.to_shaft = sign / ratio
-        self.to_wheel = sign * ratio
-        """Torque at the wheel per torque at the shaft."""
+        self.to_shaft, self.to_wheel = torque_factors(sign, ratio)
+        """Torque at the shaft per torque at the wheel, and the other way."""
         self.angle_wheel_rad = self.speed_wheel_rad_s = 0.0
         self.encoder_ns = NEVER
         self.heartbeat_ns: int | None = None

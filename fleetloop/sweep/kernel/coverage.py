@@ -1,0 +1,206 @@
+"""What the kernel can run: a positive list of keys and of the values that they may have.
+
+A key that stands in no list may only have its default, and a section that stands in none isn't run
+at all: what is added to scenarios goes to the in-process reference until the kernel learns it.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import MISSING, fields
+from functools import lru_cache
+from typing import Any, Final
+
+from agents.laws.gains import AdaptiveDscGains, AdaptiveDscRobustGains
+from configs import paths, sections
+from configs.drives import DEFAULT, Drive
+from configs.graph_section import GraphSection
+from configs.host import Host
+from configs.netem import Effects
+from configs.parameters import Parameters
+from configs.plugins import LAWS, Choice
+from configs.resolve import pose_age_limit_s, schedule
+from configs.scenario import Scenario
+
+Reason = Callable[[Any], str]
+"""Why a value isn't covered, "" if it is."""
+
+
+def _any(_: Any) -> str:
+    return ""
+
+
+def _only(wanted: Any, otherwise: str) -> Reason:
+    def reason(value: Any) -> str:
+        return "" if value == wanted else otherwise
+
+    return reason
+
+
+def _all_of(names: str) -> dict[str, Reason]:
+    return dict.fromkeys(names.split(), _any)
+
+
+_GAINS: Final = _all_of(
+    "k1 k2 k3 k4 gamma_1_s gamma_2_s gamma_3_s k5 sigma_max sigma_margin eta rho sgn_width"
+    " theta_hat_0 kappa_hat_0"
+)
+_SECTIONS: Final[Mapping[str, Reason]] = {
+    **_all_of("schema_ name description duration_s until_s seed robot_types expect record"),
+    **_all_of("motor encoder supply"),  # only of realistic drives
+    **_all_of("clock path leader graph control coordination localisation bus drive_choice"),
+    **_all_of("mounting host disturbance network robot"),  # looked at for themselves
+    "fault": _only((), "faults"),
+}
+_DRIVE: Final[Mapping[str, Reason]] = {
+    "preset": _only("ideal", "drives with limits or motors of their own"),
+    **_all_of("right_node left_node command_latency_s torque_constant_N_m_A current_limit_A"),
+    **_all_of("heartbeat_period_s watchdog_s velocity_limit_shaft_rev_s overspeed_ratio"),
+    **_all_of("velocity_gain_shaft_N_m_s_rev velocity_integrator_gain_shaft_N_m_rev"),
+    **_all_of("position_gain_1_s under_voltage_V over_voltage_V derate_from_C derate_to_C"),
+    **_all_of("spinout_power_W firmware boot_s calibration_s estop_blocks_arming"),
+}
+_KEYS: Final[Mapping[type[Parameters], Mapping[str, Reason]]] = {
+    sections.Clock: {
+        "mode": _only("lockstep", "real time"),
+        **_all_of("control_period_s share_period_s localisation_period_s plant_step_s"),
+        **_all_of("countdown_s tick_deadline_s on_late start_deadline_s"),
+    },
+    paths.Line: _all_of("kind start_m heading_rad"),
+    paths.Cosine: _all_of("kind start_m amplitude_m wavenumber_rad_m"),
+    paths.Circle: _all_of("kind centre_m radius_m start_angle_rad clockwise"),
+    paths.FigureEight: _all_of("kind centre_m half_length_m half_width_m"),
+    paths.Spline: _all_of("kind points_m closed"),
+    paths.World: _all_of("kind x_m y_m"),
+    paths.Structure: _all_of("kind ahead_m left_m"),
+    paths.Varying: _all_of("kind knots"),
+    sections.Leader: _all_of("speed_m_s steps"),
+    sections.SpeedStep: _all_of("t_s speed_m_s ramp_s"),
+    GraphSection: {
+        **_all_of("edges generator adjacency file weights max_in_degree seed leader"),
+        "switch": _only((), "a graph that switches"),
+    },
+    AdaptiveDscGains: _GAINS,
+    AdaptiveDscRobustGains: {**_GAINS, **_all_of("v_bar_limit_m_s torque_limit_wheel_N_m")},
+    sections.Coordination: {
+        **_all_of("p q v_hat_0 mu_0 age_limit_s silence_limit_s ahead_limit_s"),
+        "compensation": lambda value: (
+            "" if value in ("extrapolate", "hold") else f'coordination.compensation = "{value}"'
+        ),
+    },
+    sections.Localisation: _all_of("source delay_s"),
+    sections.Bus: {
+        **_all_of("interface bitrate_bit_s txqueuelen tx_mailboxes restart_s drive_restart_s"),
+        **_all_of("record load_ceiling"),
+        "timing": _only("ideal", "bit timing of buses"),
+    },
+    sections.Mounting: _all_of("right_sign left_sign gear_ratio"),
+    Host: {
+        **_all_of("heartbeat_age_limit_s encoder_age_limit_s pose_age_limit_s"),
+        **_all_of("torque_limit_wheel_N_m torque_slew_limit_wheel_N_m_s on_exit"),
+        **_all_of("rearm rearm_after_s rearm_attempts rearm_limit_s restarts bus_error_limit_s"),
+        "encoder_mismatch_limit_wheel_rad": _only(None, "a check of encoders"),
+        "pose_mismatch_limit_m": _only(None, "a check of poses"),
+        "dry_run": _only(False, "a dry run"),
+    },
+    sections.Disturbance: _all_of("amplitude_wheel_N_m rate_rad_s"),
+    sections.Network: {
+        "endpoint": _any,
+        "default": _only(Effects(), "an emulated network"),
+        "edge": _only((), "an emulated network"),
+    },
+    sections.Robot: {
+        **_all_of("name type pose v_m_s omega_rad_s s_0 bus right_node left_node"),
+        **_all_of("offset body control mounting disturbance"),  # looked at as they are merged
+        "joins_at_s": _only(0.0, "robots that join later"),
+        "leaves_at_s": _only(None, "robots that leave"),
+    },
+    sections.Pose: _all_of("x_m y_m theta_rad"),
+    sections.Body: _all_of(
+        "wheel_radius_m half_track_m com_offset_m body_mass_kg wheel_mass_kg body_inertia_kg_m2"
+        " wheel_axle_inertia_kg_m2 wheel_diameter_inertia_kg_m2 damping_right_wheel_N_m_s"
+        " damping_left_wheel_N_m_s wheels_in_mass"
+    ),
+}
+"""By the section's type and key."""
+
+
+def lacks(scenario: Scenario) -> str:
+    """Why the kernel can't run a scenario, "" if it can."""
+    return next(_reasons(scenario), "")
+
+
+def _reasons(scenario: Scenario) -> Iterator[str]:
+    for name, field in type(scenario).model_fields.items():
+        value = getattr(scenario, name)
+        if name in _SECTIONS:
+            yield from filter(None, (_SECTIONS[name](value),))
+        elif value != field.get_default(call_default_factory=True):
+            yield f"section [{name}]"
+    for section in (
+        *(scenario.clock, scenario.path, scenario.leader, *scenario.leader.steps),
+        *(scenario.graph, scenario.coordination, scenario.localisation, scenario.bus),
+        *(scenario.mounting, scenario.host, scenario.disturbance, scenario.network),
+    ):
+        yield from _of_section(section)
+    if scenario.drive_choice.name == DEFAULT:
+        yield from filter(None, (_section_reason(scenario.drive_choice.parameters),))
+    else:
+        yield f"the drive protocol {scenario.drive_choice.name}"
+    for robot in scenario.robot:
+        yield from filter(None, (_reason_of(robot),))
+        yield from _of_section(robot.offset)
+        yield from _of_law(scenario.control_of(robot))
+        yield from _of_section(robot.pose)
+        yield from _of_section(robot.disturbance or scenario.disturbance)
+    for body in scenario.robot_types.values():
+        yield from _of_section(body)
+    yield from _of_poses(scenario)
+
+
+def _of_law(choice: Choice) -> Iterator[str]:
+    if choice.name in LAWS and type(choice.parameters) in (AdaptiveDscGains, AdaptiveDscRobustGains):
+        yield from _of_section(choice.parameters)
+    else:
+        yield f"the law {choice.name}"
+
+
+def _of_poses(scenario: Scenario) -> Iterator[str]:
+    """A robot stops where poses are further apart than it lets them be."""
+    if scenario.localisation.source != "odometry":
+        ticks = schedule(scenario)
+        oldest_s = (ticks.pose_delay_ticks + ticks.localise_every) * ticks.period_s
+        if oldest_s > pose_age_limit_s(scenario):
+            yield "poses that are older than host.pose_age_limit_s"
+
+
+def _of_section(section: object) -> Iterator[str]:
+    if isinstance(section, Choice):
+        yield f"the shape {section.name}"
+    elif reason := _section_reason(section):
+        yield reason
+
+
+@lru_cache(maxsize=4096)
+def _section_reason(section: Parameters) -> str:
+    """As `_reason_of`, looked up by the value: cases of a sweep have most sections in common."""
+    return _reason_of(section)
+
+
+def _reason_of(section: Parameters) -> str:
+    kind = type(section)
+    keys = _DRIVE if isinstance(section, Drive) else _KEYS.get(kind)
+    if keys is None:
+        return f"a section of the type {kind.__name__}"
+    for field in fields(section):
+        value = getattr(section, field.name)
+        reason = keys.get(field.name)
+        if reason is not None:
+            said = reason(value)
+            if said:
+                return said
+            continue
+        default = field.default
+        if default is MISSING and field.default_factory is not MISSING:
+            default = field.default_factory()
+        if value != default:
+            return f"the key {field.name} of {kind.__name__}"
+    return ""

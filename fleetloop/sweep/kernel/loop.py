@@ -1,0 +1,459 @@
+"""The closed loop of one case, tick by tick: the order of `fleetloop.in_process`, without its parts.
+
+    share       path variables and speed estimates, every `share_every` ticks
+    per robot   truth to the record; pose, every `localise_every`; encoders as float32;
+                odometry and fix; coordination; reference; law; limits; torques as float32; body
+
+Every equation is a function of `agents`, `plant` or `configs`: this module only calls them, in the
+order in which the controller and the plant do. It is plain Python that numba compiles, with the
+equations, as they stand in their sources (`fleetloop.sweep.kernel.linking`), and it runs uncompiled
+just as well, only slowly.
+
+A case that leaves the ordinary course (a robot stops itself, a body or a path variable diverges)
+isn't followed: `simulate` says at which tick, and the case belongs to the reference.
+
+Records of arrays have the fields of `fleetloop.sweep.kernel.layout`.
+"""
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from agents.coordination import Map, advanced, period_map
+from agents.laws.adaptive_dsc import (
+    Filters,
+    approach,
+    bound_estimate,
+    surface,
+    virtual_controls,
+)
+from agents.laws.adaptive_dsc_robust import adapt_normalised, at_limit, bounded_approach
+from agents.laws.dsc_terms import Projection, adapt, clip, sense
+from agents.laws.path_errors import path_errors
+from agents.limits import limited
+from agents.localisation import along, anchored, carried, heading_then, moved, nearest_turn
+from agents.neighbours import extrapolated
+from agents.paths import (
+    PlanarJet,
+    Jet,
+    circle_jet,
+    cosine_jet,
+    cosine_reference,
+    figure_eight_jet,
+    line_jet,
+    shifted_reference,
+    spline_jet,
+    turning_reference,
+    varying_jet,
+)
+from configs.reach import reached, within_world
+from fleetloop.sweep.kernel.layout import (
+    CIRCLE,
+    COSINE,
+    EXTERNAL,
+    FIGURE_EIGHT,
+    LINE,
+    ODOMETRY,
+    ROBUST,
+    STRUCTURE,
+    VARYING,
+    WORLD,
+)
+from fleetloop.sweep.kernel.primitives import FLOAT32_MOST, float32
+from plant.body import body_rates, disturbance_torques, rolling_speeds
+from plant.exact import shaft_motion
+from plant.integrate import net_torques, runge_kutta, within_bounds
+
+SATURATED = 3.4e38
+"""What a torque beyond float32 is sent as: `bridge.drives.odrive.client.FLOAT32_MAX`."""
+NOTHING, PATH_VARIABLE, POSE, TORQUE, BODY, TURN = range(6)
+"""Why a case left the ordinary course."""
+MOST_TURN_RAD = 1e15
+"""Whole turns beyond are no whole numbers any more."""
+
+
+def simulate(
+    case: Any,
+    robots: Any,
+    states: Any,
+    edges: Any,
+    leader_m_s: Any,
+    curves: Any,
+    columns: tuple[Any, Any],
+    rows: tuple[Any, Any],
+) -> tuple[int, int, int]:
+    """Run one case from tick 0 to its end, or to the tick at which it leaves the ordinary course.
+
+    Args:
+        case: a record of `layout.CASE`.
+        robots: records of `layout.ROBOT`.
+        states: of `layout.STATE`, at tick 0; at the end those of the end.
+        edges: of `layout.EDGE`, those to each robot together, in the order of speakers' names.
+        leader_m_s: v_r by tick.
+        curves: knots of all splines; and their coefficients, twice: x and y, or ahead and left.
+        columns: of the plant's row and of the controller's, which are kept.
+        rows: of the plant and of the controllers: robot, tick, column; column 0 stays as it is.
+
+    Returns:
+        why it left the ordinary course, `NOTHING` if it didn't; the tick; the robot's number.
+    """
+    count, ticks = len(robots), case.ticks
+    plant_columns, controller_columns = columns
+    plant_rows, controller_rows = rows
+    kept = case.pose_delay_ticks + 1
+    odometries = np.zeros((count, kept, 3))  # by tick, the last `kept`
+    poses = np.zeros((count, kept, 3))
+    said = np.zeros((count, 2))  # s, v̂
+    said_ns = 0
+    truth, told = np.zeros(12), np.zeros(35)
+    for tick in range(ticks):
+        t_ns = tick * case.period_ns
+        t_s = t_ns * 1e-9
+        if tick % case.share_every == 0:
+            said_ns = t_ns
+            for i in range(count):
+                state = states[i]
+                said[i, 0], said[i, 1] = state.s, state.v_hat
+                if not _is_reached(case, t_s, state.s, state.v_hat):
+                    return PATH_VARIABLE, tick, i
+        for i in range(count):
+            robot, state = robots[i], states[i]
+            if len(plant_columns):
+                _plant_row(truth, t_s, robot, state)
+                for column in range(len(plant_columns)):
+                    plant_rows[i, tick, column + 1] = truth[plant_columns[column]]
+            if tick % case.localise_every == 0:
+                if not within_world(state.x, state.y, state.theta):
+                    return POSE, tick, i
+                pose = poses[i, tick % kept]
+                pose[0], pose[1], pose[2] = state.x, state.y, state.theta
+            _measure(robot, state)
+            odometry = odometries[i, tick % kept]
+            odometry[0], odometry[1], odometry[2] = state.o_x, state.o_y, state.o_theta
+            fix_tick = tick - case.pose_delay_ticks
+            fixes = case.localisation != ODOMETRY and fix_tick >= 0
+            if fixes and fix_tick % case.localise_every == 0:
+                pose, odometry = poses[i, fix_tick % kept], odometries[i, fix_tick % kept]
+                if not _fix(state, pose, (odometry[0], odometry[1], odometry[2])):
+                    return TURN, tick, i
+            v_r = leader_m_s[tick] if robot.follows_leader else 0.0
+            why = _control(case, robot, state, edges, said, t_ns - said_ns, v_r, curves, told)
+            told[0] = t_s
+            if why != NOTHING:
+                return why, tick, i
+            for column in range(len(controller_columns)):
+                controller_rows[i, tick, column + 1] = told[controller_columns[column]]
+            if not _is_reached(case, t_s + case.period_s, state.s, state.v_hat):
+                return PATH_VARIABLE, tick, i
+            if not _advance(case, robot, state, t_s):
+                return BODY, tick, i
+    return NOTHING, ticks, 0
+
+
+def _is_reached(case: Any, t_s: float, s: float, v_hat: float) -> bool:
+    """Whether a path variable is within the reach of the scenario."""
+    low, high = reached(t_s, case.s_min_m, case.s_max_m, case.v_min_m_s, case.v_max_m_s)
+    return low <= s <= high and case.v_low_m_s <= v_hat <= case.v_high_m_s
+
+
+def _plant_row(row: Any, t_s: float, robot: Any, state: Any) -> None:
+    """The signals of `configs.signals.PLANT_SIGNALS`."""
+    row[0] = t_s
+    row[1], row[2], row[3], row[4], row[5] = state.x, state.y, state.theta, state.v, state.omega
+    row[6] = state.torque_right_shaft * robot.gear_right
+    row[7] = state.torque_left_shaft * robot.gear_left
+    row[8], row[9] = state.demand_right, state.demand_left
+    row[10], row[11] = state.demand_right, state.demand_left
+
+
+# --- what the controller knows --------------------------------------------------------------------
+
+
+def _measure(robot: Any, state: Any) -> None:
+    """Encoders, as the bus carries them; odometry and speeds from them."""
+    speeds = rolling_speeds(
+        state.v, state.omega, robot.half_track, robot.inv_right, robot.inv_left
+    )
+    right_rev, right_rev_s = shaft_motion(state.right_wheel_rad, speeds[0], robot.gear_right)
+    left_rev, left_rev_s = shaft_motion(state.left_wheel_rad, speeds[1], robot.gear_left)
+    right_rad = float32(right_rev + 0.0) * robot.wheel_rad_per_rev_right  # + the offset of a drive
+    left_rad = float32(left_rev + 0.0) * robot.wheel_rad_per_rev_left
+    right_rad_s = float32(right_rev_s) * robot.wheel_rad_per_rev_right
+    left_rad_s = float32(left_rev_s) * robot.wheel_rad_per_rev_left
+    half, half_over_b = robot.half_radius, robot.half_radius_over_b
+    distance, turn = along(
+        right_rad - state.seen_right_rad, left_rad - state.seen_left_rad, half, half_over_b
+    )
+    state.o_x, state.o_y, state.o_theta = moved(
+        (state.o_x, state.o_y, state.o_theta), distance, turn
+    )
+    state.seen_right_rad, state.seen_left_rad = right_rad, left_rad
+    state.v_used, state.omega_used = along(right_rad_s, left_rad_s, half, half_over_b)
+
+
+def _anchor(state: Any) -> tuple[float, float, float, float, float, float, float, float]:
+    """The anchor of a state."""
+    return (
+        *(state.f_x, state.f_y, state.f_theta),
+        *(state.a_x, state.a_y, state.a_theta, state.a_cos, state.a_sin),
+    )
+
+
+def _fix(state: Any, pose: Any, odometry: tuple[float, float, float]) -> bool:
+    """Take a pose of the instant of this odometry; False if its turns can't be counted."""
+    then = heading_then(_anchor(state), odometry)
+    if not abs(then) < MOST_TURN_RAD:
+        return False
+    theta = nearest_turn(pose[2], then)
+    anchor = anchored(pose[0], pose[1], theta, odometry)
+    state.f_x, state.f_y, state.f_theta = anchor[0], anchor[1], anchor[2]
+    state.a_x, state.a_y, state.a_theta = anchor[3], anchor[4], anchor[5]
+    state.a_cos, state.a_sin = anchor[6], anchor[7]
+    return True
+
+
+# --- the controller -------------------------------------------------------------------------------
+
+
+def _control(
+    case: Any,
+    robot: Any,
+    state: Any,
+    edges: Any,
+    said: Any,
+    age_ns: int,
+    v_r: float,
+    curves: Any,
+    row: Any,
+) -> int:
+    """One period of the controller: its row, torques and next state; why it can't go on."""
+    if case.localisation == EXTERNAL:
+        x, y, theta = state.f_x, state.f_y, state.f_theta
+    else:
+        x, y, theta = carried(_anchor(state), (state.o_x, state.o_y, state.o_theta))
+    v, omega = state.v_used, state.omega_used
+    if not isfinite(x + y + theta + v + omega):
+        return POSE
+    v_hat, mu, s = state.v_hat, state.mu, state.s
+    s_dot = mu + v_hat
+    neighbours = _coordinate(case, robot, state, edges, said, age_ns, v_r)
+    x_d, y_d, theta_d, v_bar_d, omega_bar_d = _reference(case, robot, curves, s)
+    row[1], row[2], row[3], row[4], row[5] = x, y, theta, v, omega
+    row[6], row[7], row[8], row[9], row[10] = s, s_dot, mu, v_hat, neighbours
+    row[11], row[12], row[13] = x_d, y_d, theta_d
+
+    x_e, y_e, theta_e = path_errors(x, y, theta, x_d, y_d, theta_d)
+    right, left = _law(
+        robot, state, row, v, omega, x_e, y_e, theta_e, s_dot, v_bar_d, omega_bar_d
+    )
+    if not isfinite(right + left):
+        return TORQUE
+    _send(robot, state, right, left)
+    row[31] = state.torque_right_shaft * robot.to_wheel_right
+    row[32] = state.torque_left_shaft * robot.to_wheel_left
+    row[33] = row[34] = 0.0
+    return NOTHING
+
+
+def _coordinate(
+    case: Any, robot: Any, state: Any, edges: Any, said: Any, age_ns: int, v_r: float
+) -> int:
+    """The next state of the coordination; the number of neighbours that count."""
+    neighbours = 0
+    degree = sum_s = sum_v = 0.0
+    age_s = age_ns * 1e-9
+    if age_s <= case.silence_limit_s:
+        age_s = min(age_s, case.age_limit_s)
+        for number in range(robot.first_edge, robot.last_edge):
+            edge = edges[number]
+            s_j, v_j, weight = said[edge.speaker, 0], said[edge.speaker, 1], edge.weight
+            neighbours += 1
+            degree += weight
+            if case.extrapolates:
+                sum_s += weight * extrapolated(s_j, v_j, age_s, case.half_period_s)
+            else:
+                sum_s += weight * s_j
+            sum_v += weight * v_j
+    if degree != state.degree:
+        state.degree = degree
+        _keep_map(state, period_map(case.p, case.q, degree, robot.h, case.period_s))
+    state.v_hat, state.mu, state.s = advanced(
+        _kept_map(state), state.v_hat, state.mu, state.s, sum_s, sum_v, v_r
+    )
+    return neighbours
+
+
+def _keep_map(state: Any, rows: Map) -> None:
+    """Keep the coordination's map until the degree changes."""
+    v, mu, s = rows
+    state.v_1, state.v_2, state.v_3 = v
+    state.mu_1, state.mu_2, state.mu_3, state.mu_4, state.mu_5, state.mu_6 = mu
+    state.s_1, state.s_2, state.s_3, state.s_4, state.s_5, state.s_6 = s
+
+
+def _kept_map(state: Any) -> Map:
+    return (
+        (state.v_1, state.v_2, state.v_3),
+        (state.mu_1, state.mu_2, state.mu_3, state.mu_4, state.mu_5, state.mu_6),
+        (state.s_1, state.s_2, state.s_3, state.s_4, state.s_5, state.s_6),
+    )
+
+
+def _law(
+    robot: Any,
+    state: Any,
+    row: Any,
+    v: float,
+    omega: float,
+    x_e: float,
+    y_e: float,
+    theta_e: float,
+    s_dot: float,
+    v_bar_d: float,
+    omega_bar_d: float,
+) -> tuple[float, float]:
+    """The torques of the paper's law or of the robust one, limited by the host; its next state."""
+    k1, k2, k3, k4 = robot.k1, robot.k2, robot.k3, robot.k4
+    robust = robot.law == ROBUST
+    if robust:
+        closing, bar_theta = bounded_approach(x_e, sense(s_dot) * y_e, k1, k2, robot.v_limit)
+    else:
+        closing, bar_theta = approach(x_e, sense(s_dot) * y_e, k1, k2)
+    bar_v, turn = virtual_controls(closing, bar_theta, theta_e, s_dot, v_bar_d, omega_bar_d, k3)
+    if not state.started:
+        state.started = 1
+        state.alpha_theta, state.alpha_v, state.alpha_omega = bar_theta, bar_v, turn
+    filters: Filters = (state.alpha_theta, state.alpha_v, state.alpha_omega)
+    theta_1 = (state.theta_1, state.theta_2, state.theta_3, state.theta_4)
+    theta_2 = (state.theta_5, state.theta_6, state.theta_7, state.theta_8)
+    kappa = state.kappa
+    constants = (
+        (k1, k2, k3, k4),
+        (robot.gamma_1, robot.gamma_2, robot.gamma_3),
+        (robot.move_1, robot.move_2, robot.move_3),
+        (robot.kappa_keep, robot.kappa_gain, robot.sgn_width),
+        (robot.radius, robot.half_track_known),
+    )
+    right, left, after, f_1, f_2, e_1, e_2 = surface(
+        constants, v, omega, bar_theta, bar_v, turn, filters, theta_1, theta_2, kappa
+    )
+    row[14], row[15], row[16] = x_e, y_e, theta_e
+    row[17], row[18], row[19] = filters
+    row[20], row[21] = e_1, e_2
+    row[22], row[23], row[24], row[25] = theta_1
+    row[26], row[27], row[28], row[29] = theta_2
+    row[30] = kappa
+    learns = True
+    if robust and at_limit(right, left, robot.torque_limit):
+        right, left = clip(right, robot.torque_limit), clip(left, robot.torque_limit)
+        learns = False
+    if not isfinite(right + left):  # the case ends here
+        return right, left
+    if robot.host_limits:
+        asked_right, asked_left = right, left
+        right = limited(right, state.limited_right, robot.host_limit, robot.host_step)
+        left = limited(left, state.limited_left, robot.host_limit, robot.host_step)
+        state.limited_right, state.limited_left = right, left
+        learns = learns and right == asked_right and left == asked_left
+    state.alpha_theta, state.alpha_v, state.alpha_omega = after
+    if learns:
+        bounds = Projection(robot.sigma, robot.sigma_square, robot.sigma_span, robot.sigma_limit)
+        rates_1 = (robot.rate_1, robot.rate_2, robot.rate_3, robot.rate_4)
+        rates_2 = (robot.rate_5, robot.rate_6, robot.rate_7, robot.rate_8)
+        if robust:
+            theta_1 = adapt_normalised(theta_1, f_1, e_1, rates_1, bounds, k4)
+            theta_2 = adapt_normalised(theta_2, f_2, e_2, rates_2, bounds, k4)
+        else:
+            theta_1 = adapt(theta_1, f_1, e_1, rates_1, bounds)
+            theta_2 = adapt(theta_2, f_2, e_2, rates_2, bounds)
+        state.theta_1, state.theta_2, state.theta_3, state.theta_4 = theta_1
+        state.theta_5, state.theta_6, state.theta_7, state.theta_8 = theta_2
+        state.kappa = bound_estimate(kappa, e_1, e_2, robot.kappa_keep, robot.kappa_gain)
+    return right, left
+
+
+def _send(robot: Any, state: Any, right: float, left: float) -> None:
+    """Torques to the drives, as float32 carries them; if one of them is beyond, both saturate."""
+    right *= robot.to_shaft_right
+    left *= robot.to_shaft_left
+    right_32, left_32 = float32(right), float32(left)
+    if abs(right_32) > FLOAT32_MOST or abs(left_32) > FLOAT32_MOST:
+        right_32, left_32 = float32(clip(right, SATURATED)), float32(clip(left, SATURATED))
+    state.torque_right_shaft, state.torque_left_shaft = right_32, left_32
+
+
+# --- the path -------------------------------------------------------------------------------------
+
+
+def _reference(
+    case: Any, robot: Any, curves: Any, s: float
+) -> tuple[float, float, float, float, float]:
+    """The robot's reference at s."""
+    if case.path == COSINE and robot.offset == WORLD:
+        return cosine_reference(
+            s, robot.path_1, robot.path_2, robot.path_3, robot.path_4, robot.path_5, robot.path_6
+        )
+    centre = _centre(case, curves, s)
+    if robot.offset == WORLD:
+        shifted = shifted_reference(centre, robot.path_1, robot.path_2)
+        return shifted.x, shifted.y, shifted.theta, shifted.v_bar, shifted.omega_bar
+    if robot.offset == STRUCTURE:
+        ahead = Jet(robot.path_1, 0.0, 0.0, 0.0)
+        place = PlanarJet(ahead, Jet(robot.path_2, 0.0, 0.0, 0.0))
+    else:
+        knots, first, second = curves
+        a, b = robot.first_knot, robot.last_knot
+        place = varying_jet(s, knots[a:b], first[a : b - 1], second[a : b - 1])
+    turned = turning_reference(centre, place)
+    return turned.x, turned.y, turned.theta, turned.v_bar, turned.omega_bar
+
+
+def _centre(case: Any, curves: Any, s: float) -> PlanarJet:
+    """The jets of the formation's centre at s."""
+    one, two, three, four, five = case.path_1, case.path_2, case.path_3, case.path_4, case.path_5
+    if case.path == COSINE:
+        return cosine_jet(s, one, two, three, four)
+    if case.path == LINE:
+        return line_jet(s, one, two, three, four)
+    if case.path == CIRCLE:
+        return circle_jet(s, one, two, three, four, five)
+    if case.path == FIGURE_EIGHT:
+        return figure_eight_jet(s, one, two, three, four, five)
+    knots, first, second = curves
+    b = case.last_knot
+    return spline_jet(s, knots[:b], first[: b - 1], second[: b - 1], case.closed)
+
+
+# --- the robot ------------------------------------------------------------------------------------
+
+
+def _advance(case: Any, robot: Any, state: Any, t_s: float) -> bool:
+    """The body over one period, torques held; False: its motion diverged."""
+    right = state.torque_right_shaft * robot.gear_right
+    left = state.torque_left_shaft * robot.gear_left
+    state.demand_right, state.demand_left = right, left
+    constants = (
+        *(robot.centrifugal, robot.coriolis),
+        *(robot.damping_11, robot.damping_12, robot.damping_21, robot.damping_22),
+        *(robot.gain_1, robot.gain_2),
+    )
+    waves = (robot.amplitude, robot.wave_rate, robot.phase)
+    motion = (
+        *(state.x, state.y, state.theta, state.v, state.omega),
+        *(state.right_wheel_rad, state.left_wheel_rad),
+    )
+    step_s, half_track = case.period_s / case.substeps, robot.half_track
+    for n in range(case.substeps):
+        if robot.disturbed:
+            net = net_torques(right, left, waves, t_s + n * step_s, step_s)
+        else:
+            net = (right, left, right, left, right, left)
+        motion = runge_kutta(
+            body_rates, constants, motion, net, step_s, half_track, robot.inv_right, robot.inv_left
+        )
+        if not within_bounds(motion, half_track, robot.fastest_m_s):
+            return False
+    state.x, state.y, state.theta, state.v, state.omega = motion[:5]
+    state.right_wheel_rad, state.left_wheel_rad = motion[5], motion[6]
+    return True

@@ -1,0 +1,319 @@
+"""A scenario as the numbers of one case: what the briefs and the constructors of its parts make of it.
+
+Numbers that equations need once are computed by the functions that the parts call, too. What cases of
+a sweep have in common is computed once and looked up by its value.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from math import inf, nan
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.laws.adaptive_dsc import adaptation_rates, law_constants
+from agents.laws.dsc_terms import Projection
+from agents.laws.gains import AdaptiveDscGains, AdaptiveDscRobustGains
+from agents.localisation import anchored
+from agents.paths import circle_rate, cosine_numbers, line_tangent
+from bridge.drives.interface import torque_factors, wheel_rad_per_shaft_rev
+from configs import paths, sections
+from configs.brief import Schedule, WheelDisturbance, Wheels
+from configs.curves import SplinePath, VaryingOffset, formation_offset, reference_path
+from configs.graph import Graph
+from configs.leader_speed import speed_at
+from configs.parameters import Parameters, extended
+from configs.resolve import schedule, speed_changes, substeps
+from configs.scenario import Scenario
+from fleetloop.sweep.kernel import layout
+from plant.body import RigidBody
+
+_SOURCES: Final = {
+    "fused": layout.FUSED,
+    "external": layout.EXTERNAL,
+    "odometry": layout.ODOMETRY,
+}
+_UNDISTURBED: Final = WheelDisturbance(amplitude_wheel_N_m=0.0, rate_rad_s=0.0, phase_rad=0.0)
+Numbers = tuple[float, ...]
+Curves = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+
+class Case(NamedTuple):
+    """What `loop.simulate` is given of one case."""
+
+    schedule: Schedule
+    case: Any
+    robots: Any
+    states: Any
+    edges: Any
+    leader_m_s: NDArray[np.float64]
+    curves: Curves
+
+
+def lowered(scenario: Scenario) -> Case:
+    """A scenario of which `coverage.lacks` says nothing, as numbers."""
+    ticks, graph = schedule(scenario), _shared_graph(scenario)
+    curves = _Splines()
+    centre_kind, centre = _centre(scenario.path, curves)
+    robots, states, edges = [], [], []
+    numbers = {name: number for number, name in enumerate(scenario.names)}
+    for number, robot in enumerate(scenario.robot):
+        heard = graph.hears[robot.name]
+        first_edge = len(edges)
+        edges += [(numbers[edge.speaker], edge.weight) for edge in heard]
+        link = graph.links.get(robot.name)
+        body, choice = scenario.body_of(robot), scenario.control_of(robot)
+        h = 0.0 if link is None else link.weight
+        offset_kind, place, knots = _offset(scenario.path, robot.offset, curves)
+        disturbed, waves = _waves(robot.disturbance or scenario.disturbance, number + 1)
+        limits, limit = _host_limits(scenario.host, ticks.period_s)
+        law, of_law = _law(choice.parameters, _wheels(body), ticks.period_ns)
+        robots.append(
+            (
+                *(law, limits, link is not None, disturbed),
+                *(first_edge, len(edges), offset_kind, *knots),
+                *(*of_law, *limit, *place, h),
+                *(*_localiser(body), *_drives(scenario.mounting_of(robot)), *_body(body), *waves),
+            )
+        )
+        states.append(_start(robot, scenario.coordination, choice.parameters))
+    case = layout.records(layout.CASE, [_case(scenario, ticks, centre_kind, centre, curves)])
+    return Case(
+        ticks,
+        case[0],
+        layout.records(layout.ROBOT, robots),
+        layout.records(layout.STATE, states),
+        layout.records(layout.EDGE, edges),
+        _leader(scenario.leader, ticks.period_ns, ticks.ticks),
+        curves.arrays(),
+    )
+
+
+def _case(
+    scenario: Scenario, ticks: Schedule, kind: int, centre: Numbers, curves: "_Splines"
+) -> tuple[Any, ...]:
+    coordination, reach = scenario.coordination, scenario.reach
+    return (
+        *(ticks.ticks, ticks.period_ns, ticks.share_every, ticks.localise_every),
+        *(ticks.pose_delay_ticks, substeps(scenario.clock, ticks.period_ns)),
+        _SOURCES[scenario.localisation.source],
+        coordination.compensation == "extrapolate",
+        *(kind, curves.closed, curves.centre_knots),
+        *(ticks.period_s, 0.5 * ticks.period_s, coordination.p, coordination.q),
+        *(coordination.age_limit_s, coordination.silence_limit_s),
+        *(reach.s_min_m, reach.s_max_m, reach.v_min_m_s, reach.v_max_m_s),
+        *(reach.v_min_m_s - reach.v_margin_m_s, reach.v_max_m_s + reach.v_margin_m_s),
+        *centre,
+    )
+
+
+def _start(
+    robot: sections.Robot, coordination: sections.Coordination, gains: Any
+) -> tuple[float, ...]:
+    """The state of a robot at tick 0, after a countdown in which its drives were armed."""
+    pose = robot.pose
+    where = pose.x_m, pose.y_m, pose.theta_rad
+    return (
+        0,
+        *(*where, robot.v_m_s, robot.omega_rad_s, 0.0, 0.0),
+        *(0.0, 0.0, 0.0, 0.0),
+        *(0.0, 0.0, nan, nan, 0.0, 0.0, 0.0),
+        *anchored(*where, (0.0, 0.0, 0.0)),
+        *(coordination.v_hat_0, coordination.mu_0, robot.s_0, *((nan,) * 16)),
+        *(nan, nan, nan, *gains.theta_hat_0, gains.kappa_hat_0),
+        *(0.0, 0.0),
+    )
+
+
+# --- the graph and the leader ---------------------------------------------------------------------
+
+
+def _shared_graph(scenario: Scenario) -> Graph:
+    """The graph of a scenario, computed once for all that have it."""
+    made = scenario.__dict__.get("topology")
+    if made is None:
+        key = (
+            *(scenario.graph, scenario.names, scenario.clock.control_period_s),
+            *(scenario.duration_s, scenario.ends_at_s),
+        )
+        made = _GRAPHS.get(key)
+        if made is None:
+            if len(_GRAPHS) >= _MOST_GRAPHS:
+                _GRAPHS.clear()
+            made = _GRAPHS[key] = scenario.topology
+        scenario.__dict__["topology"] = made
+    return made  # type: ignore[no-any-return]
+
+
+_MOST_GRAPHS: Final = 4096
+_GRAPHS: Final[dict[tuple[Any, ...], Graph]] = {}
+
+
+@lru_cache(maxsize=64)
+def _leader(leader: sections.Leader, period_ns: int, ticks: int) -> NDArray[np.float64]:
+    """v_r at every tick."""
+    changes = speed_changes(leader)
+    if len(changes) == 1:
+        return np.full(ticks, changes[0].speed_m_s)
+    return np.array([speed_at(changes, tick * period_ns) for tick in range(ticks)])
+
+
+# --- the law --------------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=4096)
+def _law(gains: Parameters, wheels: Wheels, period_ns: int) -> tuple[int, Numbers]:
+    if not isinstance(gains, AdaptiveDscGains):
+        raise TypeError(f"{type(gains).__name__} are gains of another law")
+    robust = isinstance(gains, AdaptiveDscRobustGains)
+    period_s = period_ns * 1e-9
+    rates_1, rates_2 = adaptation_rates(gains, period_s)
+    numbers = [
+        *(number for part in law_constants(gains, wheels, period_s) for number in part),
+        *(*rates_1, *rates_2, *Projection.of(gains.sigma_max, gains.sigma_margin)),
+    ]
+    if isinstance(gains, AdaptiveDscRobustGains):
+        numbers += [gains.v_bar_limit_m_s, gains.torque_limit_wheel_N_m]
+    else:
+        numbers += [inf, inf]
+    return layout.ROBUST if robust else layout.PAPER, tuple(numbers)
+
+
+def _host_limits(host: Any, period_s: float) -> tuple[bool, Numbers]:
+    limit, slew = host.torque_limit_wheel_N_m, host.torque_slew_limit_wheel_N_m_s
+    limit = inf if limit is None else limit
+    slew = inf if slew is None else slew
+    return limit < inf or slew < inf, (limit, slew * period_s)
+
+
+# --- the robot ------------------------------------------------------------------------------------
+
+
+def _wheels(body: sections.Body) -> Wheels:
+    return Wheels(body.wheel_radius_m, body.half_track_m)
+
+
+def _localiser(body: sections.Body) -> Numbers:
+    half = 0.5 * body.wheel_radius_m
+    return half, half / body.half_track_m
+
+
+@lru_cache(maxsize=1024)
+def _drives(mounting: sections.Mounting) -> Numbers:
+    ratio = mounting.gear_ratio
+    right, left = mounting.right_sign, mounting.left_sign
+    to_shaft_right, to_wheel_right = torque_factors(right, ratio)
+    to_shaft_left, to_wheel_left = torque_factors(left, ratio)
+    return (
+        *(to_shaft_right, to_shaft_left, to_wheel_right, to_wheel_left),
+        *(wheel_rad_per_shaft_rev(right, ratio), wheel_rad_per_shaft_rev(left, ratio)),
+        *(right * ratio, left * ratio),
+    )
+
+
+@lru_cache(maxsize=4096)
+def _body(body: sections.Body) -> Numbers:
+    rigid = RigidBody(body, _UNDISTURBED)
+    return *rigid.constants, rigid.b, rigid.inv_right, rigid.inv_left, rigid.fastest_m_s
+
+
+@lru_cache(maxsize=4096)
+def _waves(disturbance: sections.Disturbance, number: int) -> tuple[bool, Numbers]:
+    made = extended(WheelDisturbance, disturbance, phase_rad=float(number))
+    rigid = RigidBody(sections.Body(), made)
+    return rigid.disturbed, rigid.disturbs
+
+
+# --- the path -------------------------------------------------------------------------------------
+
+
+class _Splines:
+    """Knots and coefficients of all splines of a case, behind each other; the centre's first."""
+
+    def __init__(self) -> None:
+        self._knots: list[float] = []
+        self._first: list[Sequence[float]] = []
+        self._second: list[Sequence[float]] = []
+        self._places: dict[VaryingOffset, tuple[int, int]] = {}
+        self.closed, self.centre_knots = False, 0
+
+    def centre(self, spline: SplinePath) -> None:
+        """Put down the centre's path, before any offset."""
+        self._add(spline.knots_m, spline.x_coefficients, spline.y_coefficients)
+        self.closed, self.centre_knots = spline.closed, len(spline.knots_m)
+
+    def place(self, spline: VaryingOffset) -> tuple[int, int]:
+        """Put down an offset; its first knot, and the one behind its last."""
+        if spline not in self._places:
+            start = len(self._knots)
+            self._add(spline.knots_m, spline.ahead_coefficients, spline.left_coefficients)
+            self._places[spline] = start, len(self._knots)
+        return self._places[spline]
+
+    def _add(
+        self, knots: Sequence[float], first: Sequence[Numbers], second: Sequence[Numbers]
+    ) -> None:
+        self._knots += knots
+        nothing = (0.0,) * 6  # behind the last knot
+        self._first += [*first, nothing]
+        self._second += [*second, nothing]
+
+    def arrays(self) -> Curves:
+        """For the loop."""
+        if not self._knots:
+            return _NO_CURVES
+        return np.array(self._knots), np.array(self._first), np.array(self._second)
+
+
+_NO_CURVES: Final[Curves] = (np.zeros(0), np.zeros((0, 6)), np.zeros((0, 6)))
+
+
+def _centre(shape: paths.PathShape, curves: _Splines) -> tuple[int, Numbers]:
+    """The kind of the centre's path, and the five numbers of its jets."""
+    path = reference_path(shape)
+    match path:
+        case paths.Cosine():
+            numbers = (*path.start_m, path.amplitude_m, path.wavenumber_rad_m, 0.0)
+            return layout.COSINE, numbers
+        case paths.Line():
+            return layout.LINE, (*path.start_m, *line_tangent(path), 0.0)
+        case paths.Circle():
+            rate = circle_rate(path)
+            start = path.start_angle_rad / rate
+            return layout.CIRCLE, (*path.centre_m, path.radius_m, rate, start)
+        case paths.FigureEight():
+            length = path.half_length_m
+            numbers = (*path.centre_m, length, path.half_width_m, 1.0 / length)
+            return layout.FIGURE_EIGHT, numbers
+        case SplinePath():
+            curves.centre(path)
+            return layout.SPLINE, (0.0,) * 5
+        case _:
+            raise TypeError(f"{path} is a shape that the kernel doesn't know")
+
+
+def _offset(
+    path: paths.PathShape, offset: paths.Offset, curves: _Splines
+) -> tuple[int, Numbers, tuple[int, int]]:
+    """The kind of an offset, the six numbers of its place, and the knots of one that varies."""
+    nothing = (0.0,) * 4
+    match offset:
+        case paths.World() if isinstance(path, paths.Cosine):
+            return layout.WORLD, cosine_numbers(path, offset), (0, 0)
+        case paths.World():
+            return layout.WORLD, (offset.x_m, offset.y_m, *nothing), (0, 0)
+        case paths.Structure():
+            return layout.STRUCTURE, (offset.ahead_m, offset.left_m, *nothing), (0, 0)
+        case paths.Varying():
+            return layout.VARYING, (0.0,) * 6, curves.place(_varying(offset))
+        case _:
+            raise TypeError(f"{offset} is an offset that the kernel doesn't know")
+
+
+@lru_cache(maxsize=64)
+def _varying(offset: paths.Varying) -> VaryingOffset:
+    made = formation_offset(offset)
+    if not isinstance(made, VaryingOffset):
+        raise TypeError(f"{offset} doesn't vary")
+    return made
