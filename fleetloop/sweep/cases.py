@@ -70,7 +70,7 @@ class Cases:
         graph = table.get(GRAPH)
         self._graph: dict[str, Any] = graph if isinstance(graph, dict) else {}
         self.factors = tuple(
-            Factor(one.column, _expanded(one.every_key, self.base), one.draw(self.base.names))
+            Factor(one.column, expanded(one.every_key, self.base), one.draw(self.base.names))
             for one in self.study.factor
         )
         self.quantities: Quantities
@@ -173,7 +173,7 @@ def _refuse(source: str, scenario: Scenario) -> None:
         raise ScenarioError(f"{source}: {problem}; a sweep has none: leave them out")
 
 
-def _expanded(keys: tuple[str, ...], base: Scenario) -> tuple[str, ...]:
+def expanded(keys: tuple[str, ...], base: Scenario) -> tuple[str, ...]:
     """The keys with each robot's name in the place of the star of `robot.*`."""
     found = []
     for key in keys:
