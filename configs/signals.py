@@ -7,6 +7,7 @@ its rows, so everything that reads one goes by name.
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 
@@ -152,6 +153,14 @@ def law_table(controller: Sequence[Signal]) -> tuple[Signal, ...]:
 
 def signals_fault(law: object) -> str | None:
     """Why a law's table can't be recorded, None if it can."""
+    try:
+        return _signals_fault(law)
+    except TypeError:  # a list, or what else has no hash
+        return _signals_fault.__wrapped__(law)
+
+
+@lru_cache(maxsize=64)
+def _signals_fault(law: object) -> str | None:
     if not isinstance(law, tuple):
         return "SIGNALS must be a tuple of Signal(name, unit, meaning)"
     seen: set[str] = set()

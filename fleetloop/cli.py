@@ -30,6 +30,7 @@ from fleetloop.results.app import diff, export, report
 from fleetloop.runs.app import ps, stop
 from fleetloop.steer.app import app as steer_app
 from fleetloop.suite.app import test
+from fleetloop.sweep.app import app as sweep_app
 
 app = typer.Typer(
     name="fleetloop",
@@ -46,6 +47,7 @@ app.add_typer(can_app, name="can")
 app.add_typer(certs_app, name="certs")
 app.add_typer(fault_app, name="fault")
 app.add_typer(steer_app, name="steer")
+app.add_typer(sweep_app, name="sweep")
 
 
 def init(

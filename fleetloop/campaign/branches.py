@@ -127,7 +127,8 @@ class Branches:
 def baseline_of(scenario: Scenario, tell: Tell, stop: Stop) -> Baseline | None:
     """Run a scenario as it is; None if it was told to stop."""
     try:
-        outcome = run_in_memory(scenario, stop, tell)
+        with settled_memory():
+            outcome = run_in_memory(scenario, stop, tell)
     except FleetloopError as error:
         latest = tuple(expect.from_s for expect in scenario.expect)
         return Baseline(scenario.seed, "aborted", str(error), latest)

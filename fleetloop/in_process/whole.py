@@ -31,6 +31,8 @@ def run_in_memory(
 ) -> Outcome:
     """Run a scenario from its first tick to its end, or until told to stop.
 
+    One run of many: garbage collection is the caller's (`settled_memory`).
+
     Raises:
         FleetloopError: what a law or a shape of the user's own did wrong.
     """
@@ -39,13 +41,16 @@ def run_in_memory(
         scenario = scenario.model_copy(update={"bus": bus})
     memory = MemoryRecord()
     agents = [agent_brief(scenario, name, network=_NETWORK, bus=()) for name in scenario.names]
+    plant = plant_brief(scenario, network=_NETWORK)
     run = InProcessRun(
-        plant_brief(scenario, network=_NETWORK),
+        plant,
         [replace(agent, logs_inputs=False) for agent in agents],
         leader_brief(scenario),
         memory,
         on_progress,
     )
-    run.run(stop)
+    run.begin()
+    run.go(plant.schedule.ticks + 1, stop)
+    run.finish()
     signals = {robot.name: signals_of(scenario, robot) for robot in scenario.robot}
     return Outcome(memory.record(signals, ""), run.stopped_robots, run.events)

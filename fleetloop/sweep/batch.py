@@ -9,6 +9,7 @@ the row of that case.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -24,6 +25,7 @@ from fleetloop.in_process.whole import run_in_memory
 from fleetloop.record.reader import Record
 from fleetloop.sweep.cases import Case, Cases
 from fleetloop.sweep.dataset import Row
+from fleetloop.sweep.watch import Watch
 
 KERNEL, REFERENCE = "kernel", "in process"
 NO_KERNEL = "the batch kernel isn't there"
@@ -74,20 +76,15 @@ def kernel_here() -> Kernel | None:
 
 
 def rows_of(
-    cases: Cases,
-    numbers: Sequence[int],
-    stop: Stop,
-    kernel: Kernel | None = None,
-    on_case: Callable[[int], None] = lambda _: None,
+    cases: Cases, numbers: Sequence[int], watch: Watch, kernel: Kernel | None = None
 ) -> list[Row]:
-    """The rows of these cases; less of them if told to stop.
+    """The rows of these cases, in this order.
 
     Args:
         cases: of the study.
         numbers: of the cases.
-        stop: ends it.
+        watch: bounds their wall time.
         kernel: the batch kernel, if it is to be used.
-        on_case: told of each case that the reference begins, or of the first that the kernel does.
     """
     rows: dict[int, Row] = {}
     valid: list[Valid] = []
@@ -104,16 +101,14 @@ def rows_of(
         why_not = {one.case.number: _lacks(kernel, one.scenario) for one in valid}
         able = [one for one in valid if not why_not[one.case.number]]
         if able:
-            on_case(able[0].case.number)
-            made, failure = _by_kernel(cases, able, kernel, stop)
+            made, failure = _by_kernel(cases, able, kernel, watch)
             rows |= made
             if failure:
                 why_not |= {one.case.number: failure for one in able}
     for one in valid:
-        if one.case.number not in rows and not stop.requested:
-            on_case(one.case.number)
-            rows |= _by_reference(cases, one, why_not[one.case.number], stop)
-    return [rows[number] for number in numbers if number in rows]
+        if one.case.number not in rows:
+            rows[one.case.number] = _by_reference(cases, one, why_not[one.case.number], watch)
+    return [rows[number] for number in numbers]
 
 
 def _lacks(kernel: Kernel, scenario: Scenario) -> str:
@@ -124,17 +119,18 @@ def _lacks(kernel: Kernel, scenario: Scenario) -> str:
 
 
 def _by_kernel(
-    cases: Cases, valid: Sequence[Valid], kernel: Kernel, stop: Stop
+    cases: Cases, valid: Sequence[Valid], kernel: Kernel, watch: Watch
 ) -> tuple[dict[int, Row], str]:
     """Rows, and why there are none: then the reference shows which case is at fault."""
     began_s = SYSTEM_CLOCK.monotonic_s()
     try:
         scenarios = [one.scenario for one in valid]
-        brought = kernel.run(scenarios, cases.quantities.signals, stop)
+        brought = kernel.run(scenarios, cases.quantities.signals, watch.begin(len(valid)))
     except Exception as error:
+        watch.end()
         return {}, f"the kernel failed: {_described(error)}"
-    if stop.requested:
-        return {}, ""
+    if watch.end():
+        return {}, f"the kernel {watch.reason}"
     share_s = (SYSTEM_CLOCK.monotonic_s() - began_s) / len(valid)
     rows = {
         one.case.number: _judged(cases, one, outcome, KERNEL, "", share_s)
@@ -143,20 +139,21 @@ def _by_kernel(
     return rows, ""
 
 
-def _by_reference(cases: Cases, one: Valid, why_not: str, stop: Stop) -> dict[int, Row]:
-    """The row of a case; none if told to stop."""
+def _by_reference(cases: Cases, one: Valid, why_not: str, watch: Watch) -> Row:
+    """The row of a case."""
     began_s = SYSTEM_CLOCK.monotonic_s()
-    number = one.case.number
+    told, outcome = "", None
     try:
-        outcome = run_in_memory(one.scenario, stop)
+        outcome = run_in_memory(one.scenario, watch.begin())
     except Exception as error:
         told = _one_line(error) if isinstance(error, FleetloopError) else _described(error)
-        wall_s = SYSTEM_CLOCK.monotonic_s() - began_s
-        return {number: _row(cases, one.case, "error", told, one.scenario, REFERENCE, wall_s)}
-    if stop.requested:
-        return {}
+    overdue = watch.end()
     wall_s = SYSTEM_CLOCK.monotonic_s() - began_s
-    return {number: _judged(cases, one, outcome, REFERENCE, why_not, wall_s)}
+    if outcome is None or overdue:
+        told = watch.reason if overdue else told
+        row = _row(cases, one.case, "error", told, one.scenario, REFERENCE, wall_s)
+        return replace(row, engine_reason=why_not)
+    return _judged(cases, one, outcome, REFERENCE, why_not, wall_s)
 
 
 def _judged(

@@ -167,8 +167,12 @@ class Dataset:
         os.close(self._lock)
 
 
-def read(folder: Path) -> "pa.Table":
+def read(folder: Path, columns: Sequence[str] | None = None) -> "pa.Table":
     """All rows of a study's folder, by case; its metadata is in the schema (`about`).
+
+    Args:
+        folder: of the study.
+        columns: `case` and others; all if not given.
 
     Raises:
         ScenarioError: there are none.
@@ -181,7 +185,7 @@ def read(folder: Path) -> "pa.Table":
     if not paths:
         raise ScenarioError(f"{folder}: no rows of a study there ({PARTS}/part-*.parquet)")
     try:
-        table = pa.concat_tables([pq.read_table(path) for path in paths])
+        table = pa.concat_tables([pq.read_table(path, columns=columns) for path in paths])
     except (OSError, pa.ArrowException) as error:
         raise InfrastructureError(f"{folder / PARTS}: {error}") from error
     cases = table.column("case").to_numpy()

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from bridge.process.lifecycle import Stop
 from fleetloop.sweep.batch import Kernel, rows_of
 from fleetloop.sweep.cases import Cases
 from fleetloop.sweep.dataset import Columns, Dataset
 from fleetloop.sweep.plan import Base, Plan
 from fleetloop.sweep.study import loads
+from fleetloop.sweep.watch import Watch
 
 SHORT = """
 schema = 1
@@ -57,7 +57,7 @@ def study_folder(
     dataset = Dataset(folder, cases.study.total)
     try:
         chosen = range(cases.study.total) if numbers is None else numbers
-        dataset.add(Columns(cases).batch(rows_of(cases, chosen, Stop(), kernel)))
+        dataset.add(Columns(cases).batch(rows_of(cases, chosen, Watch(300.0), kernel)))
     finally:
         dataset.close()
     return folder

@@ -9,12 +9,13 @@ from bridge.process.lifecycle import Stop
 from configs.scenario import Scenario
 from fleetloop.in_process.whole import run_in_memory
 from fleetloop.sweep.batch import KERNEL, NO_KERNEL, REFERENCE, Kernel, rows_of
+from fleetloop.sweep.watch import Watch
 
 GRID = SHORT + 'design = "grid"\n'
 
 
 def test_rows_come_in_the_order_asked_for_and_say_which_engine_and_why() -> None:
-    rows = rows_of(cases_of(GRID + P + FEW), [2, 0], Stop())
+    rows = rows_of(cases_of(GRID + P + FEW), [2, 0], Watch(300.0))
     assert [row.case for row in rows] == [2, 0]
     assert {(row.engine, row.engine_reason) for row in rows} == {(REFERENCE, NO_KERNEL)}
     assert [row.factors["p"] for row in rows] == [2.0, 0.5]
@@ -23,7 +24,7 @@ def test_rows_come_in_the_order_asked_for_and_say_which_engine_and_why() -> None
 
 def test_an_invalid_case_is_a_row_and_the_others_go_on() -> None:
     cases = cases_of(GRID + P.replace("1.0, 2.0]", "-1.0, 2.0]") + FEW)
-    rows = rows_of(cases, range(3), Stop())
+    rows = rows_of(cases, range(3), Watch(300.0))
     assert [row.verdict for row in rows] == ["held", "invalid", "held"]
     assert rows[1].reason.startswith("case 1: p = -1.0: must be")
     assert "coordination.p=-1.0" in rows[1].command
@@ -33,7 +34,7 @@ def test_a_law_that_fails_is_the_failure_of_its_case_alone(tmp_path, monkeypatch
     (tmp_path / "brittle.py").write_text(BRITTLE, "utf-8")
     monkeypatch.chdir(tmp_path)
     law = '[[factor]]\nkey = "control.law"\nvalues = ["adaptive_dsc", "brittle:Brittle"]\n'
-    rows = rows_of(cases_of(GRID + law + FEW), [0, 1], Stop())
+    rows = rows_of(cases_of(GRID + law + FEW), [0, 1], Watch(300.0))
     assert [row.verdict for row in rows] == ["held", "failed"]
     assert "no such step" in rows[1].reason
 
@@ -43,7 +44,7 @@ def test_a_run_that_breaks_down_is_an_error_of_its_case_alone() -> None:
         runs = reference(scenarios, signals, stop)
         return [run._replace(record=None) if n == 1 else run for n, run in enumerate(runs)]
 
-    rows = rows_of(cases_of(GRID + P), range(3), Stop(), Kernel(lambda _: "", brittle))
+    rows = rows_of(cases_of(GRID + P), range(3), Watch(300.0), Kernel(lambda _: "", brittle))
     assert [row.verdict for row in rows] == ["held", "error", "held"]
     assert rows[1].reason.startswith("its run can't be judged: AttributeError: ")
 
@@ -69,10 +70,10 @@ def test_the_engine_is_chosen_for_each_case() -> None:
         return "a p of 1" if scenario.coordination.p == 1.0 else ""
 
     cases = cases_of(GRID + P + FEW)
-    rows = rows_of(cases, range(3), Stop(), Kernel(lacks, reference))
+    rows = rows_of(cases, range(3), Watch(300.0), Kernel(lacks, reference))
     chosen = [(row.engine, row.engine_reason) for row in rows]
     assert chosen == [(KERNEL, ""), (REFERENCE, "a p of 1"), (KERNEL, "")]
-    plain = rows_of(cases, range(3), Stop())
+    plain = rows_of(cases, range(3), Watch(300.0))
     assert [row.values for row in rows] == [row.values for row in plain]
 
 
@@ -80,22 +81,26 @@ def test_a_kernel_that_fails_leaves_its_cases_to_the_reference() -> None:
     def broken(*_: object):
         raise FloatingPointError("overflow")
 
-    rows = rows_of(cases_of(GRID + P + FEW), range(3), Stop(), Kernel(lambda _: "", broken))
+    rows = rows_of(cases_of(GRID + P + FEW), range(3), Watch(300.0), Kernel(lambda _: "", broken))
     assert [row.verdict for row in rows] == ["held"] * 3
     assert {row.engine for row in rows} == {REFERENCE}
     assert all("the kernel failed: FloatingPointError: overflow" in it.engine_reason for it in rows)
 
 
-def test_told_to_stop_nothing_half_done_becomes_a_row() -> None:
-    stop = Stop()
-    cases = cases_of(GRID + P + FEW)
-    rows = rows_of(cases, range(3), stop, on_case=lambda n: stop.request("now") if n == 1 else None)
-    assert [row.case for row in rows] == [0]
+def test_a_case_that_takes_too_long_is_an_error_and_the_next_one_has_its_own_time() -> None:
+    text = GRID.replace("until_s=0.1", "clock.plant_step_s=0.002") + "limit_s = 0.2\n"
+    lengths = '[[factor]]\nname = "length"\nkey = "until_s"\nvalues = [1e4, 0.1]\n'
+    cases = cases_of(text + lengths + FEW)
+    with Watch(cases.study.limit_s) as watch:
+        rows = rows_of(cases, range(2), watch)
+    assert [row.verdict for row in rows] == ["error", "held"]
+    assert rows[0].reason == "took longer than limit_s = 0.2 s of wall time"
+    assert rows[0].wall_s < 5.0
 
 
 @pytest.mark.parametrize("number", [0, 5])
 def test_a_case_is_the_same_alone_and_among_others(number: int) -> None:
     cases = cases_of(SHORT + 'design = "sobol"\ncases = 6\n' + MASS)
-    (alone,) = rows_of(cases, [number], Stop())
-    among = rows_of(cases, range(6), Stop())[number]
+    (alone,) = rows_of(cases, [number], Watch(300.0))
+    among = rows_of(cases, range(6), Watch(300.0))[number]
     assert (alone.values, alone.command, alone.seed) == (among.values, among.command, among.seed)

@@ -14,10 +14,10 @@ import pyarrow.parquet
 import pytest
 from support.studies import FEW, MASS, SHORT, P, cases_of, study_folder
 
-from bridge.process.lifecycle import Stop
 from configs.errors import InfrastructureError, ScenarioError
 from fleetloop.sweep.batch import rows_of
 from fleetloop.sweep.dataset import Columns, Dataset, about, read
+from fleetloop.sweep.watch import Watch
 
 GRAPH = "\n[[factor]]\ngraph = {}\n"
 LAW = '\n[[factor]]\nkey = "control.law"\nvalues = ["adaptive_dsc", "adaptive_dsc_robust"]\n'
@@ -61,7 +61,7 @@ def test_pandas_and_arrow_open_its_folder_of_parts_as_one_table(folder) -> None:
 def test_a_case_has_one_row_whatever_comes_twice(tmp_path) -> None:
     cases = cases_of(SHORT + 'design = "grid"\n' + P + FEW)
     columns = Columns(cases)
-    rows = rows_of(cases, range(3), Stop())
+    rows = rows_of(cases, range(3), Watch(300.0))
     dataset = Dataset(tmp_path, 3)
     dataset.add(columns.batch(rows[:2]))
     dataset.add(columns.batch([replace(rows[1], reason="again"), rows[2]]))
@@ -105,7 +105,7 @@ def test_what_a_killed_command_left_half_written_is_no_part(tmp_path, capfd) -> 
 
 def test_an_infinite_margin_is_kept_and_an_unknown_one_is_null(tmp_path) -> None:
     cases = cases_of(SHORT + 'design = "grid"\n' + P + FEW)
-    rows = rows_of(cases, range(3), Stop())
+    rows = rows_of(cases, range(3), Watch(300.0))
     rows = [replace(rows[0], margin=-math.inf), replace(rows[1], margin=None)]
     column = Columns(cases).batch([*rows, replace(rows[1], margin=math.nan)]).column("margin")
     assert column.to_pylist() == [-math.inf, None, None]

@@ -1,0 +1,218 @@
+"""Where cases are computed: Dask workers, of this machine or of a cluster that the user has.
+
+    here        a scheduler in this process and a process per worker, all on loopback, with
+                certificates made for this command: nobody else on the machine can give them work
+    elsewhere   the scheduler of an address, as it is; what it has is not ended
+
+Dask's own messages go to a file in the study's folder, never to the terminal.
+"""
+
+import logging
+import os
+import warnings
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from configs.errors import InfrastructureError, ScenarioError
+from fleetloop.sweep.versions import mismatch, versions_here
+
+LOG = "dask.log"
+NEEDS = "fleetloop sweep needs Dask: pip install 'fleetloop[sweep]'"
+START_S, ANSWER_S, CLOSE_S = 60.0, 10.0, 5.0
+_SETTINGS: dict[str, Any] = {
+    "logging.distributed": "error",
+    # What a worker is killed for is said, and its cases are computed again; a worker that only
+    # pauses would stand still for ever.
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.memory.terminate": 0.95,
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+    "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": 1,
+    "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical",
+    "distributed.admin.tick.limit": "1h",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Tls:
+    """Files of a cluster's certificates; without any Dask's own settings hold."""
+
+    ca: Path | None = None
+    certificate: Path | None = None
+    key: Path | None = None
+
+    @property
+    def given(self) -> bool:
+        """Whether any is named."""
+        return any((self.ca, self.certificate, self.key))
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a study's cases are computed."""
+
+    workers: int
+    """Processes here."""
+    memory: str = "auto"
+    """Of each of them at most, as Dask takes it."""
+    scheduler: str | None = None
+    """Address of a scheduler elsewhere."""
+    tls: Tls = Tls()
+
+
+@contextmanager
+def client_of(place: Place, folder: Path) -> Iterator[Any]:
+    """A Dask client whose workers are there, with this program's versions.
+
+    Raises:
+        ScenarioError: Dask isn't there, or the address or a file is none.
+        InfrastructureError: the scheduler doesn't answer, or workers have other versions.
+    """
+    try:
+        import dask
+    except ImportError:
+        raise ScenarioError(NEEDS) from None
+    with ExitStack() as stack:
+        stack.enter_context(dask.config.set(_SETTINGS))
+        try:
+            import distributed
+        except ImportError:
+            raise ScenarioError(NEEDS) from None
+        stack.enter_context(_logged(folder / LOG))
+        stack.enter_context(warnings.catch_warnings())
+        warnings.simplefilter("ignore")  # of Dask; what matters is checked below
+        if place.scheduler is None:
+            client = _here(distributed, place, folder, stack)
+        else:
+            client = _elsewhere(distributed, place, place.scheduler, stack)
+        _check_versions(client)
+        yield client
+
+
+def _here(distributed: Any, place: Place, folder: Path, stack: ExitStack) -> Any:
+    security = distributed.Security.temporary()
+    scratch = folder / ".dask"
+    try:
+        cluster = distributed.LocalCluster(
+            n_workers=place.workers,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            protocol="tls://",
+            security=security,
+            silence_logs=False,
+            dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
+            memory_limit=place.memory,
+            local_directory=str(scratch),
+            death_timeout=START_S,
+        )
+    except ValueError as error:
+        raise ScenarioError(f"--memory {place.memory}: {error}") from error
+    except (OSError, RuntimeError) as error:
+        raise InfrastructureError(f"can't start workers: {error}") from error
+    stack.callback(_remove, scratch)
+    stack.callback(_close, cluster)
+    client = distributed.Client(cluster, timeout=ANSWER_S, set_as_default=False)
+    stack.callback(_close, client)
+    return client
+
+
+def _elsewhere(distributed: Any, place: Place, address: str, stack: ExitStack) -> Any:
+    security = None
+    if place.tls.given:
+        for path in (place.tls.ca, place.tls.certificate, place.tls.key):
+            if path is not None and not path.is_file():
+                raise ScenarioError(f"{path}: no such file")
+        security = distributed.Security(
+            tls_ca_file=_text(place.tls.ca),
+            tls_client_cert=_text(place.tls.certificate),
+            tls_client_key=_text(place.tls.key),
+            require_encryption=True,
+        )
+    try:
+        client = distributed.Client(
+            address, timeout=ANSWER_S, security=security, set_as_default=False
+        )
+    except (OSError, TimeoutError) as error:
+        why = "" if isinstance(error, TimeoutError) else f": {error}"
+        raise InfrastructureError(
+            f"--scheduler {address}: no scheduler answers there within {ANSWER_S:g} s{why}"
+        ) from error
+    except (ValueError, TypeError, RuntimeError) as error:
+        raise ScenarioError(f"--scheduler {address}: {error}") from error
+    stack.callback(_close, client)
+    return client
+
+
+def _check_versions(client: Any) -> None:
+    """Refuse workers of another program.
+
+    Raises:
+        InfrastructureError: it names the first that differs, and how.
+    """
+    ours = versions_here()
+    try:
+        theirs = client.run(versions_here, on_error="return")
+        scheduler = client.get_versions()["scheduler"]["packages"]
+    except (OSError, TimeoutError) as error:
+        raise InfrastructureError(f"the workers don't answer: {error}") from error
+    for worker, found in theirs.items():
+        if isinstance(found, BaseException):
+            raise InfrastructureError(
+                f"worker {worker} can't run this program: {type(found).__name__}: {found};"
+                " install the same Fleetloop there, with its extra sweep"
+            )
+        if differs := mismatch(ours, found):
+            raise InfrastructureError(
+                f"worker {worker} has other versions: {differs}; a dataset is of one program"
+            )
+    if (found := scheduler.get("distributed")) != ours["distributed"]:
+        raise InfrastructureError(
+            f"the scheduler has other versions: distributed {found}, here {ours['distributed']}"
+        )
+
+
+@contextmanager
+def _logged(path: Path) -> Iterator[None]:
+    """Dask's messages go to a file while this lasts."""
+    names = [
+        name for name in logging.root.manager.loggerDict if name.split(".")[0] == "distributed"
+    ]
+    loggers = [logging.getLogger(name) for name in {*names, "distributed"}]
+    before = [(one, one.handlers[:], one.propagate, one.level) for one in loggers]
+    handler = logging.FileHandler(path, delay=True)
+    handler.setFormatter(logging.Formatter("%(asctime)s %(name)s %(levelname)s %(message)s"))
+    for logger in loggers:
+        logger.handlers = []
+        logger.propagate = logger.name != "distributed"
+        logger.setLevel(logging.WARNING if logger.name == "distributed" else logging.NOTSET)
+    logging.getLogger("distributed").handlers = [handler]
+    try:
+        yield
+    finally:
+        for logger, handlers, propagate, level in before:
+            logger.handlers, logger.propagate = handlers, propagate
+            logger.setLevel(level)
+        handler.close()
+
+
+def _close(opened: Any) -> None:
+    with suppress(Exception):
+        opened.close(timeout=CLOSE_S)
+
+
+def _remove(folder: Path) -> None:
+    import shutil
+
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else os.fspath(path)

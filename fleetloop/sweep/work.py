@@ -1,0 +1,51 @@
+"""What a worker does: the rows of some cases of a plan."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from bridge.process.clock import SYSTEM_CLOCK
+from bridge.process.lifecycle import settled_memory
+from fleetloop.sweep.batch import kernel_here, rows_of
+from fleetloop.sweep.cases import cases_of
+from fleetloop.sweep.dataset import Columns
+from fleetloop.sweep.plan import Plan
+from fleetloop.sweep.versions import Versions, mismatch, versions_here
+from fleetloop.sweep.watch import Watch
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+class VersionMismatchError(Exception):
+    """A worker isn't the program that the study was begun with."""
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What came of some cases."""
+
+    rows: "pa.RecordBatch"
+    busy_s: float
+    """Wall time of all of it."""
+
+
+def work(plan: Plan, numbers: tuple[int, ...], asked: Versions, *, kernel: bool) -> Done:
+    """The rows of these cases.
+
+    Args:
+        plan: the study and its base.
+        numbers: of the cases.
+        asked: versions of the program that asks.
+        kernel: whether the batch kernel is to be used for what it can do.
+
+    Raises:
+        VersionMismatchError: this one is another.
+    """
+    if differs := mismatch(asked, versions_here()):
+        raise VersionMismatchError(differs)
+    began_s = SYSTEM_CLOCK.monotonic_s()
+    cases = cases_of(plan)
+    with settled_memory(), Watch(cases.study.limit_s) as watch:
+        rows = rows_of(cases, numbers, watch, kernel_here() if kernel else None)
+    batch = Columns(cases).batch(rows)
+    return Done(batch, SYSTEM_CLOCK.monotonic_s() - began_s)
