@@ -1,7 +1,7 @@
 """`fleetloop tune`: from a tuning's file to its best gains.
 
 tuning.toml, base.toml, base.json    the tuning as it was begun
-trials.db                            Optuna's storage
+trials.journal                       Optuna's storage
 trials/trial-*.parquet               the rows of each trial's cases, as a study has them
 check/trial-*.parquet                those of the other cases, of baseline and best
 best.toml, best_study.toml, tune.json, tune.html, figures/

@@ -12,10 +12,10 @@ worst case there is no number then, and the demand isn't met. With `missing` it 
 `failure_rate` is the share of cases that failed, are invalid, or ended with an error. A trial is
 feasible if it meets every constraint and its objective has a number. How far it misses them is
 
-    Σ max(0, value − at_most) / max(|at_most|, 1e-9)    of the constraints with a number (at_least alike)
-      + the share of cases without a value              of the others, and of the objective
+    Σ max(0, value − at_most) / |at_most|       of the constraints with a number; at_least alike
+      + the share of cases without a value      of the others, and of the objective
 
-with 1 for a bound that is 0: by that infeasible trials are ranked.
+with 1 for |at_most| of a bound that is 0: by that infeasible trials are ranked.
 """
 
 from collections.abc import Sequence
@@ -87,8 +87,7 @@ class Constraint(Parameters):
     def missed_by(self, value: float) -> float:
         """How far, relative to the bound; 0 if it is met."""
         over = self.sign * (value - self.bound)
-        scale = max(abs(self.bound), 1e-9) if self.bound else 1.0
-        return max(0.0, over / scale)
+        return max(0.0, over / (abs(self.bound) or 1.0))
 
 
 class Number(NamedTuple):

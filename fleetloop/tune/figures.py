@@ -10,7 +10,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from fleetloop.results.drawing import COLOURS, DPI, HEIGHT_IN, PAGE_IN, STYLE, WIDTH_IN
 from fleetloop.results.figures import Captioned
@@ -104,7 +104,7 @@ def _slices(tuning: Tuning, trials: Sequence[Trial], best: Trial) -> Figure:
         texts = any(isinstance(trial.values[name], str | bool) for trial in trials)
         places = [str(t.values[name]) if texts else t.values[name] for t in trials]
         if parameter.logarithmic:
-            axes.set_xscale("log")
+            _logarithmic(axes)
         _scatter(axes, trials, places)
         marked = [(best, "D", _BEST)]
         if tuning.baseline is not None:
@@ -144,6 +144,14 @@ def _cases(tuning: Tuning, cases: Mapping[str, Sequence[float | None]]) -> Figur
     quantity = tuning.objective.quantity
     axes.set(xlabel=f"{quantity}, {x_name}", ylabel=f"{quantity}, {y_name}")
     return figure
+
+
+def _logarithmic(axes: Axes) -> None:
+    """A logarithmic scale whose numbers are written out."""
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _scatter(axes: Axes, trials: Sequence[Trial], places: Sequence[object]) -> None:

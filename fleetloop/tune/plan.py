@@ -1,7 +1,7 @@
 """A tuning with its base scenario: all that decides its trials.
 
-    tuning.toml            the tuning, all defaults written out
-    base.toml, base.json   its base scenario, and where that came from
+tuning.toml            the tuning, all defaults written out
+base.toml, base.json   its base scenario, and where that came from
 """
 
 from collections.abc import Mapping
@@ -31,9 +31,7 @@ class TuningPlan:
     base: Base
 
     @classmethod
-    def of(
-        cls, source: str, *, trials: int | None = None, seed: int | None = None
-    ) -> "TuningPlan":
+    def of(cls, source: str, *, trials: int | None = None, seed: int | None = None) -> "TuningPlan":
         """Of a tuning's file or name.
 
         Raises:
@@ -89,8 +87,7 @@ class TuningPlan:
             raise tunings.in_our_keys(tuning, error) from None
         known = (FAILURE_RATE, MARGIN, *cases.quantities.names)
         found = []
-        given = [(f"constraint.{n}", one) for n, one in enumerate(tuning.constraint)]
-        for where, one in [("objective", tuning.objective), *given]:
+        for where, one in tunings.places(tuning).items():
             if one.quantity not in known:
                 remedy = f"the base has no such expectation; known: {', '.join(known)}"
                 found.append(Complaint(name, f"{where}.quantity", one.quantity, remedy))
@@ -102,9 +99,7 @@ class TuningPlan:
             raise refusal(found)
         return cases
 
-    def _of_ends(
-        self, name: str, cases: Cases, middle: Mapping[str, Value]
-    ) -> list[Complaint]:
+    def _of_ends(self, name: str, cases: Cases, middle: Mapping[str, Value]) -> list[Complaint]:
         """What the ends of the ranges are refused for, each beside the middle of the others."""
         found: list[Complaint] = []
         for n, parameter in enumerate(self.tuning.parameter):

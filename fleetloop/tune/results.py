@@ -1,8 +1,8 @@
 """What a tuning leaves: its numbers, the best gains as a fragment of a scenario and as a study.
 
-    tune.json        numbers, for programs
-    best.toml        the best gains: keys of a scenario, and the commands that use them
-    best_study.toml  the cases under the best gains, for `fleetloop sweep`
+tune.json        numbers, for programs
+best.toml        the best gains: keys of a scenario, and the commands that use them
+best_study.toml  the cases under the best gains, for `fleetloop sweep`
 """
 
 import shlex
@@ -83,9 +83,7 @@ def sentences(plan: TuningPlan, best: Trial, judged: Sequence[Judged]) -> list[s
             if by > 0.0
         )
         reason = f"; its first failure: {best.score.reason}" if best.score.reason else ""
-        return [
-            f"no feasible trial; trial {best.number} misses least: it misses {missed}{reason}"
-        ]
+        return [f"no feasible trial; trial {best.number} misses least: it misses {missed}{reason}"]
     first = judged[0]
     if first.name != BASELINE_NAME:
         return [f"trial {best.number} is the best: {objective.label} {shown(_value(best))}"]

@@ -1,21 +1,21 @@
-"""The trials of a tuning in Optuna's storage: an SQLite file in the tuning's folder.
+"""The trials of a tuning in Optuna's storage: a journal in the tuning's folder.
 
-    trials.db        Optuna's study `fleetloop`; its own tools open it
+    trials.journal   Optuna's study `fleetloop`, a line of JSON for each change; its tools open it
     user attributes  of each trial: what was tried, what it came to
 
 A trial is chosen by a sampler of its own: its seed follows from the tuning's seed and the number of
 trials that are done. So what is tried depends on those alone, and a tuning that goes on tries what
 it would have tried without the break. A trial that was broken off is marked as failed, which no
-sampler looks at, and is repeated.
+sampler looks at, and is repeated. A line that was broken off, as by a kill, is cut.
 """
 
 import fcntl
+import json
 import logging
 import os
-import sqlite3
 import warnings
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +26,7 @@ from fleetloop.sweep.draws import Value
 from fleetloop.tune.scores import Score, Trial
 from fleetloop.tune.tuning import Tuning
 
-FILE, LOCK, NAME = "trials.db", ".lock", "fleetloop"
+FILE, LOCK, NAME = "trials.journal", ".lock", "fleetloop"
 NEEDS = "fleetloop tune needs Optuna: pip install 'fleetloop[sweep]'"
 _VALUES, _SCORE = "values", "score"
 _LEAST_FOR_IMPORTANCES = 10
@@ -72,32 +72,26 @@ def storage_of(folder: Path, tuning: Tuning) -> Iterator["Storage"]:
         InfrastructureError: the file is damaged, or can't be read or written.
     """
     optuna = _optuna()
-    from sqlalchemy.exc import SQLAlchemyError
+    from optuna.storages.journal import JournalFileBackend
 
     path = folder / FILE
-    _check(path)
-    storage = None
+    _mend(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of Optuna, about Optuna
-            storage = optuna.storages.RDBStorage(f"sqlite:///{path}")
+            backend = JournalFileBackend(str(path), lock_obj=_Ours())
             study = optuna.create_study(
-                storage=storage,
+                storage=optuna.storages.JournalStorage(backend),
                 study_name=NAME,
                 direction=tuning.objective.direction.replace("ise", "ize"),
                 load_if_exists=True,
             )
             yield Storage(optuna, study, tuning)
-    except (SQLAlchemyError, optuna.exceptions.StorageInternalError) as error:
-        why = str(error.__cause__ or error).splitlines()[0]
+    except OSError as error:
         raise InfrastructureError(
-            f"{path}: {why}; trials that were written before are kept,"
-            f" go on with fleetloop tune --resume {folder}"
+            f"{error.filename or path}: {error.strerror or error}; trials that were written before"
+            f" are kept, go on with fleetloop tune --resume {folder}"
         ) from error
-    finally:
-        if storage is not None:
-            storage.remove_session()
-            storage.engine.dispose()
 
 
 class Storage:
@@ -108,14 +102,15 @@ class Storage:
         self._study = study
         self._tuning = tuning
         self._parameters = {one.column: one for one in tuning.parameter}
-        states = optuna.trial.TrialState
-        self._done_states, self._open_states = (states.COMPLETE,), (states.RUNNING, states.WAITING)
-        for left in study.get_trials(deepcopy=False, states=self._open_states):
-            study._storage.set_trial_state_values(left._trial_id, states.FAIL)
+        self._states = states = optuna.trial.TrialState
+        for _ in study.get_trials(deepcopy=False, states=(states.WAITING,)):
+            study.ask()
+        for left in study.get_trials(deepcopy=False, states=(states.RUNNING,)):
+            study.tell(left.number, state=states.FAIL)
 
     def done(self) -> list[Trial]:
         """All trials that are done, in their order."""
-        found = self._study.get_trials(deepcopy=False, states=self._done_states)
+        found = self._study.get_trials(deepcopy=False, states=(self._states.COMPLETE,))
         return [
             Trial(n, one.user_attrs[_VALUES], Score(**one.user_attrs[_SCORE]))
             for n, one in enumerate(found)
@@ -149,7 +144,7 @@ class Storage:
 
     def drop(self, asked: Asked) -> None:
         """A trial was broken off."""
-        self._study.tell(asked.trial, state=self._optuna.trial.TrialState.FAIL)
+        self._study.tell(asked.trial, state=self._states.FAIL)
 
     def importances(self) -> dict[str, float]:
         """How much each parameter decides, of all together 1; none of few trials.
@@ -175,26 +170,40 @@ class Storage:
         )
 
 
-def _check(path: Path) -> None:
-    """Refuse a file that is damaged.
+class _Ours:
+    """The journal's lock: `alone` has it for us."""
+
+    def acquire(self) -> bool:
+        """Ours."""
+        return True
+
+    def release(self) -> None:
+        """Ours still."""
+
+
+def _mend(path: Path) -> None:
+    """Cut a last line that isn't whole; refuse a file that is damaged otherwise.
 
     Raises:
-        InfrastructureError: it is.
+        InfrastructureError: it is, or it can't be read or written.
     """
-    if not path.exists():
-        return
     try:
-        with closing(sqlite3.connect(path)) as connection:
-            (found,) = connection.execute("PRAGMA quick_check(1)").fetchone()
-            tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
-    except sqlite3.DatabaseError as error:
-        found, tables = str(error), 1
-    if found != "ok" or not tables:
-        why = found if found != "ok" else "it is empty"
-        raise InfrastructureError(
-            f"{path}: damaged: {why}; its trials can't be read: begin the tuning again, or bring"
-            " back a copy of this file"
-        )
+        data = path.read_bytes() if path.exists() else b""
+        whole = data[: data.rfind(b"\n") + 1]
+        if len(whole) < len(data):
+            os.truncate(path, len(whole))
+    except OSError as error:
+        raise InfrastructureError(f"{path}: {error.strerror or error}") from error
+    for number, line in enumerate(whole.splitlines(), 1):
+        try:
+            sound = "op_code" in json.loads(line)
+        except (ValueError, TypeError):
+            sound = False
+        if not sound:
+            raise InfrastructureError(
+                f"{path}: damaged at line {number}; its trials can't be read: bring back a copy of"
+                " this file, or begin the tuning again"
+            )
 
 
 def _optuna() -> Any:

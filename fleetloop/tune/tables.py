@@ -70,9 +70,7 @@ def _scores(tuning: Tuning, scores: Sequence[Score], prefix: str) -> Iterator[li
 def print_table(tuning: Tuning, judged: Sequence[Judged]) -> None:
     """Print baseline and best."""
     console = ResultConsole(file=sys.stdout, highlight=False)
-    table = Table(
-        title=tuning.title, box=table_box(), padding=(0, 1, 0, 0), pad_edge=False
-    )
+    table = Table(title=tuning.title, box=table_box(), padding=(0, 1, 0, 0), pad_edge=False)
     first, *others = header(judged)
     table.add_column(first, no_wrap=True)
     for text in others:

@@ -95,7 +95,7 @@ class Tuning(Study):
             ScenarioError: what is wrong with it as a study, in the keys of a tuning file.
         """
         data = self.model_dump(mode="json", by_alias=True, exclude_none=True, exclude=_OWN)
-        needed = {one.quantity for one in (self.objective, *self.demands)}
+        needed = {self.objective.quantity, *(one.quantity for one in self.demands)}
         named = {one.name for one in self.keep.quantity}
         kept = dict.fromkeys(self.keep.quantities)
         kept |= dict.fromkeys(n for n in sorted(needed - named) if parts_of(n) is not None)
@@ -182,7 +182,7 @@ def _our_key(tuning: Tuning, key: str) -> str:
         return f"parameter.{names.index(number)}.{last}"
     quantity = key.removeprefix("keep: ")
     if quantity != key and quantity not in tuning.keep.quantities:
-        for where, one in _places(tuning).items():
+        for where, one in places(tuning).items():
             if one.quantity == quantity:
                 return f"{where}.quantity"
     return key
@@ -195,15 +195,16 @@ def _folder() -> Any:
 # --- check ----------------------------------------------------------------------------------------
 
 
-def _places(tuning: Tuning) -> dict[str, Objective | Constraint]:
-    given = {f"constraint.{n}": one for n, one in enumerate(tuning.constraint)}
-    return {"objective": tuning.objective, **given}
+def places(tuning: Tuning) -> dict[str, Objective | Constraint]:
+    """What is asked, by its place in the file."""
+    found: dict[str, Objective | Constraint] = {"objective": tuning.objective}
+    return found | {f"constraint.{n}": one for n, one in enumerate(tuning.constraint)}
 
 
 def _demands(name: str, tuning: Tuning) -> list[Complaint]:
     found = []
     named = [one.name for one in tuning.keep.quantity]
-    for where, one in _places(tuning).items():
+    for where, one in places(tuning).items():
         text = one.quantity
         known = text in (FAILURE_RATE, MARGIN, *named) or _MARGIN_OF.fullmatch(text)
         if not known and parts_of(text) is None:
@@ -214,9 +215,7 @@ def _demands(name: str, tuning: Tuning) -> list[Complaint]:
     for n, constraint in enumerate(tuning.constraint):
         if constraint.label in seen:
             remedy = "another constraint says the same of it; one is enough"
-            found.append(
-                Complaint(name, f"constraint.{n}.quantity", constraint.quantity, remedy)
-            )
+            found.append(Complaint(name, f"constraint.{n}.quantity", constraint.quantity, remedy))
         seen.add(constraint.label)
     return found
 
