@@ -151,8 +151,10 @@ class Search:
     def judged(self) -> list[Judged]:
         """Baseline, if there is one, and best."""
         best = self.best
+        if best is None:
+            return []
         found = [Judged(BASELINE_NAME, self.trials[0])] if self.tuning.baseline else []
-        return [] if best is None else [*found, Judged(BEST_NAME, best)]
+        return [*found, Judged(BEST_NAME, best)]
 
     def checked(self, evaluation: Evaluation, stop: Stop) -> list[Judged]:
         """The same, judged on the other cases."""
@@ -210,6 +212,7 @@ def _finish(
 ) -> None:
     folder, plan, best = search.folder, search.plan, search.best
     if best is None:
+        note(f"no trial is done ({search.ended}): go on with fleetloop tune --resume {folder}")
         return
     importances = search.storage.importances()
     said = results.sentences(plan, best, judged)

@@ -79,7 +79,8 @@ def storage_of(folder: Path, tuning: Tuning) -> Iterator["Storage"]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of Optuna, about Optuna
-            backend = JournalFileBackend(str(path), lock_obj=_Ours())
+            lock: Any = _Ours()
+            backend = JournalFileBackend(str(path), lock_obj=lock)
             study = optuna.create_study(
                 storage=optuna.storages.JournalStorage(backend),
                 study_name=NAME,
