@@ -31,6 +31,7 @@ from fleetloop.runs.app import ps, stop
 from fleetloop.steer.app import app as steer_app
 from fleetloop.suite.app import test
 from fleetloop.sweep.app import app as sweep_app
+from fleetloop.tune.app import tune
 
 app = typer.Typer(
     name="fleetloop",
@@ -72,6 +73,7 @@ for verb in (
     stop,
     compare,
     campaign,
+    tune,
     graph,
     network,
     live,

@@ -8,6 +8,7 @@ import pickle
 import re
 import shlex
 import tomllib
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -70,7 +71,7 @@ class Cases:
         graph = table.get(GRAPH)
         self._graph: dict[str, Any] = graph if isinstance(graph, dict) else {}
         self.factors = tuple(
-            Factor(one.column, _expanded(one.every_key, self.base), one.draw(self.base.names))
+            Factor(one.column, expanded(one.every_key, self.base.names), one.draw(self.base.names))
             for one in self.study.factor
         )
         self.quantities: Quantities
@@ -173,13 +174,13 @@ def _refuse(source: str, scenario: Scenario) -> None:
         raise ScenarioError(f"{source}: {problem}; a sweep has none: leave them out")
 
 
-def _expanded(keys: tuple[str, ...], base: Scenario) -> tuple[str, ...]:
+def expanded(keys: Sequence[str], robots: Sequence[str]) -> tuple[str, ...]:
     """The keys with each robot's name in the place of the star of `robot.*`."""
     found = []
     for key in keys:
         parts = key.split(".")
         if parts[:1] == ["robot"] and parts[1:2] == [EVERY]:
-            found += [".".join(["robot", robot, *parts[2:]]) for robot in base.names]
+            found += [".".join(["robot", robot, *parts[2:]]) for robot in robots]
         else:
             found.append(key)
     return tuple(found)

@@ -47,6 +47,31 @@ class Base:
         name, text = read(source)
         return cls(source, name, text, folder_of(source))
 
+    @classmethod
+    def resume(cls, folder: Path) -> "Base":
+        """The base of what was begun in a folder.
+
+        Raises:
+            ScenarioError: nothing was.
+            InfrastructureError: its files can't be read.
+        """
+        text, origin = saved(folder / BASE), saved(folder / ORIGIN)
+        try:
+            found = json.loads(origin)
+            return cls(found["source"], found["name"], text, found["folder"])
+        except (ValueError, KeyError, TypeError) as error:
+            raise ScenarioError(f"{folder / ORIGIN}: not a study's: {error!r}") from error
+
+    def save(self, folder: Path) -> None:
+        """Write its files.
+
+        Raises:
+            InfrastructureError: one can't be written.
+        """
+        origin = {"source": self.source, "name": self.name, "folder": self.folder}
+        run_folder.write(folder / BASE, self.text)
+        run_folder.write(folder / ORIGIN, json.dumps(origin, indent=2) + "\n")
+
 
 @dataclass(frozen=True, slots=True)
 class Plan:
@@ -74,18 +99,7 @@ class Plan:
             ScenarioError: none was.
             InfrastructureError: its files can't be read.
         """
-        try:
-            texts = [(folder / name).read_text("utf-8") for name in (STUDY, BASE, ORIGIN)]
-            origin = json.loads(texts[2])
-            base = Base(origin["source"], origin["name"], texts[1], origin["folder"])
-        except FileNotFoundError as error:
-            missing = Path(error.filename).name
-            raise ScenarioError(f"{folder}: no study was begun there: no {missing}") from None
-        except OSError as error:
-            raise InfrastructureError(f"{folder}: {error.strerror or error}") from error
-        except (ValueError, KeyError, TypeError) as error:
-            raise ScenarioError(f"{folder / ORIGIN}: not a study's: {error!r}") from error
-        plan = cls(texts[0], base)
+        plan = cls(saved(folder / STUDY), Base.resume(folder))
         _study(plan.text, str(folder / STUDY))
         return plan
 
@@ -95,16 +109,28 @@ class Plan:
         Raises:
             InfrastructureError: one can't be written.
         """
-        base = self.base
-        origin = {"source": base.source, "name": base.name, "folder": base.folder}
-        run_folder.write(folder / BASE, base.text)
-        run_folder.write(folder / ORIGIN, json.dumps(origin, indent=2) + "\n")
+        self.base.save(folder)
         run_folder.write(folder / STUDY, self.text)
 
     @property
     def study(self) -> Study:
         """The study."""
         return _study(self.text, STUDY)
+
+
+def saved(path: Path) -> str:
+    """A file of what was begun in a folder.
+
+    Raises:
+        ScenarioError: nothing was.
+        InfrastructureError: it can't be read.
+    """
+    try:
+        return path.read_text("utf-8")
+    except FileNotFoundError:
+        raise ScenarioError(f"{path.parent}: no study was begun there: no {path.name}") from None
+    except (OSError, UnicodeError) as error:
+        raise InfrastructureError(f"{path}: {error}") from error
 
 
 @lru_cache(maxsize=8)

@@ -26,7 +26,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import tomli_w
 from annotated_types import Ge, Gt, Le, Len, Lt
@@ -133,6 +133,9 @@ class Study(BaseModel):
         return min(product, self.cases or product)
 
 
+_S = TypeVar("_S", bound=Study)
+
+
 def json_schema() -> dict[str, Any]:
     """The JSON Schema of study files, for editors."""
     schema = Study.model_json_schema(by_alias=True)
@@ -176,6 +179,23 @@ def loads(name: str, text: str, changes: dict[str, int | None] | None = None) ->
     Raises:
         ScenarioError: all that is wrong with it, a line each.
     """
+    return loads_as(Study, name, text, changes)
+
+
+def loads_as(
+    kind: type[_S], name: str, text: str, changes: dict[str, int | None] | None = None
+) -> _S:
+    """Load a file that is a study, and more.
+
+    Args:
+        kind: of what it is.
+        name: stands for the file in messages.
+        text: of the file.
+        changes: keys, and what is in their place if it is given: options of the same names.
+
+    Raises:
+        ScenarioError: all that is wrong with it, a line each.
+    """
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -184,10 +204,10 @@ def loads(name: str, text: str, changes: dict[str, int | None] | None = None) ->
     given = {key: value for key, value in (changes or {}).items() if value is not None}
     found: list[Complaint] = []
     try:
-        study = Study.model_validate(as_tuples(data | given))
+        study = kind.model_validate(as_tuples(data | given))
         found = [_blamed(name, problem, given) for problem in _problems(study)]
     except ValidationError as error:
-        found = [_blamed(name, it, given) for it in complaints(error, data | given, Study)]
+        found = [_blamed(name, it, given) for it in complaints(error, data | given, kind)]
     if found:
         raise refusal(found)
     return study

@@ -1,0 +1,1 @@
+"""`fleetloop tune`: gains that suit many cases, searched for by Optuna."""
