@@ -4,7 +4,7 @@
     fleetloop/<run>/robot/<name>/silence     from the plant: no path state of it at a tick
     fleetloop/<run>/robot/<name>/pose        from the localisation system to the robot
     fleetloop/<run>/robot/<name>/truth       the plant's rows, to viewers, and a recorder elsewhere
-    fleetloop/<run>/robot/<name>/telemetry   the controller's rows, to viewers, and a recorder elsewhere
+    fleetloop/<run>/robot/<name>/telemetry   the controller's rows, likewise
     fleetloop/<run>/robot/<name>/inputs      the controller's input log, to a recorder elsewhere
     fleetloop/<run>/can/<bus>/traffic        what crosses a bus, to a recorder elsewhere
     fleetloop/<run>/leader/speed             v_r; heard by the robots with h_i = 1
