@@ -3,10 +3,10 @@
     fleetloop/<run>/robot/<name>/path        s, v̂_r, t; heard by exactly the out-neighbours
     fleetloop/<run>/robot/<name>/silence     from the plant: no path state of it at a tick
     fleetloop/<run>/robot/<name>/pose        from the localisation system to the robot
-    fleetloop/<run>/robot/<name>/truth       the plant's rows, to viewers (1)
-    fleetloop/<run>/robot/<name>/telemetry   the controller's rows, to viewers (1)
-    fleetloop/<run>/robot/<name>/inputs      the controller's input log (1)
-    fleetloop/<run>/can/<bus>/traffic        what crosses a bus (1)
+    fleetloop/<run>/robot/<name>/truth       the plant's rows, to viewers, and a recorder elsewhere
+    fleetloop/<run>/robot/<name>/telemetry   the controller's rows, likewise
+    fleetloop/<run>/robot/<name>/inputs      the controller's input log, to a recorder elsewhere
+    fleetloop/<run>/can/<bus>/traffic        what crosses a bus, to a recorder elsewhere
     fleetloop/<run>/leader/speed             v_r; heard by the robots with h_i = 1
     fleetloop/<run>/@live/<process>          liveliness token: "ready"
     fleetloop/<run>/@clock/go                from the launcher to plant and controllers
@@ -21,8 +21,7 @@
                                              <run>/<bus> if it names the run as well
     fleetloop/@guest/<user>/@relay           liveliness token: the relay serves this user
 
-(1) of a process on another machine to the recorder, too: those on its own have sockets to it
-(`bridge.network.row_socket`).
+A recorder on the same machine has a socket of each process (`bridge.network.row_socket`).
 
 A process is `launcher`, `plant`, `recorder` or `agent/<robot>`. Chunks that begin with @ are
 verbatim: no wildcard of data subscriptions matches them.
