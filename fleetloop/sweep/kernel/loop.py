@@ -103,7 +103,8 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
         curves: knots of all splines; and their coefficients, twice: x and y, or ahead and left.
         rows: records of `layout.TRUTH` and of `layout.TOLD`, one each, to write in.
         kept: numbers of the columns of these that are kept.
-        room: for these columns of the plant and of the controllers: robot, tick, column.
+        room: for these columns of the plant and of the controllers: robot, tick, column; the first
+            two columns, tick and time, are there.
 
     Returns:
         why it left the course, `NOTHING` if it didn't; the tick; the robot's number.
@@ -139,7 +140,7 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
             if len(kept_truth):
                 _tell_truth(truth, t_s, robot, state)
                 for column in range(len(kept_truth)):
-                    plant_room[i, tick, column] = truth_row[kept_truth[column]]
+                    plant_room[i, tick, column + 2] = truth_row[kept_truth[column]]
             _measure(robot, state)
             if localises:
                 if not within_world(state.x, state.y, state.theta):
@@ -218,7 +219,7 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
             if state.stopped != GOING and case.rearms:
                 return REARMING, tick, i
             for column in range(len(kept_told)):
-                controller_room[i, tick, column] = told_row[kept_told[column]]
+                controller_room[i, tick, column + 2] = told_row[kept_told[column]]
             if not _is_reached(case, t_s + case.period_s, state.s, state.v_hat):
                 return PATH_VARIABLE, tick, i
             _advance(case.substeps, step_s, robot, state, t_s, tick)
