@@ -30,7 +30,7 @@ a wheel drives, else 1: E' ≤ F v + T ω + Σ n_i ν_i, so slip creates no ener
 x, y [m]   θ [rad]   v [m/s]   ω [rad/s]   ν wheel speeds [rad/s]   τ, Δ [N·m] at the wheels
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from math import cos, sin
 from typing import Any, NamedTuple
 
@@ -40,7 +40,7 @@ from plant.divergence import FASTEST_WHEEL_RAD_S
 
 NO_SLIP = (1.0, 1.0)
 NO_PUSH = (0.0, 0.0)
-Rates = Callable[[Sequence[float], float, float, float, float], tuple[float, float]]
+Rates = Callable[[tuple[float, ...], float, float, float, float], tuple[float, float]]
 """Constants of the equations, v, ω, net torques right, left [N·m] ↦ v', ω'."""
 
 
@@ -205,7 +205,7 @@ def disturbance_torques(t_s: float, waves: Waves) -> tuple[float, float]:
 
 
 def body_rates(
-    constants: Sequence[float], v: float, omega: float, right: float, left: float
+    constants: tuple[float, ...], v: float, omega: float, right: float, left: float
 ) -> tuple[float, float]:
     """(v', ω') of (4) under net wheel torques."""
     centrifugal, coriolis, d11, d12, d21, d22, g1, g2 = constants
@@ -216,7 +216,7 @@ def body_rates(
 
 
 def general_rates(
-    constants: Sequence[float], v: float, omega: float, right: float, left: float
+    constants: tuple[float, ...], v: float, omega: float, right: float, left: float
 ) -> tuple[float, float]:
     """(v', ω') of (4') under net wheel torques."""
     along, across, turning, determinant, load, b, inv_r, inv_right, inv_left = constants[:9]

@@ -5,7 +5,6 @@ that are linear in (v, ω), so they come from the same stages. The step is a fun
 batch kernel of sweeps compiles it as it stands.
 """
 
-from collections.abc import Sequence
 from math import cos, sin
 from typing import Final
 
@@ -57,7 +56,7 @@ def net_torques(
 
 def runge_kutta(
     rates: Rates,
-    constants: Sequence[float],
+    constants: tuple[float, ...],
     motion: Motion,
     net: Torques,
     step_s: float,
