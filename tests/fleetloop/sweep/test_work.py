@@ -43,8 +43,16 @@ def test_the_first_cases_of_a_process_that_compiles_are_alone(
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.setattr(working, "_compiled", False)
     path = tmp_path / f"fleetloop-kernel-{os.getuid()}.lock"
-    with working._first_alone(compiles=True), path.open("r+") as other:
-        with pytest.raises(BlockingIOError):
-            fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    with working._first_alone(compiles=True), path.open("r+") as other:
-        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+    def is_free() -> bool:
+        with path.open("r+") as other:
+            try:
+                fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return False
+            return True
+
+    with working._first_alone(compiles=True):
+        assert not is_free()
+    with working._first_alone(compiles=True):
+        assert is_free()
