@@ -271,7 +271,8 @@ def _numbers(work: _Work, interrupted: bool) -> dict[str, Any]:
         "counts": dict(counts),
         "engines": dict(engines),
         "failure_rate": shown.value,
-        "failure_rate_interval": list(shown.interval),
+        # The points of a grid are no sample: their rate has no interval.
+        "failure_rate_interval": None if study.design == "grid" else list(shown.interval),
         "confidence": study.stop.confidence,
         "judged": shown.judged,
         "computed": pace.cases,
@@ -289,12 +290,12 @@ def _say(work: _Work, numbers: dict[str, Any]) -> None:
     if work.ended:
         say(f"ended    {work.ended}")
     if numbers["judged"]:
-        least, most = numbers["failure_rate_interval"]
-        say(
-            f"failed   {100 * numbers['failure_rate']:.2f} % of {numbers['judged']} that held or"
-            f" failed; {100 * numbers['confidence']:g} % interval {100 * least:.2f} to"
-            f" {100 * most:.2f} %"
-        )
+        told = f"{100 * numbers['failure_rate']:.2f} % of {numbers['judged']} that held or failed"
+        if numbers["failure_rate_interval"] is not None:
+            least, most = numbers["failure_rate_interval"]
+            told += f"; {100 * numbers['confidence']:g} % interval"
+            told += f" {100 * least:.2f} to {100 * most:.2f} %"
+        say(f"failed   {told}")
     if engines := ", ".join(f"{n} {engine}" for engine, n in numbers["engines"].items()):
         say(f"engine   {engines}")
     if work.pace.cases:
