@@ -31,7 +31,7 @@ from fleetloop.sweep.extra import PACKAGES, require
 from fleetloop.sweep.plan import STUDY, Plan
 from fleetloop.sweep.progress import Meter
 from fleetloop.sweep.stopping import Tally, decided
-from fleetloop.sweep.worst import FOLDER, keep_worst, worst_of
+from fleetloop.sweep.worst import FOLDER, keep_worst, missing_of, worst_of
 from fleetloop.terminal import note, say, say_json
 
 NUMBERS = "sweep.json"
@@ -198,18 +198,24 @@ def _go(folder: Path, cases: Cases, ways: Ways) -> int:
                 raise ScenarioError(
                     f'{work.invalid}; invalid = "stop": go on without it with invalid = "go on"'
                 )
-            troubles: list[str] = []
+            finished = work.ended != "" or bool(dataset.done.all())
             if not stop.requested and dataset.done.any():
-                numbers = worst_of(folder, cases.study.keep.worst)
-                troubles = keep_worst(cases.plan, folder, numbers, stop, lambda: None)
-            for line in troubles:
-                note(line)
-            interrupted = stop.requested and not (dataset.done.all() or work.ended)
+                _keep_worst(work, stop)
+            interrupted = stop.requested and not (finished and not cases.study.keep.worst)
             if interrupted:
                 note(f"{stop.reason}: go on with fleetloop sweep --resume {folder}")
     finally:
         dataset.close()
     return _finish(work, interrupted)
+
+
+def _keep_worst(work: _Work, stop: Stop) -> None:
+    numbers = worst_of(work.folder, work.cases.study.keep.worst)
+    missing = missing_of(work.folder, numbers)
+    if missing and not work.ways.as_json:
+        note(f"{work.cases.study.title}: whole runs of the worst cases: {len(missing)}")
+    for line in keep_worst(work.cases.plan, work.folder, missing, stop):
+        note(line)
 
 
 def _tally_of(folder: Path, total: int, dataset: Dataset) -> Tally:
@@ -265,7 +271,8 @@ def _numbers(work: _Work, interrupted: bool) -> dict[str, Any]:
         "counts": dict(counts),
         "engines": dict(engines),
         "failure_rate": shown.value,
-        "failure_rate_interval": list(shown.interval),
+        # The points of a grid are no sample: their rate has no interval.
+        "failure_rate_interval": None if study.design == "grid" else list(shown.interval),
         "confidence": study.stop.confidence,
         "judged": shown.judged,
         "computed": pace.cases,
@@ -283,12 +290,12 @@ def _say(work: _Work, numbers: dict[str, Any]) -> None:
     if work.ended:
         say(f"ended    {work.ended}")
     if numbers["judged"]:
-        least, most = numbers["failure_rate_interval"]
-        say(
-            f"failed   {100 * numbers['failure_rate']:.2f} % of {numbers['judged']} that held or"
-            f" failed; {100 * numbers['confidence']:g} % interval {100 * least:.2f} to"
-            f" {100 * most:.2f} %"
-        )
+        told = f"{100 * numbers['failure_rate']:.2f} % of {numbers['judged']} that held or failed"
+        if numbers["failure_rate_interval"] is not None:
+            least, most = numbers["failure_rate_interval"]
+            told += f"; {100 * numbers['confidence']:g} % interval"
+            told += f" {100 * least:.2f} to {100 * most:.2f} %"
+        say(f"failed   {told}")
     if engines := ", ".join(f"{n} {engine}" for engine, n in numbers["engines"].items()):
         say(f"engine   {engines}")
     if work.pace.cases:
