@@ -2,14 +2,15 @@
 
 The cases are sorted into bins of a factor: its levels, or equal shares of its samples. A bin has
 the mean of the result and a confidence interval: Student's of a mean, Wilson's of a failure rate.
-The effect is the share of the result's variance that the bins explain, the correlation ratio η²;
-that of N cases and B bins is raised by chance, so it is corrected (Kelley 1935):
+The effect is the share of the variance of the result's ranks that the bins explain, as Kruskal and
+Wallis test it; that of N cases and B bins is raised by chance, so it is corrected (Kelley 1935):
 
     ε² = (SS_between − (B − 1) MS_within) / SS_total,   MS_within = SS_within / (N − B)        (1)
 
-It needs no straight line and no monotony, as a correlation would; of independent factors it
-estimates the first-order Sobol' index. 0: the factor alone changes no mean; what it does together
-with another factor only isn't in it.
+It needs no straight line and no monotony, as a correlation would, and a run that diverged counts as
+the last, however far it got. Of a failure rate ranks change nothing; of independent factors it then
+estimates the first-order Sobol' index. 0: the factor by itself changes nothing; what it does only
+together with another one isn't in it.
 """
 
 from collections.abc import Sequence
@@ -22,14 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from configs.errors import ScenarioError
-from fleetloop.sweep.design import NEEDS
 from fleetloop.sweep.report.columns import Column, Series
 from fleetloop.sweep.report.results import FAILURE_RATE, Results
 from fleetloop.sweep.stopping import Rate
 
+_NEEDS = "fleetloop sweep report needs SciPy: pip install 'fleetloop[sweep]'"
 MEASURE = (
-    "ε²: share of the result's variance that the bins of a factor explain (correlation ratio,"
-    " corrected for chance); no linearity is assumed, interactions aren't in it"
+    "ε²: share of the variance of the result's ranks that the bins of a factor explain"
+    " (Kruskal-Wallis, corrected for chance); no linearity is assumed, interactions aren't in it"
 )
 MOST_BINS, PER_BIN = 10, 20
 """Of a factor without levels: at most so many, with so many cases at least."""
@@ -77,13 +78,27 @@ def effect_of(factor: Column, result: Column, confidence: float) -> Effect:
             rate_interval(values, confidence) if of_rate else mean_interval(values, confidence)
         )
         made.append(Bin(label, float(x[here].mean()), len(values), float(values.mean()), low, high))
-    return Effect(factor, result, tuple(made), explained(places, y))
+    return Effect(factor, result, tuple(made), explained(places, ranks(y)))
 
 
 def ranking(factors: Sequence[Column], result: Column, confidence: float) -> list[Effect]:
     """The main effects of all factors that can have one, the largest first."""
     effects = [effect_of(one, result, confidence) for one in factors if one.is_axis]
     return sorted(effects, key=lambda one: -np.nan_to_num(one.share, nan=-1.0))
+
+
+def ranks(values: Series) -> Series:
+    """Ranks, the mean of them where values are equal.
+
+    Raises:
+        ScenarioError: SciPy isn't there.
+    """
+    try:
+        from scipy.stats import rankdata
+    except ImportError:
+        raise ScenarioError(_NEEDS) from None
+    found: Series = rankdata(values)
+    return found
 
 
 def explained(places: NDArray[np.intp], y: Series) -> float:
@@ -126,7 +141,7 @@ def mean_interval(values: Series, confidence: float) -> tuple[float, float]:
     try:
         from scipy.special import stdtrit
     except ImportError:
-        raise ScenarioError(NEEDS.replace("for this design", "for intervals")) from None
+        raise ScenarioError(_NEEDS) from None
     count = len(values)
     if count < 2:
         return float("nan"), float("nan")

@@ -170,7 +170,9 @@ def _axes(
     if x is not None and y is not None and x.name == y.name:
         raise ScenarioError(f"--x {x.name} --y {y.name}: a map needs two different columns")
     taken = {one.name for one in (x, y) if one is not None}
-    left = iter([one for one in factors if one.name not in taken])
+    names = [one.name for one in results.factors]
+    own = sorted(factors, key=lambda one: one.name not in names)  # what is derived comes last
+    left = iter([one for one in own if one.name not in taken])
     x = x or next(left, None)
     y = y or next(left, None)
     if x is None or y is None:
