@@ -137,4 +137,13 @@ def run(
     raise typer.Exit(command.begin(study, cases, seed, out, ways))
 
 
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of study files, for editors."""
+    from fleetloop.sweep.study import json_schema
+    from fleetloop.terminal import say_json
+
+    say_json(json_schema())
+
+
 app.command()(report)

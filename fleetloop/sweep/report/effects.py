@@ -22,12 +22,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from configs.errors import ScenarioError
+from fleetloop.sweep.extra import require
 from fleetloop.sweep.report.columns import Column, Series
 from fleetloop.sweep.report.results import FAILURE_RATE, Results
 from fleetloop.sweep.stopping import Rate
 
-_NEEDS = "fleetloop sweep report needs SciPy: pip install 'fleetloop[sweep]'"
 MEASURE = (
     "ε²: share of the variance of the result's ranks that the bins of a factor explain"
     " (Kruskal-Wallis, corrected for chance); no linearity is assumed, interactions aren't in it"
@@ -88,17 +87,10 @@ def ranking(factors: Sequence[Column], result: Column, confidence: float) -> lis
 
 
 def ranks(values: Series) -> Series:
-    """Ranks, the mean of them where values are equal.
-
-    Raises:
-        ScenarioError: SciPy isn't there.
-    """
-    try:
-        from scipy.stats import rankdata
-    except ImportError:
-        raise ScenarioError(_NEEDS) from None
-    found: Series = rankdata(values)
-    return found
+    """Ranks from 1 on, the mean of them where values are equal."""
+    _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
+    of_equals: Series = np.cumsum(counts) - 0.5 * (counts - 1)
+    return of_equals[places]
 
 
 def explained(places: NDArray[np.intp], y: Series) -> float:
@@ -138,10 +130,9 @@ def mean_interval(values: Series, confidence: float) -> tuple[float, float]:
     Raises:
         ScenarioError: SciPy isn't there.
     """
-    try:
-        from scipy.special import stdtrit
-    except ImportError:
-        raise ScenarioError(_NEEDS) from None
+    require("scipy")
+    from scipy.special import stdtrit
+
     count = len(values)
     if count < 2:
         return float("nan"), float("nan")

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scipy.stats import binomtest, kruskal, t
+from scipy.stats import binomtest, kruskal, rankdata, t
 
 from fleetloop.sweep.report.columns import Column
 from fleetloop.sweep.report.effects import (
@@ -14,6 +14,7 @@ from fleetloop.sweep.report.effects import (
     explained,
     mean_interval,
     ranking,
+    ranks,
     rate_interval,
 )
 from fleetloop.sweep.report.results import FAILURE_RATE
@@ -93,6 +94,11 @@ def test_a_share_is_a_share_on_any_scale(y: np.ndarray) -> None:
         return
     assert 0.0 <= share <= 1.0
     assert other == pytest.approx(share, abs=1e-6)
+
+
+@given(arrays(np.int64, st.integers(0, 30), elements=st.integers(-5, 5)))
+def test_equal_values_share_their_ranks(values: np.ndarray) -> None:
+    assert ranks(values.astype(float)).tolist() == rankdata(values).tolist()
 
 
 def test_without_variance_or_cases_to_spare_no_share_is_known() -> None:
