@@ -245,7 +245,7 @@ def synchronisation(results: Results) -> Captioned | None:
     if not results.derived:
         return None
     left, right = results.derived
-    if not (left.varies or right.varies):
+    if not (left.varies or right.varies) or np.isnan(results.failed).all():
         return None
     with mpl.rc_context(STYLE), np.errstate(all="ignore"):
         figure = Figure(figsize=(0.6 * PAGE_IN, 3.0), dpi=DPI, layout="constrained")
