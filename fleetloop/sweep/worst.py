@@ -7,7 +7,7 @@ Worst are the cases that failed, those with the least margin first, and then the
 
 import math
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -88,20 +88,22 @@ def worst_in(
     return [number for number, *_ in sorted(judged, key=rank)[:most]]
 
 
-def folder_of(folder: Path, number: int) -> Path:
-    """Where the whole run of a case is, if it was kept."""
-    return folder / FOLDER / f"case-{number:06d}"
+def missing_of(folder: Path, numbers: Sequence[int]) -> list[int]:
+    """Those of these cases whose whole runs aren't there yet."""
+    return [number for number in numbers if not place_of(folder, number).exists()]
 
 
-def keep_worst(
-    plan: Plan, folder: Path, numbers: Sequence[int], stop: Stop, on_look: Callable[[], None]
-) -> list[str]:
-    """Run the worst cases whose folders aren't there yet; what went wrong, a line each."""
-    jobs = [WholeRun(plan, number, folder_of(folder, number)) for number in numbers]
-    left = [job for job in jobs if not job.folder.exists()]
-    done = pool.work(left, stop, lambda *_: on_look())
+def keep_worst(plan: Plan, folder: Path, numbers: Sequence[int], stop: Stop) -> list[str]:
+    """Run cases whole; what went wrong, a line each."""
+    jobs = [WholeRun(plan, number, place_of(folder, number)) for number in numbers]
+    done = pool.work(jobs, stop)
     return [
-        f"case {left[n].number}: its whole run: {brought}"
+        f"case {jobs[n].number}: its whole run: {brought}"
         for n, brought in sorted(done.items())
         if isinstance(brought, pool.Failed)
     ]
+
+
+def place_of(folder: Path, number: int) -> Path:
+    """Where the whole run of a case is, if it was kept."""
+    return folder / FOLDER / f"case-{number:06d}"

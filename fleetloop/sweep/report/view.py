@@ -24,7 +24,7 @@ from fleetloop.sweep.report.effects import (
 from fleetloop.sweep.report.heat import Heat, heat_of
 from fleetloop.sweep.report.results import MARGIN, Results
 from fleetloop.sweep.stopping import Rate
-from fleetloop.sweep.worst import folder_of, worst_in
+from fleetloop.sweep.worst import place_of, worst_in
 
 METHOD = "Wilson"
 MOST_PAIRED = 4
@@ -195,7 +195,7 @@ def _worst(results: Results, most: int) -> tuple[Worst, ...]:
     found = []
     for number in chosen:
         (row,) = table.slice(rows[number], 1).to_pylist()
-        kept = folder_of(results.folder, number)
+        kept = place_of(results.folder, number)
         found.append(
             Worst(
                 number,
