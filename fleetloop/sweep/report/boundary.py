@@ -72,7 +72,9 @@ class Boundary:
         if not self.lines:
             return f"{what}: {'holds' if self.everywhere else 'fails'} all over the map"
         if len(self.lines) > 1:
-            return f"{what}: between its two lines it depends on the other factors"
+            return (
+                f"{what}: lines of the extremes of the other factors; between, it depends on these"
+            )
         return what
 
 

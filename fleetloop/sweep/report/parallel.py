@@ -63,7 +63,7 @@ def parallel_coordinates(
     if len(chosen) < len(results):
         caption += f"; {len(chosen)} of {len(results)} cases, failed ones first"
     if count := int(missing.any(axis=0).sum()):
-        caption += f"; {count} cases without a value end below the axis"
+        caption += f"; without a value, below the axis: {count}"
     return Captioned("parallel_coordinates", f"{caption}.", figure)
 
 

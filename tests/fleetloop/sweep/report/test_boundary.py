@@ -63,7 +63,7 @@ def test_over_random_graphs_the_outermost_lines_are_those_of_the_extreme_graphs(
     (boundary,) = of_all
     along, most = boundary.lines[-1]
     assert most == pytest.approx(np.sqrt(along * sides.max()))
-    assert "between its two lines it depends" in boundary.words
+    assert "lines of the extremes of the other factors" in boundary.words
 
 
 def test_a_graph_for_which_all_gains_do_is_said(tmp_path) -> None:

@@ -64,7 +64,10 @@ def test_json_has_the_numbers_of_the_page(done) -> None:
     ("words", "told"),
     [
         (("nowhere",), "nowhere: no such folder; name the folder of a study"),
-        (("study", "--x", "mas_kg"), "--x mas_kg: no such column; did you mean mass_kg?; there are"),
+        (
+            ("study", "--x", "mas_kg"),
+            "--x mas_kg: no such column; did you mean mass_kg?; there are",
+        ),
         (("study", "--y", "verdict"), "--y verdict: no such column"),
         (("study", "--color", "mass_kg"), "--color mass_kg: no such result"),
         (("study", "--x", "p", "--y", "p"), "--x p --y p: a map needs two different columns"),
