@@ -15,7 +15,6 @@ together with another one isn't in it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from math import sqrt
 from typing import NamedTuple
 
@@ -108,15 +107,27 @@ def explained(places: NDArray[np.intp], y: Series) -> float:
 
 
 def binned(factor: Column, x: Series) -> tuple[NDArray[np.intp], list[str]]:
-    """The number of each value's bin, and the bins' labels."""
-    distinct = np.unique(x)
+    """The number of each value's bin, and the bins' labels.
+
+    Bins of samples have about equal shares of the cases; a value that more have is one by itself.
+    """
+    distinct, places, counts = np.unique(x, return_inverse=True, return_counts=True)
     if factor.levels or len(distinct) <= MOST_BINS:
-        return np.searchsorted(distinct, x), [factor.shown(float(one)) for one in distinct]
+        return places, [factor.shown(float(one)) for one in distinct]
     bins = int(min(MOST_BINS, max(_FEWEST_BINS, len(x) // PER_BIN)))
-    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, bins + 1)))
-    places = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
-    pairs = pairwise(edges.tolist())
-    return places, [f"{factor.shown(a)} to {factor.shown(b)}" for a, b in pairs]
+    heavy = counts * bins > len(x)
+    light = np.where(heavy, 0, counts)
+    left = int(np.clip(light.sum() // PER_BIN, 1, max(bins - heavy.sum(), 1)))
+    if not heavy.any():
+        left = bins
+    shares = left * (np.cumsum(light) - 0.5 * light) / max(light.sum(), 1)
+    starts = (np.diff(np.floor(shares)) > 0) | heavy[1:] | heavy[:-1]
+    numbers = np.concatenate([[0], np.cumsum(starts)])
+    ends = [(distinct[numbers == n][0], distinct[numbers == n][-1]) for n in np.unique(numbers)]
+    labels = [
+        factor.shown(a) if a == b else f"{factor.shown(a)} to {factor.shown(b)}" for a, b in ends
+    ]
+    return numbers[places], labels
 
 
 def rate_interval(failed: Series, confidence: float) -> tuple[float, float]:

@@ -35,8 +35,10 @@ _COLUMNS, _PANEL_IN = 3, 1.75
 _DECADES = 100.0
 """Ratio of positive values from which they are shown on a logarithmic scale."""
 _DASHES = ("-", "--", ":")
-_HALO = (patheffects.Stroke(linewidth=3.2, foreground="white"), patheffects.Normal())
+_HALO = (patheffects.Stroke(linewidth=2.4, foreground="white"), patheffects.Normal())
 _EMPTY = "#e4e4e4"
+_TOPS = (0.1, 0.2, 0.5, 1.0)
+"""Of the scale of a failure rate; it begins with 0."""
 
 
 def heat_map(heat: Heat, found: Sequence[Boundary], name: str = MAP) -> Captioned:
@@ -160,7 +162,8 @@ def _scale(axes: Axes, side: Literal["x", "y"], axis: Axis) -> None:
 def _norm(values: Series, result: Column) -> Normalize:
     known = values[np.isfinite(values)]
     if result.name == FAILURE_RATE:
-        return Normalize(0.0, 1.0)
+        highest = float(known.max(initial=0.0))
+        return Normalize(0.0, next((top for top in _TOPS if highest <= top), 1.0))
     if not len(known):
         return Normalize(0.0, 1.0)
     low, high = float(known.min()), float(known.max())

@@ -154,6 +154,15 @@ def test_bins_of_samples_have_equal_shares_and_at_most_ten_are_made() -> None:
     assert len(few) == 3
 
 
+def test_a_value_that_most_cases_have_is_a_bin_by_itself() -> None:
+    x = np.concatenate([np.zeros(900), np.linspace(0.1, 1.0, 100)])
+    y = (x > 0.0).astype(float)
+    effect = effect_of(Column("x", x), Column(FAILURE_RATE, y), 0.95)
+    assert [one.cases for one in effect.bins] == [900, 20, 20, 20, 20, 20]
+    assert effect.bins[0].label == "0"
+    assert effect.share > 0.99
+
+
 def test_levels_of_texts_are_bins_by_name() -> None:
     laws = Column("law", np.array([0.0, 1.0, 0.0, 1.0]), levels=("paper", "robust"))
     bins = effect_of(laws, Column("y", np.array([1.0, 5.0, 3.0, 7.0])), 0.95).bins
