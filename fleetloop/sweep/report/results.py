@@ -133,7 +133,7 @@ class Results:
 
 
 def _choose(names: list[str]) -> str:
-    return f"choose of {', '.join(names) or 'none: all are alike'}"
+    return f"choose one of {', '.join(names)}" if names else "there is none: all cases are alike"
 
 
 def results_of(folder: Path) -> Results:
