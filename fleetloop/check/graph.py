@@ -156,7 +156,7 @@ def _positive(graph: Graph, p: float, q: float) -> bool:
 
 
 def right_side(graph: Graph) -> float:
-    """max Im(ζ)²/Re(ζ) of (46); of a graph that switches the largest of its graphs."""
+    """Max Im(ζ)²/Re(ζ) of (46); of a graph that switches the largest of its graphs."""
     if graph.switches:
         instants = {one.edges: one for _, one in islice(graph.phases(), _MOST_INSTANTS)}
         return max(map(right_side, instants.values()))

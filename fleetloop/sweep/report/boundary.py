@@ -14,6 +14,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, log, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +72,9 @@ class Boundary:
         if not self.lines:
             return f"{what}: {'holds' if self.everywhere else 'fails'} all over the map"
         if len(self.lines) > 1:
-            return f"{what}: between its two lines it depends on the other factors"
+            return (
+                f"{what}: lines of the extremes of the other factors; between, it depends on these"
+            )
         return what
 
 
@@ -259,7 +262,7 @@ class _Map:
         try:
             scenario = self._loaded(Case(number, tuple(values)))
             for key, value in quick.items():
-                scenario = _with_gain(scenario, *key.split("."), value)
+                scenario = _with_gain(scenario, key, value)
             return float(ask(scenario))
         except (FleetloopError, ValueError, TypeError, ArithmeticError, np.linalg.LinAlgError):
             return np.nan
@@ -270,17 +273,19 @@ class _Map:
         return self._known[case]
 
 
-def _with_gain(scenario: Scenario, section: str, name: str, value: float) -> Scenario:
+def _with_gain(scenario: Scenario, key: str, value: float) -> Scenario:
     """A scenario with another gain, which no other key depends on: loading takes ten times longer.
 
     Raises:
         ValueError, TypeError: it has no such gain, or not of this value.
     """
+    section, _, name = key.partition(".")
+    change: dict[str, Any] = {name: value}
     if section == "coordination":
-        gains = replace(scenario.coordination, **{name: value})
+        gains = replace(scenario.coordination, **change)
         return scenario.model_copy(update={"coordination": gains})
     control = scenario.control
-    control = replace(control, parameters=replace(control.parameters, **{name: value}))
+    control = replace(control, parameters=replace(control.parameters, **change))
     return scenario.model_copy(update={"control": control})
 
 

@@ -35,6 +35,8 @@ UNITS = {
 """By how a name ends, the longest first."""
 MOST_LEVELS = 24
 """Different values of a column that each stand for themselves on an axis."""
+OUTLIER = 100.0
+"""Magnitude of an outlier in typical ones."""
 _LONGEST = 28
 """Characters of a label of a level."""
 
@@ -134,6 +136,12 @@ def wrapped(text: str, most: int) -> list[str]:
             lines.append("")
         lines[-1] += part
     return [line.rstrip(" ") for line in lines]
+
+
+def linear_width(values: Series) -> float:
+    """Of a scale that is linear near 0 and logarithmic beyond, where outliers need one; else 0."""
+    typical = float(np.median(np.abs(values))) if len(values) else 0.0
+    return typical if np.abs(values).max(initial=0.0) > OUTLIER * typical else 0.0
 
 
 def nice_marks(low: float, high: float, *, log: bool, most: int = 6) -> list[float]:

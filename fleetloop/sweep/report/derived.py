@@ -42,7 +42,7 @@ def with_derived(results: Results) -> Results:
     sides = _sides(results, cases, of_graph)
     with np.errstate(all="ignore"):
         left = Column(LEFT, np.where(q > 0, p * p / q, np.nan), symbol="p²/q")
-    right = Column(RIGHT, np.round(sides, 12), symbol="max Im(ζ)²/Re(ζ)")
+    right = Column(RIGHT, np.round(sides, 8), symbol="max Im(ζ)²/Re(ζ)")
     return replace(results, derived=(left, right))
 
 

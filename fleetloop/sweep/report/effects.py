@@ -2,34 +2,33 @@
 
 The cases are sorted into bins of a factor: its levels, or equal shares of its samples. A bin has
 the mean of the result and a confidence interval: Student's of a mean, Wilson's of a failure rate.
-The effect is the share of the result's variance that the bins explain, the correlation ratio η²;
-that of N cases and B bins is raised by chance, so it is corrected (Kelley 1935):
+The effect is the share of the variance of the result's ranks that the bins explain, as Kruskal and
+Wallis test it; that of N cases and B bins is raised by chance, so it is corrected (Kelley 1935):
 
     ε² = (SS_between − (B − 1) MS_within) / SS_total,   MS_within = SS_within / (N − B)        (1)
 
-It needs no straight line and no monotony, as a correlation would; of independent factors it
-estimates the first-order Sobol' index. 0: the factor alone changes no mean; what it does together
-with another factor only isn't in it.
+It needs no straight line and no monotony, as a correlation would, and a run that diverged counts as
+the last, however far it got. Of a failure rate ranks change nothing; of independent factors it then
+estimates the first-order Sobol' index. 0: the factor by itself changes nothing; what it does only
+together with another one isn't in it.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from configs.errors import ScenarioError
-from fleetloop.sweep.design import NEEDS
+from fleetloop.sweep.extra import require
 from fleetloop.sweep.report.columns import Column, Series
 from fleetloop.sweep.report.results import FAILURE_RATE, Results
 from fleetloop.sweep.stopping import Rate
 
 MEASURE = (
-    "ε²: share of the result's variance that the bins of a factor explain (correlation ratio,"
-    " corrected for chance); no linearity is assumed, interactions aren't in it"
+    "ε²: share of the variance of the result's ranks that the bins of a factor explain"
+    " (Kruskal-Wallis, corrected for chance); no linearity is assumed, interactions aren't in it"
 )
 MOST_BINS, PER_BIN = 10, 20
 """Of a factor without levels: at most so many, with so many cases at least."""
@@ -77,13 +76,20 @@ def effect_of(factor: Column, result: Column, confidence: float) -> Effect:
             rate_interval(values, confidence) if of_rate else mean_interval(values, confidence)
         )
         made.append(Bin(label, float(x[here].mean()), len(values), float(values.mean()), low, high))
-    return Effect(factor, result, tuple(made), explained(places, y))
+    return Effect(factor, result, tuple(made), explained(places, ranks(y)))
 
 
 def ranking(factors: Sequence[Column], result: Column, confidence: float) -> list[Effect]:
     """The main effects of all factors that can have one, the largest first."""
     effects = [effect_of(one, result, confidence) for one in factors if one.is_axis]
     return sorted(effects, key=lambda one: -np.nan_to_num(one.share, nan=-1.0))
+
+
+def ranks(values: Series) -> Series:
+    """Ranks from 1 on, the mean of them where values are equal."""
+    _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
+    of_equals: Series = np.cumsum(counts) - 0.5 * (counts - 1)
+    return of_equals[places]
 
 
 def explained(places: NDArray[np.intp], y: Series) -> float:
@@ -101,15 +107,27 @@ def explained(places: NDArray[np.intp], y: Series) -> float:
 
 
 def binned(factor: Column, x: Series) -> tuple[NDArray[np.intp], list[str]]:
-    """The number of each value's bin, and the bins' labels."""
-    distinct = np.unique(x)
+    """The number of each value's bin, and the bins' labels.
+
+    Bins of samples have about equal shares of the cases; a value that more have is one by itself.
+    """
+    distinct, places, counts = np.unique(x, return_inverse=True, return_counts=True)
     if factor.levels or len(distinct) <= MOST_BINS:
-        return np.searchsorted(distinct, x), [factor.shown(float(one)) for one in distinct]
+        return places, [factor.shown(float(one)) for one in distinct]
     bins = int(min(MOST_BINS, max(_FEWEST_BINS, len(x) // PER_BIN)))
-    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, bins + 1)))
-    places = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
-    pairs = pairwise(edges.tolist())
-    return places, [f"{factor.shown(a)} to {factor.shown(b)}" for a, b in pairs]
+    heavy = counts * bins > len(x)
+    light = np.where(heavy, 0, counts)
+    left = int(np.clip(light.sum() // PER_BIN, 1, max(bins - heavy.sum(), 1)))
+    if not heavy.any():
+        left = bins
+    shares = left * (np.cumsum(light) - 0.5 * light) / max(light.sum(), 1)
+    starts = (np.diff(np.floor(shares)) > 0) | heavy[1:] | heavy[:-1]
+    numbers = np.concatenate([[0], np.cumsum(starts)])
+    ends = [(distinct[numbers == n][0], distinct[numbers == n][-1]) for n in np.unique(numbers)]
+    labels = [
+        factor.shown(a) if a == b else f"{factor.shown(a)} to {factor.shown(b)}" for a, b in ends
+    ]
+    return numbers[places], labels
 
 
 def rate_interval(failed: Series, confidence: float) -> tuple[float, float]:
@@ -123,10 +141,9 @@ def mean_interval(values: Series, confidence: float) -> tuple[float, float]:
     Raises:
         ScenarioError: SciPy isn't there.
     """
-    try:
-        from scipy.special import stdtrit
-    except ImportError:
-        raise ScenarioError(NEEDS.replace("for this design", "for intervals")) from None
+    require("scipy")
+    from scipy.special import stdtrit
+
     count = len(values)
     if count < 2:
         return float("nan"), float("nan")

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis as Ticks
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.colors import AsinhNorm, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, PercentFormatter
 
@@ -20,21 +20,25 @@ from fleetloop.results.drawing import DPI, PAGE_IN, STYLE, legend_above
 from fleetloop.results.figures import Captioned
 from fleetloop.results.palette import STATE_LINES
 from fleetloop.sweep.report.boundary import Boundary
-from fleetloop.sweep.report.columns import Column, Series, nice_marks, wrapped
+from fleetloop.sweep.report.columns import Column, Series, linear_width, nice_marks, wrapped
 from fleetloop.sweep.report.effects import Effect
 from fleetloop.sweep.report.heat import Axis, Heat
 from fleetloop.sweep.report.results import FAILURE_RATE, Results
 
-MAP, THEORY_MAP = "map", "map_with_theory"
+MAP, THEORY_MAP, INEQUALITY = "map", "map_with_theory", "inequality_46"
 MOST_NUMBERS = 12
 """Cells of a row and of a column into which their values are written."""
 MOST_PANELS = 12
+_LEAST_CELL = 0.045
+"""Part of an axis that a cell with its value in it takes, and that ticks of levels are apart."""
 _COLUMNS, _PANEL_IN = 3, 1.75
 _DECADES = 100.0
 """Ratio of positive values from which they are shown on a logarithmic scale."""
 _DASHES = ("-", "--", ":")
-_HALO = (patheffects.Stroke(linewidth=3.2, foreground="white"), patheffects.Normal())
+_HALO = (patheffects.Stroke(linewidth=2.4, foreground="white"), patheffects.Normal())
 _EMPTY = "#e4e4e4"
+_TOPS = (0.1, 0.2, 0.5, 1.0)
+"""Of the scale of a failure rate; it begins with 0."""
 
 
 def heat_map(heat: Heat, found: Sequence[Boundary], name: str = MAP) -> Captioned:
@@ -106,8 +110,9 @@ def _write(axes: Axes, heat: Heat, norm: Normalize, colours: str) -> None:
     """Each cell's value in it."""
     shades = mpl.colormaps[colours]
     middles = [_middles(axis) for axis in (heat.x, heat.y)]
+    wide, high = (_parts(axis) > _LEAST_CELL for axis in (heat.x, heat.y))
     for (row, column), value in np.ndenumerate(heat.means):
-        if np.isfinite(value):
+        if np.isfinite(value) and wide[column] and high[row]:
             red, green, blue, _ = shades(norm(value))
             ink = "black" if 0.3 * red + 0.59 * green + 0.11 * blue > 0.5 else "white"
             text = f"{100 * value:.0f}" if heat.result.name == FAILURE_RATE else f"{value:.3g}"
@@ -121,6 +126,14 @@ def _middles(axis: Axis) -> Series:
     edges = axis.edges
     found: Series = 0.5 * (edges[1:] + edges[:-1])
     return np.sqrt(edges[1:] * edges[:-1]) if axis.column.log and edges[0] > 0 else found
+
+
+def _parts(axis: Axis) -> Series:
+    """How much of the axis each cell takes."""
+    log = axis.column.log and axis.edges[0] > 0.0
+    edges = np.log(axis.edges) if log else axis.edges
+    parts: Series = np.diff(edges) / (edges[-1] - edges[0])
+    return parts
 
 
 def _scale(axes: Axes, side: Literal["x", "y"], axis: Axis) -> None:
@@ -137,19 +150,27 @@ def _scale(axes: Axes, side: Literal["x", "y"], axis: Axis) -> None:
         axes.set(**{f"{side}scale": "log"})
         _decades(ticks, column.distinct)
     elif axis.exact and axis.cells <= MOST_NUMBERS:
-        ticks.set_major_locator(FixedLocator(column.distinct.tolist()))
+        levels, least = column.distinct, _LEAST_CELL * (axis.edges[-1] - axis.edges[0])
+        marks = [float(levels[0])]
+        for one in levels[1:].tolist():
+            if one - marks[-1] >= least:
+                marks.append(one)
+        ticks.set_major_locator(FixedLocator(marks))
         ticks.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
 
 
 def _norm(values: Series, result: Column) -> Normalize:
     known = values[np.isfinite(values)]
     if result.name == FAILURE_RATE:
-        return Normalize(0.0, 1.0)
+        highest = float(known.max(initial=0.0))
+        return Normalize(0.0, next((top for top in _TOPS if highest <= top), 1.0))
     if not len(known):
         return Normalize(0.0, 1.0)
     low, high = float(known.min()), float(known.max())
     if low > 0.0 and high > _DECADES * low:
         return LogNorm(low, high)
+    if width := linear_width(known):
+        return AsinhNorm(width, low, high)
     return Normalize(low, high if high > low else low + (abs(low) or 1.0))
 
 
@@ -182,8 +203,8 @@ def main_effects(effects: Sequence[Effect], confidence: float) -> Captioned:
     interval = "Wilson's" if result.name == FAILURE_RATE else "Student's"
     caption = (
         f"Main effects on {_words(result)}: its mean by level or quantile bin of each factor, with"
-        f" {interval} {100 * confidence:g} % intervals; ε² is the share of its variance that the"
-        f" factor explains{more}."
+        f" {interval} {100 * confidence:g} % intervals; ε² is the share of the"
+        f" variance of its ranks that the factor explains{more}."
     )
     return Captioned("main_effects", caption, figure)
 
@@ -227,7 +248,7 @@ def synchronisation(results: Results) -> Captioned | None:
     if not results.derived:
         return None
     left, right = results.derived
-    if not (left.varies or right.varies):
+    if not (left.varies or right.varies) or np.isnan(results.failed).all():
         return None
     with mpl.rc_context(STYLE), np.errstate(all="ignore"):
         figure = Figure(figsize=(0.6 * PAGE_IN, 3.0), dpi=DPI, layout="constrained")
@@ -251,7 +272,8 @@ def synchronisation(results: Results) -> Captioned | None:
         axes.set_ylabel("p²/q")
         legend_above(figure, axes, 3)
     caption = f"Both sides of (46) in every case that held or failed: {agreement(results)}."
-    return Captioned("inequality_46", caption, figure)
+    caption += " (46) says what becomes of the path variables in the end, not how soon."
+    return Captioned(INEQUALITY, caption, figure)
 
 
 def agreement(results: Results) -> str:

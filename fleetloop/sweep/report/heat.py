@@ -15,6 +15,8 @@ MOST_GRID_LEVELS = 400
 """Of one axis of a grid whose cells are its levels."""
 _PER_CELL = 8
 """Cases of a cell of samples, about."""
+_LEAST_PART = 0.01
+"""Of a range, between levels that aren't a grid's."""
 _FEWEST, _MOST = 4, 24
 """Parts of a range."""
 
@@ -86,7 +88,9 @@ def axis_of(column: Column, count: int) -> Axis:
         middles = np.arange(len(column.levels), dtype=np.float64)
         edges: Series = np.arange(len(column.levels) + 1, dtype=np.float64) - 0.5
         return Axis(column, edges, middles, exact=True)
-    if len(distinct) <= (MOST_GRID_LEVELS if column.exact else MOST_LEVELS):
+    if len(distinct) <= (MOST_GRID_LEVELS if column.exact else MOST_LEVELS) and (
+        column.exact or _apart(distinct, log=column.log)
+    ):
         return Axis(column, _between(distinct, log=column.log), np.empty(0), exact=True)
     cells = int(np.clip(np.sqrt(count / _PER_CELL), _FEWEST, _MOST))
     ends = distinct[0], distinct[-1]
@@ -96,6 +100,12 @@ def axis_of(column: Column, count: int) -> Axis:
     else:
         edges = np.linspace(*ends, cells + 1)
     return Axis(column, edges, np.empty(0), exact=False)
+
+
+def _apart(levels: Series, *, log: bool) -> bool:
+    """Whether the cells of levels would all be seen."""
+    at = np.log(levels) if log and levels[0] > 0.0 else levels
+    return len(at) < 2 or bool(np.diff(at).min() > _LEAST_PART * (at[-1] - at[0]))
 
 
 def _between(levels: Series, *, log: bool) -> Series:

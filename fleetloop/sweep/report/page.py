@@ -12,7 +12,7 @@ from fleetloop.results.pages import figure_tag, table_tag
 from fleetloop.results.publication import Drawn
 from fleetloop.sweep.dataset import PARTS
 from fleetloop.sweep.report.effects import MEASURE
-from fleetloop.sweep.report.figures import MAP, THEORY_MAP
+from fleetloop.sweep.report.figures import INEQUALITY, MAP, THEORY_MAP
 from fleetloop.sweep.report.results import FAILURE_RATE
 from fleetloop.sweep.report.tables import (
     bin_row,
@@ -25,6 +25,8 @@ from fleetloop.sweep.report.tables import (
 from fleetloop.sweep.report.view import View, Worst
 
 PAGE = "report.html"
+MAPS = MAP, THEORY_MAP, INEQUALITY
+"""Figures side by side."""
 MOST_REASON = 240
 """Characters; the dataset has all."""
 OPENERS = (
@@ -44,10 +46,9 @@ def page(view: View, figures: Sequence[Drawn]) -> str:
         for item, data in figures
     }
     parts = results.folder / PARTS
-    shown_map = (
-        tags.pop(MAP, "") + tags.pop(THEORY_MAP, "")
-        or f'<p class="note">No map: {escape(view.no_map)}.</p>'
-    )
+    shown_map = "".join(tags.pop(name, "") for name in MAPS)
+    if view.heat is None:
+        shown_map += f'<p class="note">No map: {escape(view.no_map)}.</p>'
     body = Template(room.joinpath("page.html").read_text("utf-8")).substitute(
         remarks="".join(f'<p class="lost">{escape(text)}</p>' for text in remarks(view)),
         rate=escape(f"Failure rate {rate_words(view)}"),
@@ -145,7 +146,7 @@ def _worst(view: View) -> str:
     rows = "".join(line for one in view.worst for line in _worst_rows(one, names))
     note = (
         "Failed ones first, then by margin. A click on a command selects it all;"
-        " it runs the case again, exactly."
+        " it runs the case again, exactly, where the study was begun."
     )
     return (
         f'<p class="note">{note}</p><div class="wide"><table><thead><tr>{head}</tr></thead>'

@@ -13,7 +13,14 @@ from matplotlib.lines import Line2D
 from fleetloop.results.drawing import DPI, PAGE_IN, STYLE
 from fleetloop.results.figures import Captioned
 from fleetloop.results.palette import STATE_LINES
-from fleetloop.sweep.report.columns import Column, Series, nice_marks, shortened, wrapped
+from fleetloop.sweep.report.columns import (
+    Column,
+    Series,
+    linear_width,
+    nice_marks,
+    shortened,
+    wrapped,
+)
 from fleetloop.sweep.report.results import Results
 
 MOST_LINES, MOST_AXES = 600, 9
@@ -56,7 +63,7 @@ def parallel_coordinates(
     if len(chosen) < len(results):
         caption += f"; {len(chosen)} of {len(results)} cases, failed ones first"
     if count := int(missing.any(axis=0).sum()):
-        caption += f"; {count} cases without a value end below the axis"
+        caption += f"; without a value, below the axis: {count}"
     return Captioned("parallel_coordinates", f"{caption}.", figure)
 
 
@@ -89,7 +96,10 @@ def _heights(column: Column) -> Series:
 
 def _scaled(column: Column, values: Series) -> Series:
     with np.errstate(all="ignore"):
-        return np.log(values) if column.log and column.distinct[0] > 0.0 else values
+        if column.log and column.distinct[0] > 0.0:
+            return np.log(values)
+        width = 0.0 if column.levels else linear_width(column.distinct)
+        return np.arcsinh(values / width) if width else values
 
 
 def _lines(axes: Axes, heights: np.ndarray, failed: Series, chosen: np.ndarray) -> list[Line2D]:
@@ -141,6 +151,10 @@ def _ticks(column: Column) -> list[tuple[float, str]]:
     if len(distinct) > _TICKS and not column.levels:
         log = column.log and distinct[0] > 0.0
         marks = nice_marks(float(distinct[0]), float(distinct[-1]), log=log)
+        if not log and linear_width(distinct):
+            decades = [10.0**e for e in range(-9, 13)]
+            signed = [-one for one in reversed(decades)] + [0.0] + decades
+            marks = [one for one in signed if distinct[0] <= one <= distinct[-1]]
     ends = _scaled(column, distinct[[0, -1]])
     heights = (
         [0.5]

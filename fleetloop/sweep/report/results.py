@@ -17,7 +17,8 @@ import numpy as np
 from configs.errors import FleetloopError, InfrastructureError, ScenarioError
 from configs.wording import guess
 from fleetloop.sweep.cases import Cases
-from fleetloop.sweep.dataset import KEY, LOCK, NEEDS, PARTS, about
+from fleetloop.sweep.dataset import KEY, LOCK, PARTS, about
+from fleetloop.sweep.extra import require
 from fleetloop.sweep.plan import STUDY, Plan
 from fleetloop.sweep.report.columns import Column, Series, of_texts, unit_of
 
@@ -132,7 +133,7 @@ class Results:
 
 
 def _choose(names: list[str]) -> str:
-    return f"choose of {', '.join(names) or 'none: all are alike'}"
+    return f"choose one of {', '.join(names)}" if names else "there is none: all cases are alike"
 
 
 def results_of(folder: Path) -> Results:
@@ -171,11 +172,10 @@ def results_of(folder: Path) -> Results:
 
 def _read(folder: Path) -> tuple["pa.Table", tuple[str, ...]]:
     """All rows by case, one per case, and what is wrong with parts."""
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError:
-        raise ScenarioError(NEEDS) from None
+    require("pyarrow")
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     paths = sorted((folder / PARTS).glob("part-*.parquet"))
     if not paths:
         raise ScenarioError(

@@ -24,7 +24,7 @@ from fleetloop.sweep.report.effects import (
 from fleetloop.sweep.report.heat import Heat, heat_of
 from fleetloop.sweep.report.results import MARGIN, Results
 from fleetloop.sweep.stopping import Rate
-from fleetloop.sweep.worst import folder_of, worst_in
+from fleetloop.sweep.worst import place_of, worst_in
 
 METHOD = "Wilson"
 MOST_PAIRED = 4
@@ -170,7 +170,9 @@ def _axes(
     if x is not None and y is not None and x.name == y.name:
         raise ScenarioError(f"--x {x.name} --y {y.name}: a map needs two different columns")
     taken = {one.name for one in (x, y) if one is not None}
-    left = iter([one for one in factors if one.name not in taken])
+    names = [one.name for one in results.factors]
+    own = sorted(factors, key=lambda one: one.name not in names)  # what is derived comes last
+    left = iter([one for one in own if one.name not in taken])
     x = x or next(left, None)
     y = y or next(left, None)
     if x is None or y is None:
@@ -193,7 +195,7 @@ def _worst(results: Results, most: int) -> tuple[Worst, ...]:
     found = []
     for number in chosen:
         (row,) = table.slice(rows[number], 1).to_pylist()
-        kept = folder_of(results.folder, number)
+        kept = place_of(results.folder, number)
         found.append(
             Worst(
                 number,

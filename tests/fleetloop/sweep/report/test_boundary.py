@@ -53,7 +53,9 @@ def test_on_the_gains_it_is_where_the_coordination_loses_its_stability(tmp_path,
 
 
 def test_over_random_graphs_the_outermost_lines_are_those_of_the_extreme_graphs(tmp_path) -> None:
-    found = results(tmp_path, SAMPLES.replace("12", "40") + HEAD + P.replace("0.1", "0.01") + Q + RANDOM)
+    found = results(
+        tmp_path, SAMPLES.replace("12", "40") + HEAD + P.replace("0.1", "0.01") + Q + RANDOM
+    )
     p, q, _ = found.factors
     sides = found.derived[1].values
     assert sides.max() > sides.min() == 0.0
@@ -61,7 +63,7 @@ def test_over_random_graphs_the_outermost_lines_are_those_of_the_extreme_graphs(
     (boundary,) = of_all
     along, most = boundary.lines[-1]
     assert most == pytest.approx(np.sqrt(along * sides.max()))
-    assert "between its two lines it depends" in boundary.words
+    assert "lines of the extremes of the other factors" in boundary.words
 
 
 def test_a_graph_for_which_all_gains_do_is_said(tmp_path) -> None:
