@@ -11,11 +11,16 @@ from support.snippets import Snippet, commands, snippets
 from configs.deployment import check_deployment
 from configs.loading import load, loads
 from fleetloop.cli import app
+from fleetloop.sweep import study as studies
+from fleetloop.sweep.app import StudyFirst
+from fleetloop.sweep.cases import Cases
+from fleetloop.sweep.plan import Base, Plan
 
 HEAD = 'schema = 1\nname = "shown"\n'
 FLEET = "".join(
     f'[[robot]]\nname = "r{n}"\npose = {{ x_m = 0.0, y_m = {n}.0 }}\n' for n in (1, 2, 3)
 )
+BASE = Base.beside("shown.toml", "two_robots")
 UsageError = typer.BadParameter.__base__ or Exception
 
 
@@ -31,6 +36,9 @@ TABLES = [
 @pytest.mark.parametrize("snippet", TABLES, ids=lambda s: s.where)
 def test_files_that_are_shown_are_taken(snippet: Snippet, tmp_path: Path) -> None:
     data = tomllib.loads(snippet.text)
+    if "factor" in data:
+        Cases(Plan(studies.loads("shown.toml", snippet.text).to_toml(), BASE))
+        return
     placed = "roles" in data or isinstance(data.get("robot"), dict)
     if placed or "endpoint" in data.get("network", ()):
         for name in re.findall(r'"([\w./-]+\.(?:pem|key))"', snippet.text):
@@ -50,7 +58,11 @@ def test_commands_that_are_shown_are_understood() -> None:
     for where, words in commands():
         command = root
         name, *rest = words
-        while (known := getattr(command, "commands", {})) and rest and rest[0][0] != "-":
+        while (known := getattr(command, "commands", {})) and rest:
+            if rest[0] not in known and isinstance(command, StudyFirst):
+                rest = ["run", *rest]
+            if rest[0][0] == "-":
+                break
             if rest[0] not in known and _takes_argument(command):
                 rest = rest[1:]  # the verb's own argument, as a run, before the next verb
                 continue

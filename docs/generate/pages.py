@@ -17,6 +17,7 @@ from docs.generate.scenario import (
     faults_page,
     laws_page,
     scenario_page,
+    study_page,
 )
 from docs.generate.vocabulary import door_page, events_page, network_page, signals_page
 
@@ -78,6 +79,12 @@ _PAGES = {
         "Commands",
         """Every verb with its arguments and options, as `-h` prints them; exit statuses.""",
         commands_page,
+    ),
+    "study.md": _Page(
+        "Study file",
+        """What `fleetloop sweep` varies, how often, and what it keeps ([sweeps](../sweeps.md)).
+        `fleetloop sweep schema` prints the same as JSON Schema, for editors.""",
+        study_page,
     ),
     "deployment.md": _Page(
         "Deployment file",

@@ -14,6 +14,7 @@ from configs.plugins import LAWS, Kind, find, load
 from configs.tables import adapter_of
 from docs.generate.markdown import Schema, Tables, code, doc_block, prose, table
 from fleetloop.fault.kinds import describe
+from fleetloop.sweep.study import json_schema as study_schema
 
 _ELSEWHERE = {
     "control": ("laws.md", "The law and its gains: keys and defaults are those of the law."),
@@ -34,6 +35,11 @@ def scenario_page() -> str:
 def deployment_page() -> str:
     """Every key of a deployment file."""
     return _Page(Deployment.model_json_schema(by_alias=True)).text()
+
+
+def study_page() -> str:
+    """Every key of a study file."""
+    return _Page(study_schema()).text()
 
 
 class _Page:

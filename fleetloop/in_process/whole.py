@@ -24,6 +24,8 @@ class Outcome(NamedTuple):
     stopped: dict[str, str]
     """Robots that stopped themselves or whose motion diverged, and why."""
     events: list[Event]
+    left_course: str = ""
+    """Why another engine left it to this one; "" if none did."""
 
 
 def run_in_memory(

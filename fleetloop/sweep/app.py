@@ -134,3 +134,12 @@ def run(
     if study is None:
         raise ScenarioError("name a study, or --resume FOLDER")
     raise typer.Exit(command.begin(study, cases, seed, out, ways))
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of study files, for editors."""
+    from fleetloop.sweep.study import json_schema
+    from fleetloop.terminal import say_json
+
+    say_json(json_schema())

@@ -29,6 +29,8 @@ from fleetloop.sweep.watch import Watch
 
 KERNEL, REFERENCE = "kernel", "in process"
 NO_KERNEL = "the batch kernel isn't there"
+AT_ONCE = 16
+"""Cases whose records the kernel brings together: their rows take memory."""
 
 
 class Brought(Protocol):
@@ -45,6 +47,10 @@ class Brought(Protocol):
     @property
     def events(self) -> Sequence[Event]:
         """All of the run."""
+
+    @property
+    def left_course(self) -> str:
+        """Why the kernel had the reference run it after all; "" if it didn't."""
 
 
 class Kernel(NamedTuple):
@@ -100,11 +106,8 @@ def rows_of(
     if kernel is not None:
         why_not = {one.case.number: _lacks(kernel, one.scenario) for one in valid}
         able = [one for one in valid if not why_not[one.case.number]]
-        if able:
-            made, failure = _by_kernel(cases, able, kernel, watch)
-            rows |= made
-            if failure:
-                why_not |= {one.case.number: failure for one in able}
+        for first in range(0, len(able), AT_ONCE):
+            _by_kernel(cases, able[first : first + AT_ONCE], kernel, watch, rows, why_not)
     for one in valid:
         if one.case.number not in rows:
             rows[one.case.number] = _by_reference(cases, one, why_not[one.case.number], watch)
@@ -119,24 +122,36 @@ def _lacks(kernel: Kernel, scenario: Scenario) -> str:
 
 
 def _by_kernel(
-    cases: Cases, valid: Sequence[Valid], kernel: Kernel, watch: Watch
-) -> tuple[dict[int, Row], str]:
-    """Rows, and why there are none: then the reference shows which case is at fault."""
+    cases: Cases,
+    valid: Sequence[Valid],
+    kernel: Kernel,
+    watch: Watch,
+    rows: dict[int, Row],
+    why_not: dict[int, str],
+) -> None:
+    """Add rows; where a case makes the kernel fail, that one has none, and why."""
     began_s = SYSTEM_CLOCK.monotonic_s()
+    failure = ""
+    brought: Sequence[Brought] = ()
     try:
         scenarios = [one.scenario for one in valid]
         brought = kernel.run(scenarios, cases.quantities.signals, watch.begin(len(valid)))
     except Exception as error:
-        watch.end()
-        return {}, f"the kernel failed: {_described(error)}"
+        failure = f"the kernel failed: {_described(error)}"
     if watch.end():
-        return {}, f"the kernel {watch.reason}"
-    share_s = (SYSTEM_CLOCK.monotonic_s() - began_s) / len(valid)
-    rows = {
-        one.case.number: _judged(cases, one, outcome, KERNEL, "", share_s)
-        for one, outcome in zip(valid, brought, strict=True)
-    }
-    return rows, ""
+        failure = f"the kernel {watch.reason}"
+    if not failure:
+        share_s = (SYSTEM_CLOCK.monotonic_s() - began_s) / len(valid)
+        for one, outcome in zip(valid, brought, strict=True):
+            engine = REFERENCE if outcome.left_course else KERNEL
+            row = _judged(cases, one, outcome, engine, outcome.left_course, share_s)
+            rows[one.case.number] = row
+    elif len(valid) == 1:
+        why_not[valid[0].case.number] = failure
+    else:
+        middle = len(valid) // 2
+        for half in (valid[:middle], valid[middle:]):
+            _by_kernel(cases, half, kernel, watch, rows, why_not)
 
 
 def _by_reference(cases: Cases, one: Valid, why_not: str, watch: Watch) -> Row:

@@ -9,6 +9,9 @@ Dask's own messages go to a file in the study's folder, never to the terminal.
 
 import logging
 import os
+import re
+import signal
+import socket
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -17,13 +20,14 @@ from pathlib import Path
 from typing import Any
 
 from configs.errors import InfrastructureError, ScenarioError
+from fleetloop.sweep import worker_start
 from fleetloop.sweep.versions import mismatch, versions_here
 
 LOG = "dask.log"
-NEEDS = "fleetloop sweep needs Dask: pip install 'fleetloop[sweep]'"
-START_S, ANSWER_S, CLOSE_S = 60.0, 10.0, 5.0
+_LOGGERS = ("distributed", "tornado")
+START_S, ANSWER_S, CLOSE_S = 60.0, 10.0, 15.0
+_ADDRESS = re.compile(r"(tcp|tls)://(?P<host>\[[^]]+\]|[^:/]+):(?P<port>\d{1,5})")
 _SETTINGS: dict[str, Any] = {
-    "logging.distributed": "error",
     # What a worker is killed for is said, and its cases are computed again; a worker that only
     # pauses would stand still for ever.
     "distributed.worker.memory.target": False,
@@ -71,20 +75,15 @@ def client_of(place: Place, folder: Path) -> Iterator[Any]:
     """A Dask client whose workers are there, with this program's versions.
 
     Raises:
-        ScenarioError: Dask isn't there, or the address or a file is none.
+        ScenarioError: the address or a file is none.
         InfrastructureError: the scheduler doesn't answer, or workers have other versions.
     """
-    try:
-        import dask
-    except ImportError:
-        raise ScenarioError(NEEDS) from None
+    import dask
+    import distributed  # before its settings are changed: it brings its own
+
     with ExitStack() as stack:
-        stack.enter_context(dask.config.set(_SETTINGS))
-        try:
-            import distributed
-        except ImportError:
-            raise ScenarioError(NEEDS) from None
         stack.enter_context(_logged(folder / LOG))
+        stack.enter_context(dask.config.set(_SETTINGS))
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore")  # of Dask; what matters is checked below
         if place.scheduler is None:
@@ -99,20 +98,23 @@ def _here(distributed: Any, place: Place, folder: Path, stack: ExitStack) -> Any
     security = distributed.Security.temporary()
     scratch = folder / ".dask"
     try:
-        cluster = distributed.LocalCluster(
-            n_workers=place.workers,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            protocol="tls://",
-            security=security,
-            silence_logs=False,
-            dashboard_address="127.0.0.1:0",
-            scheduler_kwargs={"dashboard": False},
-            memory_limit=place.memory,
-            local_directory=str(scratch),
-            death_timeout=START_S,
-        )
+        with _without_ctrl_c():
+            cluster = distributed.LocalCluster(
+                n_workers=place.workers,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                protocol="tls://",
+                security=security,
+                silence_logs=False,
+                dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False},
+                memory_limit=place.memory,
+                local_directory=str(scratch),
+                death_timeout=START_S,
+                preload=[worker_start.__name__],
+                env={worker_start.LOG: str((folder / LOG).resolve())},
+            )
     except ValueError as error:
         raise ScenarioError(f"--memory {place.memory}: {error}") from error
     except (OSError, RuntimeError) as error:
@@ -124,7 +126,18 @@ def _here(distributed: Any, place: Place, folder: Path, stack: ExitStack) -> Any
     return client
 
 
+@contextmanager
+def _without_ctrl_c() -> Iterator[None]:
+    """Threads and processes that begin meanwhile never get Ctrl-C; this thread gets it later."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _elsewhere(distributed: Any, place: Place, address: str, stack: ExitStack) -> Any:
+    _check_address(address)
     security = None
     if place.tls.given:
         for path in (place.tls.ca, place.tls.certificate, place.tls.key):
@@ -141,14 +154,32 @@ def _elsewhere(distributed: Any, place: Place, address: str, stack: ExitStack) -
             address, timeout=ANSWER_S, security=security, set_as_default=False
         )
     except (OSError, TimeoutError) as error:
-        why = "" if isinstance(error, TimeoutError) else f": {error}"
         raise InfrastructureError(
-            f"--scheduler {address}: no scheduler answers there within {ANSWER_S:g} s{why}"
+            f"--scheduler {address}: answers, but not as a Dask scheduler: {error}"
         ) from error
     except (ValueError, TypeError, RuntimeError) as error:
         raise ScenarioError(f"--scheduler {address}: {error}") from error
     stack.callback(_close, client)
     return client
+
+
+def _check_address(address: str) -> None:
+    """Refuse what is no address, or where nobody listens.
+
+    Raises:
+        ScenarioError: it is none.
+        InfrastructureError: nobody answers.
+    """
+    found = _ADDRESS.fullmatch(address)
+    if found is None:
+        remedy = "must be tcp://HOST:PORT or tls://HOST:PORT, for example tcp://192.168.1.2:8786"
+        raise ScenarioError(f"--scheduler {address}: {remedy}")
+    try:
+        place = (found["host"].strip("[]"), int(found["port"]))
+        socket.create_connection(place, timeout=ANSWER_S).close()
+    except (OSError, OverflowError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise InfrastructureError(f"--scheduler {address}: no scheduler there: {why}") from error
 
 
 def _check_versions(client: Any) -> None:
@@ -181,25 +212,25 @@ def _check_versions(client: Any) -> None:
 
 @contextmanager
 def _logged(path: Path) -> Iterator[None]:
-    """Dask's messages go to a file while this lasts."""
-    names = [
-        name for name in logging.root.manager.loggerDict if name.split(".")[0] == "distributed"
-    ]
-    loggers = [logging.getLogger(name) for name in {*names, "distributed"}]
-    before = [(one, one.handlers[:], one.propagate, one.level) for one in loggers]
+    """Dask's messages go to a file while this lasts, and nowhere afterwards.
+
+    What is said when all is over, as of a worker that was about to start, is of no use to anybody.
+    """
+    known = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in _LOGGERS]
+    for name in {*known, *_LOGGERS}:
+        logger = logging.getLogger(name)
+        logger.handlers = []
+        logger.propagate = name not in _LOGGERS
+        logger.setLevel(logging.WARNING if name in _LOGGERS else logging.NOTSET)
     handler = logging.FileHandler(path, delay=True)
     handler.setFormatter(logging.Formatter("%(asctime)s %(name)s %(levelname)s %(message)s"))
-    for logger in loggers:
-        logger.handlers = []
-        logger.propagate = logger.name != "distributed"
-        logger.setLevel(logging.WARNING if logger.name == "distributed" else logging.NOTSET)
-    logging.getLogger("distributed").handlers = [handler]
+    for name in _LOGGERS:
+        logging.getLogger(name).handlers = [handler]
     try:
         yield
     finally:
-        for logger, handlers, propagate, level in before:
-            logger.handlers, logger.propagate = handlers, propagate
-            logger.setLevel(level)
+        for name in _LOGGERS:
+            logging.getLogger(name).handlers = [logging.NullHandler()]
         handler.close()
 
 

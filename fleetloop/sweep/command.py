@@ -6,7 +6,9 @@ worst/case-*/                      whole runs of the worst cases
 sweep.json                         counts, failure rate and its interval, how long it took
 """
 
+import shutil
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,7 @@ import numpy as np
 
 from bridge.process.clock import SYSTEM_CLOCK
 from bridge.process.lifecycle import Stop
-from configs.errors import ExitStatus, InfrastructureError, ScenarioError
+from configs.errors import ExitStatus, FleetloopError, InfrastructureError, ScenarioError
 from fleetloop.jobs import pool
 from fleetloop.results import run_folder
 from fleetloop.results.summary import finite, to_json
@@ -24,7 +26,8 @@ from fleetloop.sweep import study as studies
 from fleetloop.sweep.cases import Cases
 from fleetloop.sweep.cluster import Place, client_of
 from fleetloop.sweep.dataset import PARTS, Dataset, read
-from fleetloop.sweep.engine import Engine
+from fleetloop.sweep.engine import Engine, Pace
+from fleetloop.sweep.extra import PACKAGES, require
 from fleetloop.sweep.plan import STUDY, Plan
 from fleetloop.sweep.progress import Meter
 from fleetloop.sweep.stopping import Tally, decided
@@ -55,12 +58,27 @@ def begin(source: str, cases: int | None, seed: int | None, out: Path | None, wa
         ScenarioError: the study, its base or an option is wrong; nothing was started.
         InfrastructureError: a file, a process or a cluster can't be had.
     """
+    require(*PACKAGES)
     plan = Plan.of(source, cases=cases, seed=seed)
     checked = Cases(plan, source)
     name = f"{Path(source).stem}-sweep"
     created = run_folder.create(name, out, SYSTEM_CLOCK.wall_ns())
     plan.save(created.path)
-    return _go(created.path, checked, ways)
+    try:
+        return _go(created.path, checked, ways)
+    except FleetloopError:
+        _discard_if_empty(created)
+        raise
+
+
+def _discard_if_empty(created: run_folder.Created) -> None:
+    """Remove the folder of a study that has no row."""
+    if not any((created.path / PARTS).glob("part-*")):
+        for path in list(created.path.iterdir()):
+            shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+        with suppress(OSError):
+            for folder in created.new:
+                folder.rmdir()
 
 
 def resume(folder: Path, cases: int | None, seed: int | None, ways: Ways) -> int:
@@ -76,6 +94,7 @@ def resume(folder: Path, cases: int | None, seed: int | None, ways: Ways) -> int
         ScenarioError: there is none, or an option doesn't go with it.
         InfrastructureError: a file, a process or a cluster can't be had.
     """
+    require(*PACKAGES)
     plan = Plan.resume(folder)
     if seed is not None and seed != plan.study.seed:
         raise ScenarioError(f"--seed {seed}: this study was begun with seed {plan.study.seed}")
@@ -117,8 +136,7 @@ class _Work:
     invalid: str = ""
     """Why the first case is invalid, where that ends the study."""
     wall_s: float = 0.0
-    busy_s: float = 0.0
-    computed: int = 0
+    pace: Pace = field(default_factory=Pace)
     workers: int = 0
 
     def do(self, stop: Stop) -> None:
@@ -141,8 +159,8 @@ class _Work:
                     engine.compute(map(int, left), len(left), stop, self.look)
                 finally:
                     self.wall_s = SYSTEM_CLOCK.monotonic_s() - began_s
-                    self.busy_s, self.computed = engine.pace.busy_s, engine.pace.cases
-                    self.workers = engine.threads
+                    self.pace = engine.pace
+                    self.workers = engine.most_threads
 
     def take(self, batch: Any) -> bool:
         """Keep rows that came; whether that's enough."""
@@ -235,7 +253,7 @@ def _numbers(work: _Work, interrupted: bool) -> dict[str, Any]:
     rate = work.tally.rate(study.stop.confidence)
     everything = work.tally.rate_of_all(study.stop.confidence)
     shown = rate if study.stop.failure_rate_within is not None and work.ended else everything
-    overhead_s = work.wall_s * work.workers - work.busy_s
+    pace = work.pace
     done = int(work.dataset.done.sum())
     return {
         "study": study.title,
@@ -250,13 +268,11 @@ def _numbers(work: _Work, interrupted: bool) -> dict[str, Any]:
         "failure_rate_interval": list(shown.interval),
         "confidence": study.stop.confidence,
         "judged": shown.judged,
-        "computed": work.computed,
+        "computed": pace.cases,
         "wall_s": round(work.wall_s, 3),
-        "cases_per_s": round(work.computed / work.wall_s, 3) if work.wall_s > 0 else None,
+        "cases_per_s": round(pace.cases / work.wall_s, 3) if work.wall_s > 0 else None,
         "workers": work.workers,
-        "overhead_ms_per_case": round(1e3 * overhead_s / work.computed, 3)
-        if work.computed
-        else None,
+        "wait_ms_per_case": round(1e3 * pace.idle_s / pace.followed, 3) if pace.followed else None,
     }
 
 
@@ -275,7 +291,7 @@ def _say(work: _Work, numbers: dict[str, Any]) -> None:
         )
     if engines := ", ".join(f"{n} {engine}" for engine, n in numbers["engines"].items()):
         say(f"engine   {engines}")
-    if work.computed:
+    if work.pace.cases:
         say(
             f"took     {numbers['wall_s']:.1f} s with {numbers['workers']} workers:"
             f" {numbers['cases_per_s']:.1f} cases a second"

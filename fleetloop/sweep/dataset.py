@@ -25,6 +25,7 @@ import numpy as np
 from configs.errors import InfrastructureError, ScenarioError
 from fleetloop.sweep.cases import Cases
 from fleetloop.sweep.draws import Graphs, Value
+from fleetloop.sweep.extra import require
 from fleetloop.terminal import note
 
 if TYPE_CHECKING:
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 PARTS, LOCK = "parts", ".lock"
 FORMAT = 1
 KEY = b"fleetloop"
-NEEDS = "fleetloop sweep needs pyarrow: pip install 'fleetloop[sweep]'"
 VERDICTS = ("held", "failed", "not checked", "invalid", "error")
 
 
@@ -262,8 +262,12 @@ def _number(value: float | None) -> float | None:
 
 
 def _arrow() -> Any:
-    try:
-        import pyarrow as pa
-    except ImportError:
-        raise ScenarioError(NEEDS) from None
+    """Of the extra `sweep` (`fleetloop.sweep.extra`).
+
+    Raises:
+        ScenarioError: it isn't there.
+    """
+    require("pyarrow")
+    import pyarrow as pa
+
     return pa

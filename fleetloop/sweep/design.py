@@ -14,11 +14,9 @@ from math import ceil, log2
 
 import numpy as np
 
-from configs.errors import ScenarioError
 from fleetloop.sweep.draws import Draw, Value
+from fleetloop.sweep.extra import require
 from fleetloop.sweep.study import Study
-
-NEEDS = "fleetloop sweep needs SciPy for this design: pip install 'fleetloop[sweep]'"
 
 
 class Design:
@@ -62,10 +60,9 @@ def _samples(design: str, factors: int, cases: int, seed: int) -> np.ndarray:
     Raises:
         ScenarioError: SciPy isn't there.
     """
-    try:
-        from scipy.stats import qmc
-    except ImportError:
-        raise ScenarioError(NEEDS) from None
+    require("scipy")
+    from scipy.stats import qmc
+
     rng = np.random.default_rng(np.random.SeedSequence(seed))
     made: np.ndarray
     if design == "sobol":

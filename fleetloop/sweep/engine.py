@@ -53,15 +53,21 @@ class Pace:
     """How many cases a chunk has, by what the last ones took."""
 
     size: int = 1
-    busy_s: float = 0.0
-    """Of all workers together."""
     cases: int = 0
+    idle_s: float = 0.0
+    """Of all workers together, between two chunks."""
+    followed: int = 0
+    """Cases of the chunks before which these waits were."""
+    _ended_s: dict[int, float] = field(default_factory=dict)
 
-    def take(self, cases: int, busy_s: float) -> None:
-        """A chunk of so many cases took so long."""
-        self.busy_s += busy_s
+    def take(self, cases: int, done: Done) -> None:
+        """A chunk of so many cases is done."""
         self.cases += cases
-        each_s = max(busy_s / cases, 1e-9)
+        if (last_s := self._ended_s.get(done.process)) is not None:
+            self.idle_s += max(0.0, done.began_s - last_s)
+            self.followed += cases
+        self._ended_s[done.process] = done.ended_s
+        each_s = max(done.busy_s / cases, 1e-9)
         fitting = max(int(CHUNK_S / each_s), min(int(LONGEST_S / each_s), FEW_CASES))
         self.size = max(1, min(fitting, max(self.size, cases) * FASTEST_GROWTH, MOST_CASES))
 
@@ -86,7 +92,8 @@ class Engine:
     clock: Clock = SYSTEM_CLOCK
     pace: Pace = field(default_factory=Pace)
     threads: int = 1
-    """Of all workers."""
+    """Of all workers now."""
+    most_threads: int = 1
     _running: dict[Any, Chunk] = field(default_factory=dict)
     _again: deque[Chunk] = field(default_factory=deque)
     _suspects: deque[Chunk] = field(default_factory=deque)
@@ -191,10 +198,11 @@ class Engine:
             except (OSError, TimeoutError):  # its worker ended meanwhile
                 self._again.append(chunk)
                 return False
-            self.pace.take(len(chunk.numbers), done.busy_s)
+            self.pace.take(len(chunk.numbers), done)
             return self.on_rows(done.rows)
-        if future.status != "error":
-            raise InfrastructureError(f"the scheduler has dropped a task ({future.status})")
+        if future.status != "error":  # done, and lost with its worker before it was fetched
+            self._again.append(chunk)
+            return False
         error = future.exception(timeout=ANSWER_S)
         if isinstance(error, VersionMismatchError):
             raise InfrastructureError(f"a worker has other versions: {error}")
@@ -241,6 +249,7 @@ class Engine:
             raise InfrastructureError(f"the scheduler has gone: {error}") from error
         if threads:
             self.threads, self._seen_s = threads, now_s
+            self.most_threads = max(self.most_threads, threads)
         elif now_s - self._seen_s > NO_WORKER_S:
             raise InfrastructureError(f"no worker for {NO_WORKER_S:g} s")
 

@@ -113,8 +113,9 @@ class Quantities:
 def _reason(verdict: str, judged: Sequence[Judged], stopped: Mapping[str, str]) -> str:
     if verdict == "not checked":
         return expectations.why_not_checked(judged, {})
-    why = [f"{robot}: {reason}" for robot, reason in stopped.items()]
-    return "; ".join(why + [claim(one) for one in judged if one["held"] is False])
+    if stopped:
+        return "; ".join(f"{robot}: {reason}" for robot, reason in stopped.items())
+    return "; ".join(claim(one) for one in judged if one["held"] is False)
 
 
 def _value(one: Quantity, record: Record, scenario: Scenario) -> float | None:

@@ -1,10 +1,13 @@
 """What a worker does: the rows of some cases of a plan."""
 
+import gc
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bridge.process.clock import SYSTEM_CLOCK
-from bridge.process.lifecycle import settled_memory
 from fleetloop.sweep.batch import kernel_here, rows_of
 from fleetloop.sweep.cases import cases_of
 from fleetloop.sweep.dataset import Columns
@@ -25,8 +28,16 @@ class Done:
     """What came of some cases."""
 
     rows: "pa.RecordBatch"
-    busy_s: float
-    """Wall time of all of it."""
+    began_s: float
+    ended_s: float
+    """By the worker's own monotonic clock."""
+    process: int
+    """Of the worker."""
+
+    @property
+    def busy_s(self) -> float:
+        """Wall time of all of it."""
+        return self.ended_s - self.began_s
 
 
 def work(plan: Plan, numbers: tuple[int, ...], asked: Versions, *, kernel: bool) -> Done:
@@ -45,7 +56,18 @@ def work(plan: Plan, numbers: tuple[int, ...], asked: Versions, *, kernel: bool)
         raise VersionMismatchError(differs)
     began_s = SYSTEM_CLOCK.monotonic_s()
     cases = cases_of(plan)
-    with settled_memory(), Watch(cases.study.limit_s) as watch:
+    with _rare_collection(), Watch(cases.study.limit_s) as watch:
         rows = rows_of(cases, numbers, watch, kernel_here() if kernel else None)
     batch = Columns(cases).batch(rows)
-    return Done(batch, SYSTEM_CLOCK.monotonic_s() - began_s)
+    return Done(batch, began_s, SYSTEM_CLOCK.monotonic_s(), os.getpid())
+
+
+@contextmanager
+def _rare_collection() -> Iterator[None]:
+    """Collect garbage rarely: what a run allocates is freed by its reference counts."""
+    thresholds = gc.get_threshold()
+    gc.set_threshold(50_000, 50, 100)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*thresholds)

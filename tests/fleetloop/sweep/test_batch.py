@@ -77,14 +77,27 @@ def test_the_engine_is_chosen_for_each_case() -> None:
     assert [row.values for row in rows] == [row.values for row in plain]
 
 
-def test_a_kernel_that_fails_leaves_its_cases_to_the_reference() -> None:
-    def broken(*_: object):
-        raise FloatingPointError("overflow")
+def test_a_case_that_makes_the_kernel_fail_is_the_references_and_no_other() -> None:
+    def broken(scenarios: Sequence[Scenario], signals: object, stop: Stop):
+        if any(scenario.coordination.p == 1.0 for scenario in scenarios):
+            raise FloatingPointError("overflow")
+        return reference(scenarios, signals, stop)
 
-    rows = rows_of(cases_of(GRID + P + FEW), range(3), Watch(300.0), Kernel(lambda _: "", broken))
+    kernel = Kernel(lambda _: "", broken)
+    rows = rows_of(cases_of(GRID + P + FEW), range(3), Watch(300.0), kernel)
     assert [row.verdict for row in rows] == ["held"] * 3
-    assert {row.engine for row in rows} == {REFERENCE}
-    assert all("the kernel failed: FloatingPointError: overflow" in it.engine_reason for it in rows)
+    assert [row.engine for row in rows] == [KERNEL, REFERENCE, KERNEL]
+    assert rows[1].engine_reason.startswith("the kernel failed: FloatingPointError: overflow")
+
+
+def test_a_case_that_the_kernel_hands_on_says_why() -> None:
+    def handing(scenarios: Sequence[Scenario], signals: object, stop: Stop):
+        runs = reference(scenarios, signals, stop)
+        return [run._replace(left_course="a robot stopped") for run in runs]
+
+    kernel = Kernel(lambda _: "", handing)
+    rows = rows_of(cases_of(GRID + P + FEW), [0], Watch(300.0), kernel)
+    assert (rows[0].engine, rows[0].engine_reason) == (REFERENCE, "a robot stopped")
 
 
 def test_a_case_that_takes_too_long_is_an_error_and_the_next_one_has_its_own_time() -> None:

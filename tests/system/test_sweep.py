@@ -1,0 +1,261 @@
+"""Sweeps over real processes, killed here and there: no case is lost, none is done twice."""
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import psutil
+import pyarrow.parquet
+import pytest
+from support.sweeping import cases_in, cluster, sweeping
+
+from fleetloop.packages import HOME, NAMES
+
+pytestmark = [pytest.mark.system, pytest.mark.timeout(400)]
+
+CASES = 40
+STUDY = f"""
+schema = 1
+title = "short"
+base = "two_robots"
+design = "random"
+cases = {CASES}
+set = [
+    "until_s=0.2",
+    "expect.0.from_s=0.1", "expect.0.max_abs=0.2",
+    "expect.1.from_s=0.1", "expect.1.max_abs=0.2",
+]
+[[factor]]
+name = "mass_kg"
+key = "robot_types.etsro.body_mass_kg"
+uniform = [1.0, 4.0]
+[keep]
+quantities = ["peak_x_e_m"]
+"""
+SAID = re.compile(
+    r"short: \d+ of \d+ cases.*|worker \S+ has ended.*|interrupted by .*: go on with .*"
+)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "study.toml").write_text(STUDY, "utf-8")
+    return tmp_path
+
+
+def assert_every_case_once(out: Path, cases: int = CASES) -> None:
+    assert sorted(cases_in(out)) == list(range(cases))
+
+
+def assert_gone(processes: Sequence[psutil.Process], within_s: float = 5.0) -> None:
+    _, alive = psutil.wait_procs(processes, timeout=within_s)
+    assert alive == []
+
+
+def test_a_worker_that_is_killed_loses_no_case_and_all_of_it_is_on_loopback(folder: Path) -> None:
+    with sweeping(folder, "study.toml", "--workers", "2") as sweep:
+        sweep.await_rows(3)
+        family = [sweep.main, *sweep.family()]
+        places = {
+            connection.laddr.ip
+            for process in family
+            for connection in process.net_connections()
+            if connection.status == psutil.CONN_LISTEN
+        }
+        assert places == {"127.0.0.1"}
+        sweep.workers()[0].kill()
+        status, out = sweep.end()
+    assert (status, out.splitlines()[0]) == (0, f"short: {CASES} of {CASES} cases: {CASES} held")
+    assert_every_case_once(sweep.out)
+    said = sweep.errors.read_text().splitlines()
+    assert [line for line in said if not SAID.fullmatch(line)] == []
+    assert any("has ended; its cases are computed again" in line for line in said)
+    assert_gone(family)
+
+
+def test_a_worker_of_a_cluster_that_is_killed_loses_no_case(folder: Path) -> None:
+    with (
+        cluster(folder, workers=2) as dask,
+        sweeping(folder, "study.toml", "--scheduler", dask.address) as sweep,
+    ):
+        sweep.await_rows(3)
+        dask.processes[-1].kill()
+        status, _ = sweep.end()
+        assert dask.processes[0].poll() is None  # what the user has goes on
+    assert status == 0
+    assert_every_case_once(sweep.out)
+
+
+def test_a_command_that_is_killed_leaves_no_process_and_its_study_goes_on(folder: Path) -> None:
+    with sweeping(folder, "study.toml", "--workers", "2") as sweep:
+        sweep.await_rows(3)
+        family = sweep.family()
+        sweep.kill()
+        sweep.end()
+        assert_gone(family)
+    before = {part.name: part.read_bytes() for part in (sweep.out / "parts").glob("part-*.parquet")}
+    done = len(cases_in(sweep.out))
+    assert 3 <= done < CASES
+    with sweeping(folder, "--resume", "out", "--json") as again:
+        status, out = again.end()
+    assert status == 0
+    assert_every_case_once(sweep.out)
+    assert f'"computed": {CASES - done},' in out
+    after = {name: (sweep.out / "parts" / name).read_bytes() for name in before}
+    assert after == before
+
+
+def test_ctrl_c_keeps_what_is_done_and_leaves_no_process(folder: Path) -> None:
+    with sweeping(folder, "study.toml", "--workers", "2") as sweep:
+        sweep.await_rows(3)
+        family = sweep.family()
+        sweep.interrupt()
+        status, out = sweep.end()
+        assert_gone(family)
+    said = sweep.errors.read_text().splitlines()
+    assert status == 130
+    assert "interrupted by SIGINT: go on with fleetloop sweep --resume out" in said
+    assert [line for line in said if not SAID.fullmatch(line)] == []
+    done = cases_in(sweep.out)
+    assert len(done) == len(set(done)) >= 3
+    assert out.startswith(f"short: {len(done)} of {CASES} cases: {len(done)} held")
+
+
+MORTAL = '''
+import os
+import signal
+
+from agents.laws.adaptive_dsc import AdaptiveDsc
+
+
+class Mortal(AdaptiveDsc):
+    """Kills its process, or takes all its memory."""
+
+    def __init__(self, gains, *args, **kwargs):
+        super().__init__(gains, *args, **kwargs)
+        self.deadly, self.lot = gains.k1, []
+
+    def step(self, *args, **kwargs):
+        if self.deadly == 7.0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        if self.deadly == 8.0:
+            self.lot.append(bytearray(b"x" * (8 << 20)))
+        return super().step(*args, **kwargs)
+'''
+DEADLY = """
+schema = 1
+title = "short"
+base = "two_robots"
+design = "grid"
+set = [
+    "until_s=0.4", "control.law=mortal:Mortal",
+    "expect.0.from_s=0.1", "expect.0.max_abs=0.2",
+    "expect.1.from_s=0.1", "expect.1.max_abs=0.2",
+]
+[[factor]]
+key = "control.k1"
+values = [{values}]
+[keep]
+quantities = []
+"""
+
+
+@pytest.mark.parametrize(("deadly", "more"), [(7.0, ()), (8.0, ("--memory", "600MiB"))])
+def test_a_case_that_ends_its_worker_is_an_error_and_the_others_are_done(
+    folder: Path, deadly: float, more: tuple[str, ...]
+) -> None:
+    (folder / "mortal.py").write_text(MORTAL, "utf-8")
+    values = [2.0 + 0.01 * n for n in range(11)] + [deadly]
+    text = DEADLY.format(values=", ".join(f"{value:.2f}" for value in values))
+    (folder / "deadly.toml").write_text(text, "utf-8")
+    with sweeping(folder, "deadly.toml", "--workers", "2", *more) as sweep:
+        status, out = sweep.end()
+    assert status == 1
+    assert out.startswith("short: 12 of 12 cases: ")
+    assert_every_case_once(sweep.out, 12)
+    rows = pyarrow.parquet.read_table(sweep.out / "parts").to_pylist()
+    verdicts = {row["k1"]: row["verdict"] for row in rows}
+    assert [k1 for k1, verdict in verdicts.items() if verdict == "error"] == [deadly]
+    (reason,) = (row["reason"] for row in rows if row["verdict"] == "error")
+    assert reason.startswith("its worker ended 2 times while it computed this case alone")
+    if more:
+        assert "out of memory at" in sweep.errors.read_text()
+
+
+def test_a_worker_of_another_program_is_refused(folder: Path) -> None:
+    other = folder / "other"
+    for package in ("fleetloop", *NAMES):
+        shutil.copytree(HOME / package, other / package)
+    with (other / "fleetloop" / "sweep" / "batch.py").open("a") as file:
+        file.write("# another\n")
+    with (
+        cluster(folder, workers=1, PYTHONPATH=str(other)) as dask,
+        sweeping(folder, "study.toml", "--scheduler", dask.address) as sweep,
+    ):
+        status, _ = sweep.end()
+    said = sweep.errors.read_text().splitlines()[-1]
+    assert status == 3
+    assert re.fullmatch(
+        r"fleetloop: (worker \S+ has|a worker has) other versions: sources \w+, here \w+.*", said
+    )
+    assert not os.path.exists(sweep.out)  # noqa: PTH110
+
+
+def test_where_no_scheduler_is_nothing_is_begun(folder: Path) -> None:
+    with sweeping(folder, "study.toml", "--scheduler", "tcp://127.0.0.1:1") as sweep:
+        status, _ = sweep.end()
+    said = sweep.errors.read_text().splitlines()[-1]
+    assert status == 3
+    assert (
+        said == "fleetloop: --scheduler tcp://127.0.0.1:1: no scheduler there: Connection refused"
+    )
+    assert not sweep.out.exists()
+
+
+RATE = """
+schema = 1
+title = "short"
+base = "two_robots"
+design = "random"
+cases = 400
+set = ["until_s=0.1", "expect.0.from_s=0.05", "expect.1.from_s=0.05"]
+{more}
+[[factor]]
+key = "expect.0.max_abs"
+uniform = [{least}, 0.2]
+[keep]
+quantities = []
+[stop]
+failure_rate_within = 0.2
+least_cases = 10
+"""
+
+
+def test_a_study_ends_when_its_failure_rate_is_known_and_goes_on_when_asked(folder: Path) -> None:
+    (folder / "rate.toml").write_text(RATE.format(more="", least=0.0), "utf-8")
+    with sweeping(folder, "rate.toml", "--json") as sweep:
+        status, out = sweep.end()
+    told = json.loads(out)
+    least, most = told["failure_rate_interval"]
+    assert status == 0
+    assert told["done"] < told["cases"] == 400
+    assert told["ended"].startswith("the failure rate is ")
+    assert 0.5 * (most - least) <= 0.2
+    assert least < 0.5 < most  # |x_e| is 0.1 m, the bound is drawn from 0 to 0.2 m
+    assert told["counts"]["failed"] + told["counts"]["held"] == told["done"]
+    assert len(cases_in(sweep.out)) == told["done"]
+    assert json.loads((sweep.out / "sweep.json").read_text())["done"] == told["done"]
+
+
+def test_an_invalid_case_ends_a_study_that_asks_for_that(folder: Path) -> None:
+    text = RATE.format(more='invalid = "stop"', least=-5.0)
+    (folder / "rate.toml").write_text(text, "utf-8")
+    with sweeping(folder, "rate.toml") as sweep:
+        status, _ = sweep.end()
+    said = sweep.errors.read_text().splitlines()[-1]
+    assert status == 2
+    assert re.match(r"fleetloop: case \d+: max_abs = -\d\.\d+: must be 0 or more", said)
+    assert cases_in(sweep.out)
