@@ -136,13 +136,11 @@ def matrix_exponential(a: Matrix) -> Matrix:
 
 def _product(a: Matrix, b: Matrix) -> Matrix:
     size = len(a)
-    product = []
+    product = [[0.0] * size for _ in range(size)]
     for i in range(size):
-        row = []
-        for j in range(size):
-            total = 0.0
-            for k in range(size):
-                total += a[i][k] * b[k][j]
-            row.append(total)
-        product.append(row)
+        row, of = product[i], a[i]
+        for k in range(size):
+            factor, by = of[k], b[k]
+            for j in range(size):
+                row[j] += factor * by[j]
     return product

@@ -89,9 +89,7 @@ def _shifted_cosine(path: Cosine, offset: World) -> RobotPath:
     return reference_at
 
 
-def cosine_numbers(
-    path: Cosine, offset: World
-) -> tuple[float, float, float, float, float, float]:
+def cosine_numbers(path: Cosine, offset: World) -> tuple[float, float, float, float, float, float]:
     """What `cosine_reference` takes beside s."""
     a, k = path.amplitude_m, path.wavenumber_rad_m
     x_0, y_0 = path.start_m[0] + offset.x_m, path.start_m[1] + offset.y_m

@@ -145,6 +145,11 @@ class Channel(Generic[Message]):
             else:
                 self._await(now_ns, left_ns + copy_delay_ns, message)
 
+    @property
+    def next_due_ns(self) -> int | None:
+        """When the next message arrives, None if none is under way."""
+        return self._due[0][0] if self._due else None
+
     def receive(self, now_ns: int, *, exists: bool = True) -> list[Delivery[Message]]:
         """The messages that are due, in the order in which they arrive.
 

@@ -1,9 +1,9 @@
 """The loop, compiled: once for each text of its sources, kept on disk for other processes.
 
-The linked module (`fleetloop.sweep.kernel.linking`) is written to a folder that has the digest of its
-text in its name, and numba keeps the machine code beside it: a change of any equation is another
-text, so another folder, and stale code is never taken. numba itself looks at its own version and at
-the processor.
+The linked module (`fleetloop.sweep.kernel.linking`) is written to a folder that has the digest of
+its text in its name, and numba keeps the machine code beside it: a change of any equation is
+another text, so another folder, and stale code is never taken. numba itself looks at its own
+version and at the processor.
 
     FLEETLOOP_CACHE    the folder of these folders; if not given $XDG_CACHE_HOME/fleetloop, that is
                        ~/.cache/fleetloop. Where it can't be written each process compiles anew.
@@ -36,7 +36,7 @@ from __future__ import annotations
 
 from numba import njit
 
-_equation = njit(error_model="numpy", nogil=True)
+_equation = njit(error_model="numpy", nogil=True, forceinline=True)
 _loop = njit(error_model="numpy", nogil=True, cache=True)
 '''
 

@@ -6,18 +6,19 @@ at all: what is added to scenarios goes to the in-process reference until the ke
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, fields
-from functools import lru_cache
+from functools import cache, lru_cache
+from importlib.util import find_spec
 from typing import Any, Final
 
 from agents.laws.gains import AdaptiveDscGains, AdaptiveDscRobustGains
 from configs import paths, sections
 from configs.drives import DEFAULT, Drive
+from configs.edges import LEADER
 from configs.graph_section import GraphSection
 from configs.host import Host
-from configs.netem import Effects
+from configs.netem import LOCALISATION, EdgeEffects, Effects
 from configs.parameters import Parameters
 from configs.plugins import LAWS, Choice
-from configs.resolve import pose_age_limit_s, schedule
 from configs.scenario import Scenario
 
 Reason = Callable[[Any], str]
@@ -58,6 +59,20 @@ _DRIVE: Final[Mapping[str, Reason]] = {
     **_all_of("position_gain_1_s under_voltage_V over_voltage_V derate_from_C derate_to_C"),
     **_all_of("spinout_power_W firmware boot_s calibration_s estop_blocks_arming"),
 }
+
+
+def _between_robots(edges: tuple[str, ...]) -> str:
+    sources = {text.partition("->")[0].strip() for text in edges}
+    if others := sources & {LEADER, LOCALISATION}:
+        return f"an emulated edge from the {min(others)}"
+    return ""
+
+
+_EFFECTS: Final = {
+    **_all_of("delay reordering loss duplication bandwidth_bit_s message_bytes queue_messages"),
+    "partitions": _any,
+    "distance": _only(None, "losses by distance"),
+}
 _KEYS: Final[Mapping[type[Parameters], Mapping[str, Reason]]] = {
     sections.Clock: {
         "mode": _only("lockstep", "real time"),
@@ -75,8 +90,7 @@ _KEYS: Final[Mapping[type[Parameters], Mapping[str, Reason]]] = {
     sections.Leader: _all_of("speed_m_s steps"),
     sections.SpeedStep: _all_of("t_s speed_m_s ramp_s"),
     GraphSection: {
-        **_all_of("edges generator adjacency file weights max_in_degree seed leader"),
-        "switch": _only((), "a graph that switches"),
+        **_all_of("edges generator adjacency file weights max_in_degree seed leader switch"),
     },
     AdaptiveDscGains: _GAINS,
     AdaptiveDscRobustGains: {**_GAINS, **_all_of("v_bar_limit_m_s torque_limit_wheel_N_m")},
@@ -104,8 +118,7 @@ _KEYS: Final[Mapping[type[Parameters], Mapping[str, Reason]]] = {
     sections.Disturbance: _all_of("amplitude_wheel_N_m rate_rad_s"),
     sections.Network: {
         "endpoint": _any,
-        "default": _only(Effects(), "an emulated network"),
-        "edge": _only((), "an emulated network"),
+        **_all_of("default edge"),  # looked at for themselves
     },
     sections.Robot: {
         **_all_of("name type pose v_m_s omega_rad_s s_0 bus right_node left_node"),
@@ -113,6 +126,8 @@ _KEYS: Final[Mapping[type[Parameters], Mapping[str, Reason]]] = {
         "joins_at_s": _only(0.0, "robots that join later"),
         "leaves_at_s": _only(None, "robots that leave"),
     },
+    Effects: _EFFECTS,
+    EdgeEffects: {**_EFFECTS, "edges": _between_robots},
     sections.Pose: _all_of("x_m y_m theta_rad"),
     sections.Body: _all_of(
         "wheel_radius_m half_track_m com_offset_m body_mass_kg wheel_mass_kg body_inertia_kg_m2"
@@ -123,9 +138,21 @@ _KEYS: Final[Mapping[type[Parameters], Mapping[str, Reason]]] = {
 """By the section's type and key."""
 
 
+def network_acts(network: sections.Network) -> bool:
+    """Whether edges between robots are emulated."""
+    return network.default != Effects() or bool(network.edge)
+
+
 def lacks(scenario: Scenario) -> str:
     """Why the kernel can't run a scenario, "" if it can."""
+    if not _has_compiler():
+        return "numba, which isn't installed: pip install 'fleetloop[sweep]'"
     return next(_reasons(scenario), "")
+
+
+@cache
+def _has_compiler() -> bool:
+    return find_spec("numba") is not None
 
 
 def _reasons(scenario: Scenario) -> Iterator[str]:
@@ -139,6 +166,7 @@ def _reasons(scenario: Scenario) -> Iterator[str]:
         *(scenario.clock, scenario.path, scenario.leader, *scenario.leader.steps),
         *(scenario.graph, scenario.coordination, scenario.localisation, scenario.bus),
         *(scenario.mounting, scenario.host, scenario.disturbance, scenario.network),
+        *(scenario.network.default, *scenario.network.edge),
     ):
         yield from _of_section(section)
     if scenario.drive_choice.name == DEFAULT:
@@ -153,23 +181,16 @@ def _reasons(scenario: Scenario) -> Iterator[str]:
         yield from _of_section(robot.disturbance or scenario.disturbance)
     for body in scenario.robot_types.values():
         yield from _of_section(body)
-    yield from _of_poses(scenario)
 
 
 def _of_law(choice: Choice) -> Iterator[str]:
-    if choice.name in LAWS and type(choice.parameters) in (AdaptiveDscGains, AdaptiveDscRobustGains):
+    if choice.name in LAWS and type(choice.parameters) in (
+        AdaptiveDscGains,
+        AdaptiveDscRobustGains,
+    ):
         yield from _of_section(choice.parameters)
     else:
         yield f"the law {choice.name}"
-
-
-def _of_poses(scenario: Scenario) -> Iterator[str]:
-    """A robot stops where poses are further apart than it lets them be."""
-    if scenario.localisation.source != "odometry":
-        ticks = schedule(scenario)
-        oldest_s = (ticks.pose_delay_ticks + ticks.localise_every) * ticks.period_s
-        if oldest_s > pose_age_limit_s(scenario):
-            yield "poses that are older than host.pose_age_limit_s"
 
 
 def _of_section(section: object) -> Iterator[str]:
@@ -186,21 +207,27 @@ def _section_reason(section: Parameters) -> str:
 
 
 def _reason_of(section: Parameters) -> str:
-    kind = type(section)
-    keys = _DRIVE if isinstance(section, Drive) else _KEYS.get(kind)
-    if keys is None:
+    kind: Any = type(section)
+    looks = _looks_of(kind)
+    if looks is None:
         return f"a section of the type {kind.__name__}"
-    for field in fields(section):
-        value = getattr(section, field.name)
-        reason = keys.get(field.name)
-        if reason is not None:
-            said = reason(value)
-            if said:
-                return said
-            continue
+    for name, reason in looks:
+        if said := reason(getattr(section, name)):
+            return said
+    return ""
+
+
+@cache
+def _looks_of(kind: Any) -> tuple[tuple[str, Reason], ...] | None:
+    """The keys of a type of section that can't have any value; None: no such section is covered."""
+    keys = _DRIVE if issubclass(kind, Drive) else _KEYS.get(kind)
+    if keys is None:
+        return None
+    looks = []
+    for field in fields(kind):
         default = field.default
         if default is MISSING and field.default_factory is not MISSING:
             default = field.default_factory()
-        if value != default:
-            return f"the key {field.name} of {kind.__name__}"
-    return ""
+        unknown = _only(default, f"the key {field.name} of {kind.__name__}")
+        looks.append((field.name, keys.get(field.name, unknown)))
+    return tuple(look for look in looks if look[1] is not _any)

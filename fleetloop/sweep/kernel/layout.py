@@ -4,10 +4,15 @@ Fields are the symbols of the modules whose functions they are given to.
 """
 
 from collections.abc import Sequence
+from functools import cache
+from struct import Struct
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike
+from numpy.typing import NDArray
+
+from agents.laws.adaptive_dsc import AdaptiveDsc
+from configs.signals import PLANT_SIGNALS, controller_signals
 
 PAPER, ROBUST = 0, 1
 """Laws."""
@@ -17,6 +22,9 @@ WORLD, STRUCTURE, VARYING = 0, 1, 2
 """Offsets."""
 FUSED, EXTERNAL, ODOMETRY = 0, 1, 2
 """Sources of poses."""
+UNHEARD, HEARD, OWN_ESTIMATE = 0, 1, 2
+"""What a robot takes for v_r: 0, the leader's speed, or its own v̂: nothing heard over an emulated
+network."""
 
 _FLOAT, _WHOLE = "f8", "i8"
 
@@ -38,7 +46,7 @@ CASE = np.dtype(
 
 ROBOT = np.dtype(
     [
-        *_fields(_WHOLE, "law host_limits follows_leader disturbed"),
+        *_fields(_WHOLE, "law host_limits disturbed leader link"),
         *_fields(_WHOLE, "first_edge last_edge offset first_knot last_knot"),
         # the law: its constants, h K_5, the bounds of the estimates, its own limits; the host's
         *_fields(_FLOAT, "k1 k2 k3 k4 gamma_1 gamma_2 gamma_3 move_1 move_2 move_3"),
@@ -47,7 +55,7 @@ ROBOT = np.dtype(
         *_fields(_FLOAT, "sigma sigma_square sigma_span sigma_limit v_limit torque_limit"),
         *_fields(_FLOAT, "host_limit host_step"),
         # the path, the leader link, the localiser
-        *_fields(_FLOAT, "path_1 path_2 path_3 path_4 path_5 path_6 h"),
+        *_fields(_FLOAT, "path_1 path_2 path_3 path_4 path_5 path_6"),
         *_fields(_FLOAT, "half_radius half_radius_over_b"),
         # the drives
         *_fields(_FLOAT, "to_shaft_right to_shaft_left to_wheel_right to_wheel_left"),
@@ -70,7 +78,7 @@ STATE = np.dtype(
         *_fields(_FLOAT, "seen_right_rad seen_left_rad v_used omega_used o_x o_y o_theta"),
         *_fields(_FLOAT, "f_x f_y f_theta a_x a_y a_theta a_cos a_sin"),
         # coordination, and its map for a degree
-        *_fields(_FLOAT, "v_hat mu s degree v_1 v_2 v_3 mu_1 mu_2 mu_3 mu_4 mu_5 mu_6"),
+        *_fields(_FLOAT, "v_hat mu s degree h v_1 v_2 v_3 mu_1 mu_2 mu_3 mu_4 mu_5 mu_6"),
         *_fields(_FLOAT, "s_1 s_2 s_3 s_4 s_5 s_6"),
         # the law, and the limits of the host
         *_fields(_FLOAT, "alpha_theta alpha_v alpha_omega"),
@@ -80,10 +88,35 @@ STATE = np.dtype(
 )
 """What changes of one robot."""
 
-EDGE = np.dtype([("speaker", _WHOLE), ("weight", _FLOAT)])
-"""An edge to a robot: who is heard, and a_ij."""
+CONTROLLER_SIGNALS = controller_signals(AdaptiveDsc.SIGNALS)
+"""Of a controller: the laws that the kernel has say the same."""
+TRUTH = np.dtype([(signal.name, _FLOAT) for signal in PLANT_SIGNALS])
+TOLD = np.dtype([(signal.name, _FLOAT) for signal in CONTROLLER_SIGNALS])
+"""The rows of the plant and of a controller."""
+
+EDGE = np.dtype(
+    [
+        ("weight", _FLOAT),
+        *_fields(_WHOLE, "speaker steady next_change last_change counts"),
+    ]
+)
+"""An edge to a robot: a_ij, who is heard, whether the newest share always counts; else the changes
+that are next, and the share that counts now. Of a leader link 1 or 0 counts: whether it exists."""
 
 
-def records(layout: DTypeLike, rows: Sequence[tuple[Any, ...]]) -> Any:
-    """Rows as an array of records whose fields are attributes."""
-    return np.array(rows, layout).view(np.recarray)
+def records(layout: np.dtype[np.void], rows: Sequence[tuple[Any, ...]]) -> NDArray[np.void]:
+    """Rows as an array; to the loop its fields are attributes, uncompiled as of `np.recarray`."""
+    pack = _packing(layout).pack
+    return np.frombuffer(bytearray().join([pack(*row) for row in rows]), layout)
+
+
+@cache
+def _packing(layout: np.dtype[np.void]) -> Struct:
+    """The record as `struct` makes it: faster than numpy by a multiple."""
+    kinds = {np.dtype(_FLOAT): "d", np.dtype(_WHOLE): "q"}
+    return Struct("<" + "".join(kinds[layout[n]] for n in range(len(layout.names or ()))))
+
+
+def one(layout: np.dtype[np.void]) -> NDArray[np.void]:
+    """One record of zeros."""
+    return np.zeros(1, layout)

@@ -1,12 +1,13 @@
 """One module out of the sources: the loop and every equation that it calls, for the compiler.
 
-From a function on, all functions, constants and tuples with names that it uses are taken out of the
-modules that define them, as they stand there, and put behind each other. So there is one text of each
-equation, the one that the controllers and the plant run; their modules may be compiled
+From a function on, all functions, constants and tuples with names that it uses are taken out of
+the modules that define them, as they stand there, and put behind each other. So there is one text
+of each equation, the one that the controllers and the plant run; their modules may be compiled
 (`docs/compiled.md`) and have no bytecode, but sources they have.
 
-Left out are docstrings and annotations. `SAID_AGAIN` has what the compiler hasn't, or has otherwise:
-names of Python that become functions of `primitives`, tested against what they stand for.
+Left out are docstrings and annotations. `SAID_AGAIN` has what the compiler hasn't, or has
+otherwise: names of Python that become functions of `primitives`, tested against what they stand
+for.
 """
 
 import ast
@@ -37,8 +38,8 @@ class Binding(NamedTuple):
 
 
 BOUND: Final = {"runge_kutta": Binding(0, "rates", "plant.body", "body_rates")}
-"""By the function that has the parameter. What is given functions isn't kept on disk by numba, so it
-is put in here."""
+"""By the function that has the parameter. numba keeps nothing on disk that is given functions, so
+they are put in."""
 _FUNCTIONS: Final = {bound.function: bound.module for bound in BOUND.values()}
 OURS: Final = ("agents", "bridge", "configs", "fleetloop", "plant")
 _Definition = ast.FunctionDef | ast.ClassDef | ast.Assign
@@ -71,10 +72,10 @@ def _source(module: str) -> _Source:
             case ast.FunctionDef() | ast.ClassDef():
                 defined[node.name] = node
             case ast.Assign(targets=[target]):
-                defined |= {name: node for name in _names_in(target)}
+                defined |= dict.fromkeys(_names_in(target), node)
             case ast.AnnAssign(target=ast.Name(), value=ast.expr() as value):
                 plain = ast.Assign([node.target], value, lineno=node.lineno)
-                defined |= {name: plain for name in _names_in(node.target)}
+                defined |= dict.fromkeys(_names_in(node.target), plain)
             case ast.Import():
                 imported |= {one.asname or one.name: (one.name, "") for one in node.names}
             case ast.ImportFrom(module=str(there)):
@@ -233,11 +234,15 @@ class Linker:
             raise LinkError(f"{source.name}.{node.name} is no tuple with names")
         self._imports.add("from typing import NamedTuple")
         fields = [ast.unparse(one.target) for one in node.body if isinstance(one, ast.AnnAssign)]
-        return "\n".join([f"class {node.name}(NamedTuple):", *(f"    {it}: float" for it in fields)])
+        return "\n".join(
+            [f"class {node.name}(NamedTuple):", *(f"    {it}: float" for it in fields)]
+        )
 
     def text(self, head: str) -> str:
         """The module: `head`, imports, definitions in the order in which they are needed."""
-        return "\n\n".join([head, "\n".join(sorted(self._imports)), *dict.fromkeys(self._texts.values())])
+        return "\n\n".join(
+            [head, "\n".join(sorted(self._imports)), *dict.fromkeys(self._texts.values())]
+        )
 
 
 def _names_of(node: _Definition) -> list[str]:

@@ -1,4 +1,4 @@
-"""The closed loop of one case, tick by tick: the order of `fleetloop.in_process`, without its parts.
+"""The closed loop of one case, tick by tick, in the order of `fleetloop.in_process`.
 
     share       path variables and speed estimates, every `share_every` ticks
     per robot   truth to the record; pose, every `localise_every`; encoders as float32;
@@ -35,8 +35,8 @@ from agents.limits import limited
 from agents.localisation import along, anchored, carried, heading_then, moved, nearest_turn
 from agents.neighbours import extrapolated
 from agents.paths import (
-    PlanarJet,
     Jet,
+    PlanarJet,
     circle_jet,
     cosine_jet,
     cosine_reference,
@@ -53,15 +53,16 @@ from fleetloop.sweep.kernel.layout import (
     COSINE,
     EXTERNAL,
     FIGURE_EIGHT,
+    HEARD,
     LINE,
     ODOMETRY,
+    OWN_ESTIMATE,
     ROBUST,
     STRUCTURE,
-    VARYING,
     WORLD,
 )
 from fleetloop.sweep.kernel.primitives import FLOAT32_MOST, float32
-from plant.body import body_rates, disturbance_torques, rolling_speeds
+from plant.body import body_rates, rolling_speeds
 from plant.exact import shaft_motion
 from plant.integrate import net_torques, runge_kutta, within_bounds
 
@@ -73,80 +74,145 @@ MOST_TURN_RAD = 1e15
 """Whole turns beyond are no whole numbers any more."""
 
 
-def simulate(
-    case: Any,
+def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are given cost time
+    cases: Any,
     robots: Any,
     states: Any,
     edges: Any,
+    changes: Any,
     leader_m_s: Any,
     curves: Any,
-    columns: tuple[Any, Any],
     rows: tuple[Any, Any],
+    kept: tuple[Any, Any],
+    room: tuple[Any, Any],
 ) -> tuple[int, int, int]:
     """Run one case from tick 0 to its end, or to the tick at which it leaves the ordinary course.
 
     Args:
-        case: a record of `layout.CASE`.
+        cases: one record of `layout.CASE`.
         robots: records of `layout.ROBOT`.
         states: of `layout.STATE`, at tick 0; at the end those of the end.
-        edges: of `layout.EDGE`, those to each robot together, in the order of speakers' names.
-        leader_m_s: v_r by tick.
+        edges: of `layout.EDGE`, those to each robot together, in the order of speakers' names, and
+            the leader links.
+        changes: of edges that change: from this tick on, this share counts.
+        leader_m_s: v_r by tick, 0 where there is none to be heard.
         curves: knots of all splines; and their coefficients, twice: x and y, or ahead and left.
-        columns: of the plant's row and of the controller's, which are kept.
-        rows: of the plant and of the controllers: robot, tick, column; column 0 stays as it is.
+        rows: records of `layout.TRUTH` and of `layout.TOLD`, one each, to write in.
+        kept: numbers of the columns of these that are kept.
+        room: for these columns of the plant and of the controllers: robot, tick, column.
 
     Returns:
         why it left the ordinary course, `NOTHING` if it didn't; the tick; the robot's number.
     """
-    count, ticks = len(robots), case.ticks
-    plant_columns, controller_columns = columns
-    plant_rows, controller_rows = rows
-    kept = case.pose_delay_ticks + 1
-    odometries = np.zeros((count, kept, 3))  # by tick, the last `kept`
-    poses = np.zeros((count, kept, 3))
-    said = np.zeros((count, 2))  # s, v̂
-    said_ns = 0
-    truth, told = np.zeros(12), np.zeros(35)
+    case, count, ticks = cases[0], len(robots), cases[0].ticks
+    (truths, tolds), (kept_truth, kept_told), (plant_room, controller_room) = rows, kept, room
+    truth, told = truths[0], tolds[0]
+    truth_row, told_row = truths.view(np.float64), tolds.view(np.float64)
+    slots = case.pose_delay_ticks + 1
+    pasts = np.zeros((count, slots, 6))  # odometry and pose, by tick, the last ones
+    shares = -(-ticks // case.share_every)
+    said = np.zeros((shares, count, 2))  # s and v̂ of all, by share
+    step_s = case.period_s / case.substeps
+    share = 0
     for tick in range(ticks):
         t_ns = tick * case.period_ns
         t_s = t_ns * 1e-9
+        fix_tick = tick - case.pose_delay_ticks
+        localises = tick % case.localise_every == 0
+        fixes = fix_tick >= 0 and fix_tick % case.localise_every == 0
+        slot, fix_slot = tick % slots, fix_tick % slots
         if tick % case.share_every == 0:
-            said_ns = t_ns
+            share = tick // case.share_every
             for i in range(count):
                 state = states[i]
-                said[i, 0], said[i, 1] = state.s, state.v_hat
+                said[share, i, 0], said[share, i, 1] = state.s, state.v_hat
                 if not _is_reached(case, t_s, state.s, state.v_hat):
                     return PATH_VARIABLE, tick, i
         for i in range(count):
             robot, state = robots[i], states[i]
-            if len(plant_columns):
-                _plant_row(truth, t_s, robot, state)
-                for column in range(len(plant_columns)):
-                    plant_rows[i, tick, column + 1] = truth[plant_columns[column]]
-            if tick % case.localise_every == 0:
+            if len(kept_truth):
+                _tell_truth(truth, t_s, robot, state)
+                for column in range(len(kept_truth)):
+                    plant_room[i, tick, column] = truth_row[kept_truth[column]]
+            _measure(robot, state)
+            if localises:
                 if not within_world(state.x, state.y, state.theta):
                     return POSE, tick, i
-                pose = poses[i, tick % kept]
-                pose[0], pose[1], pose[2] = state.x, state.y, state.theta
-            _measure(robot, state)
-            odometry = odometries[i, tick % kept]
-            odometry[0], odometry[1], odometry[2] = state.o_x, state.o_y, state.o_theta
-            fix_tick = tick - case.pose_delay_ticks
-            fixes = case.localisation != ODOMETRY and fix_tick >= 0
-            if fixes and fix_tick % case.localise_every == 0:
-                pose, odometry = poses[i, fix_tick % kept], odometries[i, fix_tick % kept]
-                if not _fix(state, pose, (odometry[0], odometry[1], odometry[2])):
+                pasts[i, slot, 3], pasts[i, slot, 4] = state.x, state.y
+                pasts[i, slot, 5] = state.theta
+            pasts[i, slot, 0], pasts[i, slot, 1] = state.o_x, state.o_y
+            pasts[i, slot, 2] = state.o_theta
+            if fixes and case.localisation != ODOMETRY:
+                odometry = (pasts[i, fix_slot, 0], pasts[i, fix_slot, 1], pasts[i, fix_slot, 2])
+                x, y, theta = pasts[i, fix_slot, 3], pasts[i, fix_slot, 4], pasts[i, fix_slot, 5]
+                if not _fix(state, x, y, theta, odometry):
                     return TURN, tick, i
-            v_r = leader_m_s[tick] if robot.follows_leader else 0.0
-            why = _control(case, robot, state, edges, said, t_ns - said_ns, v_r, curves, told)
-            told[0] = t_s
+
+            neighbours, degree, sum_s, sum_v = 0, 0.0, 0.0, 0.0
+            for number in range(robot.first_edge, robot.last_edge):
+                edge = edges[number]
+                counts = share
+                if not edge.steady:
+                    while edge.next_change < edge.last_change:
+                        if changes[edge.next_change, 0] > tick:
+                            break
+                        edge.counts = changes[edge.next_change, 1]
+                        edge.next_change += 1
+                    counts = edge.counts
+                age_s = (t_ns - counts * case.share_every * case.period_ns) * 1e-9
+                if counts < 0 or age_s > case.silence_limit_s:
+                    continue
+                age_s = min(age_s, case.age_limit_s)
+                s_j, v_j, weight = (
+                    said[counts, edge.speaker, 0],
+                    said[counts, edge.speaker, 1],
+                    edge.weight,
+                )
+                if case.extrapolates:
+                    s_j = extrapolated(s_j, v_j, age_s, case.half_period_s)
+                neighbours += 1
+                degree += weight
+                sum_s += weight * s_j
+                sum_v += weight * v_j
+            h = 0.0
+            if robot.link >= 0:
+                edge = edges[robot.link]
+                while edge.next_change < edge.last_change:
+                    if changes[edge.next_change, 0] > tick:
+                        break
+                    edge.counts = changes[edge.next_change, 1]
+                    edge.next_change += 1
+                h = edge.weight if edge.counts else 0.0
+            s = state.s
+            told.t_s, told.neighbours = t_s, neighbours
+            told.s, told.mu, told.v_r_hat, told.s_dot = (
+                s,
+                state.mu,
+                state.v_hat,
+                state.mu + state.v_hat,
+            )
+            v_r = 0.0
+            if robot.leader == HEARD:
+                v_r = leader_m_s[tick]
+            elif robot.leader == OWN_ESTIMATE:
+                v_r = state.v_hat
+            if degree != state.degree or h != state.h:
+                _take_map(case, states, i, degree, h)
+            state.v_hat, state.mu, state.s = advanced(
+                _kept_map(state), state.v_hat, state.mu, s, sum_s, sum_v, v_r
+            )
+            if case.path == COSINE and robot.offset == WORLD:
+                reference = _cosine(robot, s)
+            else:
+                reference = _reference(case, robot, curves, s)
+            why = _control(case, robot, state, told, reference)
             if why != NOTHING:
                 return why, tick, i
-            for column in range(len(controller_columns)):
-                controller_rows[i, tick, column + 1] = told[controller_columns[column]]
+            for column in range(len(kept_told)):
+                controller_room[i, tick, column] = told_row[kept_told[column]]
             if not _is_reached(case, t_s + case.period_s, state.s, state.v_hat):
                 return PATH_VARIABLE, tick, i
-            if not _advance(case, robot, state, t_s):
+            if not _advance(case.substeps, step_s, robot, state, t_s):
                 return BODY, tick, i
     return NOTHING, ticks, 0
 
@@ -157,14 +223,15 @@ def _is_reached(case: Any, t_s: float, s: float, v_hat: float) -> bool:
     return low <= s <= high and case.v_low_m_s <= v_hat <= case.v_high_m_s
 
 
-def _plant_row(row: Any, t_s: float, robot: Any, state: Any) -> None:
-    """The signals of `configs.signals.PLANT_SIGNALS`."""
-    row[0] = t_s
-    row[1], row[2], row[3], row[4], row[5] = state.x, state.y, state.theta, state.v, state.omega
-    row[6] = state.torque_right_shaft * robot.gear_right
-    row[7] = state.torque_left_shaft * robot.gear_left
-    row[8], row[9] = state.demand_right, state.demand_left
-    row[10], row[11] = state.demand_right, state.demand_left
+def _tell_truth(truth: Any, t_s: float, robot: Any, state: Any) -> None:
+    """The plant's row."""
+    truth.t_s = t_s
+    truth.x_m, truth.y_m, truth.theta_rad = state.x, state.y, state.theta
+    truth.v_m_s, truth.omega_rad_s = state.v, state.omega
+    truth.input_right_wheel_N_m = state.torque_right_shaft * robot.gear_right
+    truth.input_left_wheel_N_m = state.torque_left_shaft * robot.gear_left
+    truth.demand_right_wheel_N_m = truth.motor_right_wheel_N_m = state.demand_right
+    truth.demand_left_wheel_N_m = truth.motor_left_wheel_N_m = state.demand_left
 
 
 # --- what the controller knows --------------------------------------------------------------------
@@ -172,9 +239,7 @@ def _plant_row(row: Any, t_s: float, robot: Any, state: Any) -> None:
 
 def _measure(robot: Any, state: Any) -> None:
     """Encoders, as the bus carries them; odometry and speeds from them."""
-    speeds = rolling_speeds(
-        state.v, state.omega, robot.half_track, robot.inv_right, robot.inv_left
-    )
+    speeds = rolling_speeds(state.v, state.omega, robot.half_track, robot.inv_right, robot.inv_left)
     right_rev, right_rev_s = shaft_motion(state.right_wheel_rad, speeds[0], robot.gear_right)
     left_rev, left_rev_s = shaft_motion(state.left_wheel_rad, speeds[1], robot.gear_left)
     right_rad = float32(right_rev + 0.0) * robot.wheel_rad_per_rev_right  # + the offset of a drive
@@ -200,13 +265,14 @@ def _anchor(state: Any) -> tuple[float, float, float, float, float, float, float
     )
 
 
-def _fix(state: Any, pose: Any, odometry: tuple[float, float, float]) -> bool:
+def _fix(
+    state: Any, x: float, y: float, theta: float, odometry: tuple[float, float, float]
+) -> bool:
     """Take a pose of the instant of this odometry; False if its turns can't be counted."""
     then = heading_then(_anchor(state), odometry)
     if not abs(then) < MOST_TURN_RAD:
         return False
-    theta = nearest_turn(pose[2], then)
-    anchor = anchored(pose[0], pose[1], theta, odometry)
+    anchor = anchored(x, y, nearest_turn(theta, then), odometry)
     state.f_x, state.f_y, state.f_theta = anchor[0], anchor[1], anchor[2]
     state.a_x, state.a_y, state.a_theta = anchor[3], anchor[4], anchor[5]
     state.a_cos, state.a_sin = anchor[6], anchor[7]
@@ -216,72 +282,15 @@ def _fix(state: Any, pose: Any, odometry: tuple[float, float, float]) -> bool:
 # --- the controller -------------------------------------------------------------------------------
 
 
-def _control(
-    case: Any,
-    robot: Any,
-    state: Any,
-    edges: Any,
-    said: Any,
-    age_ns: int,
-    v_r: float,
-    curves: Any,
-    row: Any,
-) -> int:
-    """One period of the controller: its row, torques and next state; why it can't go on."""
-    if case.localisation == EXTERNAL:
-        x, y, theta = state.f_x, state.f_y, state.f_theta
-    else:
-        x, y, theta = carried(_anchor(state), (state.o_x, state.o_y, state.o_theta))
-    v, omega = state.v_used, state.omega_used
-    if not isfinite(x + y + theta + v + omega):
-        return POSE
-    v_hat, mu, s = state.v_hat, state.mu, state.s
-    s_dot = mu + v_hat
-    neighbours = _coordinate(case, robot, state, edges, said, age_ns, v_r)
-    x_d, y_d, theta_d, v_bar_d, omega_bar_d = _reference(case, robot, curves, s)
-    row[1], row[2], row[3], row[4], row[5] = x, y, theta, v, omega
-    row[6], row[7], row[8], row[9], row[10] = s, s_dot, mu, v_hat, neighbours
-    row[11], row[12], row[13] = x_d, y_d, theta_d
-
-    x_e, y_e, theta_e = path_errors(x, y, theta, x_d, y_d, theta_d)
-    right, left = _law(
-        robot, state, row, v, omega, x_e, y_e, theta_e, s_dot, v_bar_d, omega_bar_d
-    )
-    if not isfinite(right + left):
-        return TORQUE
-    _send(robot, state, right, left)
-    row[31] = state.torque_right_shaft * robot.to_wheel_right
-    row[32] = state.torque_left_shaft * robot.to_wheel_left
-    row[33] = row[34] = 0.0
-    return NOTHING
-
-
-def _coordinate(
-    case: Any, robot: Any, state: Any, edges: Any, said: Any, age_ns: int, v_r: float
-) -> int:
-    """The next state of the coordination; the number of neighbours that count."""
-    neighbours = 0
-    degree = sum_s = sum_v = 0.0
-    age_s = age_ns * 1e-9
-    if age_s <= case.silence_limit_s:
-        age_s = min(age_s, case.age_limit_s)
-        for number in range(robot.first_edge, robot.last_edge):
-            edge = edges[number]
-            s_j, v_j, weight = said[edge.speaker, 0], said[edge.speaker, 1], edge.weight
-            neighbours += 1
-            degree += weight
-            if case.extrapolates:
-                sum_s += weight * extrapolated(s_j, v_j, age_s, case.half_period_s)
-            else:
-                sum_s += weight * s_j
-            sum_v += weight * v_j
-    if degree != state.degree:
-        state.degree = degree
-        _keep_map(state, period_map(case.p, case.q, degree, robot.h, case.period_s))
-    state.v_hat, state.mu, state.s = advanced(
-        _kept_map(state), state.v_hat, state.mu, state.s, sum_s, sum_v, v_r
-    )
-    return neighbours
+def _take_map(case: Any, states: Any, i: int, degree: float, h: float) -> None:
+    """Take the coordination's map of another d and h, from a robot that has it, or a new one."""
+    state = states[i]
+    state.degree, state.h = degree, h
+    for other in range(len(states)):
+        if other != i and states[other].degree == degree and states[other].h == h:
+            _keep_map(state, _kept_map(states[other]))
+            return
+    _keep_map(state, period_map(case.p, case.q, degree, h, case.period_s))
 
 
 def _keep_map(state: Any, rows: Map) -> None:
@@ -300,20 +309,41 @@ def _kept_map(state: Any) -> Map:
     )
 
 
-def _law(
+def _control(
+    case: Any,
     robot: Any,
     state: Any,
-    row: Any,
-    v: float,
-    omega: float,
-    x_e: float,
-    y_e: float,
-    theta_e: float,
-    s_dot: float,
-    v_bar_d: float,
-    omega_bar_d: float,
+    told: Any,
+    reference: tuple[float, float, float, float, float],
+) -> int:
+    """Torques to the drives, by what the controller knows; why it can't go on."""
+    if case.localisation == EXTERNAL:
+        x, y, theta = state.f_x, state.f_y, state.f_theta
+    else:
+        x, y, theta = carried(_anchor(state), (state.o_x, state.o_y, state.o_theta))
+    if not isfinite(x + y + theta + state.v_used + state.omega_used):
+        return POSE
+    told.x_used_m, told.y_used_m, told.theta_used_rad = x, y, theta
+    told.v_used_m_s, told.omega_used_rad_s = state.v_used, state.omega_used
+    x_d, y_d, theta_d, v_bar_d, omega_bar_d = reference
+    told.x_d_m, told.y_d_m, told.theta_d_rad = x_d, y_d, theta_d
+    x_e, y_e, theta_e = path_errors(x, y, theta, x_d, y_d, theta_d)
+    told.x_e_m, told.y_e_m, told.theta_e_rad = x_e, y_e, theta_e
+    right, left = _law(robot, state, told, v_bar_d, omega_bar_d)
+    if not isfinite(right + left):
+        return TORQUE
+    _send(robot, state, right, left)
+    told.tau_right_wheel_N_m = state.torque_right_shaft * robot.to_wheel_right
+    told.tau_left_wheel_N_m = state.torque_left_shaft * robot.to_wheel_left
+    return NOTHING
+
+
+def _law(
+    robot: Any, state: Any, told: Any, v_bar_d: float, omega_bar_d: float
 ) -> tuple[float, float]:
     """The torques of the paper's law or of the robust one, limited by the host; its next state."""
+    v, omega, s_dot = state.v_used, state.omega_used, told.s_dot
+    x_e, y_e, theta_e = told.x_e_m, told.y_e_m, told.theta_e_rad
     k1, k2, k3, k4 = robot.k1, robot.k2, robot.k3, robot.k4
     robust = robot.law == ROBUST
     if robust:
@@ -338,12 +368,10 @@ def _law(
     right, left, after, f_1, f_2, e_1, e_2 = surface(
         constants, v, omega, bar_theta, bar_v, turn, filters, theta_1, theta_2, kappa
     )
-    row[14], row[15], row[16] = x_e, y_e, theta_e
-    row[17], row[18], row[19] = filters
-    row[20], row[21] = e_1, e_2
-    row[22], row[23], row[24], row[25] = theta_1
-    row[26], row[27], row[28], row[29] = theta_2
-    row[30] = kappa
+    told.alpha_theta_rad, told.alpha_v_m_s, told.alpha_omega_rad_s = filters
+    told.xi_e1_m_s, told.xi_e2_rad_s, told.kappa_hat = e_1, e_2, kappa
+    told.theta_hat_1, told.theta_hat_2, told.theta_hat_3, told.theta_hat_4 = theta_1
+    told.theta_hat_5, told.theta_hat_6, told.theta_hat_7, told.theta_hat_8 = theta_2
     learns = True
     if robust and at_limit(right, left, robot.torque_limit):
         right, left = clip(right, robot.torque_limit), clip(left, robot.torque_limit)
@@ -386,14 +414,17 @@ def _send(robot: Any, state: Any, right: float, left: float) -> None:
 # --- the path -------------------------------------------------------------------------------------
 
 
+def _cosine(robot: Any, s: float) -> tuple[float, float, float, float, float]:
+    """The robot's reference at s on the paper's path."""
+    return cosine_reference(
+        s, robot.path_1, robot.path_2, robot.path_3, robot.path_4, robot.path_5, robot.path_6
+    )
+
+
 def _reference(
     case: Any, robot: Any, curves: Any, s: float
 ) -> tuple[float, float, float, float, float]:
-    """The robot's reference at s."""
-    if case.path == COSINE and robot.offset == WORLD:
-        return cosine_reference(
-            s, robot.path_1, robot.path_2, robot.path_3, robot.path_4, robot.path_5, robot.path_6
-        )
+    """The robot's reference at s on any other path."""
     centre = _centre(case, curves, s)
     if robot.offset == WORLD:
         shifted = shifted_reference(centre, robot.path_1, robot.path_2)
@@ -428,7 +459,7 @@ def _centre(case: Any, curves: Any, s: float) -> PlanarJet:
 # --- the robot ------------------------------------------------------------------------------------
 
 
-def _advance(case: Any, robot: Any, state: Any, t_s: float) -> bool:
+def _advance(substeps: int, step_s: float, robot: Any, state: Any, t_s: float) -> bool:
     """The body over one period, torques held; False: its motion diverged."""
     right = state.torque_right_shaft * robot.gear_right
     left = state.torque_left_shaft * robot.gear_left
@@ -443,8 +474,8 @@ def _advance(case: Any, robot: Any, state: Any, t_s: float) -> bool:
         *(state.x, state.y, state.theta, state.v, state.omega),
         *(state.right_wheel_rad, state.left_wheel_rad),
     )
-    step_s, half_track = case.period_s / case.substeps, robot.half_track
-    for n in range(case.substeps):
+    half_track = robot.half_track
+    for n in range(substeps):
         if robot.disturbed:
             net = net_torques(right, left, waves, t_s + n * step_s, step_s)
         else:

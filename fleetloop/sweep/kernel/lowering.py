@@ -1,13 +1,13 @@
-"""A scenario as the numbers of one case: what the briefs and the constructors of its parts make of it.
+"""A scenario as the numbers of one case, as its briefs and the constructors of its parts make them.
 
-Numbers that equations need once are computed by the functions that the parts call, too. What cases of
-a sweep have in common is computed once and looked up by its value.
+Numbers that equations need once are computed by the functions that those parts call. What cases of
+a sweep have in common is computed once, and looked up by its value.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from math import inf, nan
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +19,17 @@ from agents.localisation import anchored
 from agents.paths import circle_rate, cosine_numbers, line_tangent
 from bridge.drives.interface import torque_factors, wheel_rad_per_shaft_rev
 from configs import paths, sections
-from configs.brief import Schedule, WheelDisturbance, Wheels
+from configs.brief import ChannelModel, Schedule, WheelDisturbance, Wheels
 from configs.curves import SplinePath, VaryingOffset, formation_offset, reference_path
+from configs.edges import InEdge
 from configs.graph import Graph
 from configs.leader_speed import speed_at
-from configs.parameters import Parameters, extended
-from configs.resolve import schedule, speed_changes, substeps
+from configs.parameters import Parameters, changed, extended
+from configs.resolve import channels, speed_changes, substeps
 from configs.scenario import Scenario
 from fleetloop.sweep.kernel import layout
+from fleetloop.sweep.kernel.coverage import network_acts
+from fleetloop.sweep.kernel.hearing import NONE, Changes, changes_of, link_changes
 from plant.body import RigidBody
 
 _SOURCES: Final = {
@@ -35,58 +38,59 @@ _SOURCES: Final = {
     "odometry": layout.ODOMETRY,
 }
 _UNDISTURBED: Final = WheelDisturbance(amplitude_wheel_N_m=0.0, rate_rad_s=0.0, phase_rad=0.0)
+_P = TypeVar("_P", bound=Parameters)
 Numbers = tuple[float, ...]
+Records = NDArray[np.void]
 Curves = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
 class Case(NamedTuple):
     """What `loop.simulate` is given of one case."""
 
-    schedule: Schedule
-    case: Any
-    robots: Any
-    states: Any
-    edges: Any
+    cases: Records
+    robots: Records
+    states: Records
+    edges: Records
+    changes: NDArray[np.int64]
     leader_m_s: NDArray[np.float64]
     curves: Curves
+    heard: dict[str, dict[str, Changes | None]]
+    """By robot and in-neighbour: the share that counts; None: always the newest."""
 
 
-def lowered(scenario: Scenario) -> Case:
-    """A scenario of which `coverage.lacks` says nothing, as numbers."""
-    ticks, graph = schedule(scenario), _shared_graph(scenario)
+def lowered(scenario: Scenario, ticks: Schedule) -> Case:
+    """A scenario of which `coverage.lacks` says nothing, as numbers; `ticks` are its schedule."""
+    graph = _shared_graph(scenario)
     curves = _Splines()
     centre_kind, centre = _centre(scenario.path, curves)
-    robots, states, edges = [], [], []
-    numbers = {name: number for number, name in enumerate(scenario.names)}
+    robots, states = [], []
+    edges = _Edges(scenario, ticks, graph)
     for number, robot in enumerate(scenario.robot):
-        heard = graph.hears[robot.name]
-        first_edge = len(edges)
-        edges += [(numbers[edge.speaker], edge.weight) for edge in heard]
-        link = graph.links.get(robot.name)
-        body, choice = scenario.body_of(robot), scenario.control_of(robot)
-        h = 0.0 if link is None else link.weight
+        heard = edges.to(robot.name)
+        body, choice = _body_of(scenario, robot), scenario.control_of(robot)
+        drives = _drives(_changed(scenario.mounting, robot.mounting))
         offset_kind, place, knots = _offset(scenario.path, robot.offset, curves)
         disturbed, waves = _waves(robot.disturbance or scenario.disturbance, number + 1)
         limits, limit = _host_limits(scenario.host, ticks.period_s)
         law, of_law = _law(choice.parameters, _wheels(body), ticks.period_ns)
         robots.append(
             (
-                *(law, limits, link is not None, disturbed),
-                *(first_edge, len(edges), offset_kind, *knots),
-                *(*of_law, *limit, *place, h),
-                *(*_localiser(body), *_drives(scenario.mounting_of(robot)), *_body(body), *waves),
+                *(law, limits, disturbed, heard.leader, heard.link),
+                *(heard.first_edge, heard.last_edge, offset_kind, *knots),
+                *(*of_law, *limit, *place),
+                *(*_localiser(body), *drives, *_body(body), *waves),
             )
         )
-        states.append(_start(robot, scenario.coordination, choice.parameters))
-    case = layout.records(layout.CASE, [_case(scenario, ticks, centre_kind, centre, curves)])
+        states.append(_start(robot, scenario.coordination, choice.parameters, drives))
+    case = _case(scenario, ticks, centre_kind, centre, curves)
     return Case(
-        ticks,
-        case[0],
+        layout.records(layout.CASE, [case]),
         layout.records(layout.ROBOT, robots),
         layout.records(layout.STATE, states),
-        layout.records(layout.EDGE, edges),
+        *edges.arrays(),
         _leader(scenario.leader, ticks.period_ns, ticks.ticks),
         curves.arrays(),
+        edges.heard,
     )
 
 
@@ -109,7 +113,7 @@ def _case(
 
 
 def _start(
-    robot: sections.Robot, coordination: sections.Coordination, gains: Any
+    robot: sections.Robot, coordination: sections.Coordination, gains: Any, drives: Numbers
 ) -> tuple[float, ...]:
     """The state of a robot at tick 0, after a countdown in which its drives were armed."""
     pose = robot.pose
@@ -117,13 +121,33 @@ def _start(
     return (
         0,
         *(*where, robot.v_m_s, robot.omega_rad_s, 0.0, 0.0),
-        *(0.0, 0.0, 0.0, 0.0),
+        *(
+            0.0 * drives[0],
+            0.0 * drives[1],
+            0.0,
+            0.0,
+        ),  # torque 0 was sent last: -0 to a mirror image
         *(0.0, 0.0, nan, nan, 0.0, 0.0, 0.0),
         *anchored(*where, (0.0, 0.0, 0.0)),
-        *(coordination.v_hat_0, coordination.mu_0, robot.s_0, *((nan,) * 16)),
+        *(coordination.v_hat_0, coordination.mu_0, robot.s_0, *((nan,) * 17)),
         *(nan, nan, nan, *gains.theta_hat_0, gains.kappa_hat_0),
         *(0.0, 0.0),
     )
+
+
+def _body_of(scenario: Scenario, robot: sections.Robot) -> sections.Body:
+    """As `Scenario.body_of`."""
+    body: sections.Body = _changed(scenario.robot_types.get(robot.type, _BODY), robot.body)
+    return body
+
+
+_BODY: Final = sections.Body()
+
+
+@lru_cache(maxsize=4096)
+def _changed(section: _P, changes: Parameters) -> _P:
+    """As `configs.parameters.changed`, once for all cases."""
+    return changed(section, changes)
 
 
 # --- the graph and the leader ---------------------------------------------------------------------
@@ -131,7 +155,7 @@ def _start(
 
 def _shared_graph(scenario: Scenario) -> Graph:
     """The graph of a scenario, computed once for all that have it."""
-    made = scenario.__dict__.get("topology")
+    made: Graph | None = scenario.__dict__.get("topology")
     if made is None:
         key = (
             *(scenario.graph, scenario.names, scenario.clock.control_period_s),
@@ -143,7 +167,62 @@ def _shared_graph(scenario: Scenario) -> Graph:
                 _GRAPHS.clear()
             made = _GRAPHS[key] = scenario.topology
         scenario.__dict__["topology"] = made
-    return made  # type: ignore[no-any-return]
+    return made
+
+
+class _Heard(NamedTuple):
+    """What one robot hears."""
+
+    leader: int
+    link: int
+    """The number of its leader link, −1 if it has none."""
+    first_edge: int
+    last_edge: int
+
+
+class _Edges:
+    """All edges, those to each robot behind each other, then its leader link; and their changes."""
+
+    def __init__(self, scenario: Scenario, ticks: Schedule, graph: Graph) -> None:
+        self._scenario, self._ticks, self._graph = scenario, ticks, graph
+        self._emulated = network_acts(scenario.network)
+        self._numbers = {name: number for number, name in enumerate(scenario.names)}
+        self._rows: list[tuple[float, int, int, int, int, int]] = []
+        self._changes: Changes = []
+        self.heard: dict[str, dict[str, Changes | None]] = {name: {} for name in scenario.names}
+
+    def to(self, robot: str) -> _Heard:
+        """Put down the edges to a robot."""
+        models = {}
+        if self._emulated:
+            models = {model.source: model for model in channels(self._scenario, robot)}
+        first = len(self._rows)
+        for edge in self._graph.hears[robot]:
+            model = models.get(edge.speaker)
+            steady = model is None and edge.windows is None
+            changes = [] if steady else self._changes_of(edge, model)
+            self.heard[robot][edge.speaker] = None if steady else changes
+            self._add(edge, self._numbers[edge.speaker], changes, steady=steady)
+        last, link = len(self._rows), self._graph.links.get(robot)
+        if link is None:
+            return _Heard(layout.OWN_ESTIMATE if models else layout.UNHEARD, -1, first, last)
+        self._add(link, -1, link_changes(link, self._ticks.ticks), steady=False)
+        return _Heard(layout.HEARD, last, first, last)
+
+    def _changes_of(self, edge: InEdge, model: ChannelModel | None) -> Changes:
+        return changes_of(edge, model, self._ticks, self._scenario.coordination)
+
+    def _add(
+        self, edge: InEdge, speaker: int, changes: Sequence[tuple[int, int]], *, steady: bool
+    ) -> None:
+        first = len(self._changes)
+        self._changes += changes
+        self._rows.append((edge.weight, speaker, steady, first, len(self._changes), NONE))
+
+    def arrays(self) -> tuple[Records, NDArray[np.int64]]:
+        """For the loop."""
+        changes = np.array(self._changes, np.int64).reshape(-1, 2)
+        return layout.records(layout.EDGE, self._rows), changes
 
 
 _MOST_GRAPHS: Final = 4096

@@ -4,17 +4,25 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from configs.events import Event
-from configs.resolve import signals_of
 from configs.scenario import Scenario
-from configs.signals import DISTANCE, PATH_DISTANCE, PLANT_SIGNALS, SPREAD, Signal
+from configs.signals import (
+    DISTANCE,
+    PATH_DISTANCE,
+    PLANT_SIGNALS,
+    SPREAD,
+    USED_SIGNALS,
+    Signal,
+    age_signals,
+)
 from fleetloop.record.reader import Record
 from fleetloop.record.schema import row_type
+from fleetloop.sweep.kernel.layout import CONTROLLER_SIGNALS
 
 _MADE_OF: Final[Mapping[str, tuple[str, ...]]] = {
     SPREAD: ("s",),
@@ -23,6 +31,7 @@ _MADE_OF: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """Recorded signals of which those are made that expectations may be about."""
 _TIME: Final = "t_s"
+_PATH: Final = Path("record of the kernel")
 Rows = NDArray[np.float64]
 
 
@@ -45,54 +54,68 @@ class Columns(NamedTuple):
 
     signals: tuple[Signal, ...]
     numbers: NDArray[np.int64]
-    """Of the columns, of all that a source has."""
+    """Of the columns that the loop fills, of all that a source has; the last ones of its rows."""
 
     @classmethod
     def of(cls, table: Sequence[Signal], wanted: Collection[str]) -> "Columns":
         """Those of a table that are wanted."""
-        numbers = [n for n, signal in enumerate(table) if signal.name in wanted]
-        return cls(tuple(table[n] for n in numbers), np.array(numbers, np.int64))
+        numbers = [n for n, it in enumerate(table) if it.name in wanted and it.name != _TIME]
+        time = (one for one in table if one.name == _TIME)
+        return cls((*time, *(table[n] for n in numbers)), np.array(numbers, np.int64))
 
-    def rows(self, robots: int, ticks: int) -> tuple[Rows, NDArray[np.void]]:
-        """Room for the rows of all robots: as numbers, and the same as rows of a record."""
+    def rows(self, robots: int, ticks: int, period_ns: int) -> tuple[Rows, NDArray[np.void]]:
+        """Room for the rows of all robots: what the loop fills, and the rows that it is of."""
         rows = np.empty((robots, ticks), row_type(self.signals))
-        rows["tick"] = np.arange(ticks)
-        return rows.view(np.float64).reshape(robots, ticks, len(self.signals) + 1), rows
+        rows[:] = _blank(self.signals, ticks, period_ns)
+        numbers = rows.view(np.float64).reshape(robots, ticks, len(self.signals) + 1)
+        return numbers[:, :, 2:], rows
+
+
+@lru_cache(maxsize=8)
+def _blank(signals: tuple[Signal, ...], ticks: int, period_ns: int) -> NDArray[np.void]:
+    """The rows of one robot, with tick and time."""
+    rows = np.zeros(ticks, row_type(signals))
+    rows["tick"] = number = np.arange(ticks)
+    rows[_TIME] = number * period_ns * 1e-9
+    return rows
 
 
 @lru_cache(maxsize=64)
-def columns(controller: tuple[Signal, ...], asked: frozenset[str]) -> tuple[Columns, Columns]:
+def columns(asked: frozenset[str]) -> tuple[Columns, Columns]:
     """What is kept of the plant's rows and of a controller's."""
-    wanted = {_TIME, *(made for name in asked for made in _MADE_OF.get(name, (name,)))}
-    return Columns.of(PLANT_SIGNALS, wanted), Columns.of(controller, wanted)
-
-
-def controller_table(scenario: Scenario) -> tuple[Signal, ...]:
-    """The signals of the controllers' rows: those of the laws that the kernel has are the same."""
-    return _table(signals_of(scenario, scenario.robot[0]))
-
-
-@lru_cache(maxsize=16)
-def _table(signals: tuple[Signal, ...]) -> tuple[Signal, ...]:
-    """The one object of equal tables: it is looked up by."""
-    return signals
+    wanted = {made for name in asked for made in _MADE_OF.get(name, (name,))}
+    return Columns.of(PLANT_SIGNALS, wanted), Columns.of(CONTROLLER_SIGNALS, wanted)
 
 
 def record_of(
     scenario: Scenario,
-    kept: tuple[Columns, Columns],
     plant: NDArray[np.void],
-    controller: NDArray[np.void],
+    controller: Mapping[str, NDArray[np.void]],
+    tables: Mapping[str, tuple[Signal, ...]],
 ) -> Record:
-    """Rows by robot and tick as a record that was read."""
+    """Rows by robot and tick as a record that was read; `tables` are those of the controllers."""
     robots = scenario.names
-    signals: dict[str, Any] = dict.fromkeys(robots, kept[1].signals)
     return Record(
-        Path("record of the kernel"),
+        _PATH,
         robots,
         dict(zip(robots, plant, strict=True)),
-        dict(zip(robots, controller, strict=True)),
-        signals,
+        dict(controller),
+        dict(tables),
         "",
         "",
     )
+
+
+def with_ages(
+    rows: NDArray[np.void], signals: tuple[Signal, ...], ages: Mapping[str, NDArray[np.float64]]
+) -> tuple[NDArray[np.void], tuple[Signal, ...]]:
+    """The rows of a controller with ages of what it heard, in a record's order; their table."""
+    used = {signal.name for signal in USED_SIGNALS}
+    before = [signal for signal in signals if signal.name in used]
+    table = (*before, *age_signals(tuple(ages)), *signals[len(before) :])
+    made = np.empty(len(rows), row_type(table))
+    for name in rows.dtype.names or ():
+        made[name] = rows[name]
+    for signal, values in zip(age_signals(tuple(ages)), ages.values(), strict=True):
+        made[signal.name] = values
+    return made, table

@@ -1,7 +1,7 @@
 """What the equations call of Python, said again for the compiler, value for value.
 
-Its own versions differ in corners: `min` and `max` where an argument isn't a number, and the float32
-of the bus. Each is tested against what it stands for.
+Its own versions differ in corners: `min` and `max` where an argument isn't a number, and float32 as
+the bus has it. Each is tested against what it stands for.
 """
 
 from collections.abc import Sequence
@@ -14,12 +14,12 @@ FLOAT32_MOST = 3.4028234663852886e38
 
 def least(a: float, b: float) -> float:
     """Python's min(a, b)."""
-    return b if b < a else a
+    return b if b < a else a  # noqa: FURB136 - that is what it says
 
 
 def most(a: float, b: float) -> float:
     """Python's max(a, b)."""
-    return b if b > a else a
+    return b if b > a else a  # noqa: FURB136 - that is what it says
 
 
 def bisect_right(ordered: Sequence[float], value: float) -> int:

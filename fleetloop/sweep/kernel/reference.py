@@ -9,12 +9,14 @@ from functools import lru_cache
 from typing import Final
 
 from bridge.process.lifecycle import Stop
+from configs.brief import Schedule
 from configs.connections import NetworkLink
 from configs.events import Event
-from configs.resolve import agent_brief, leader_brief, plant_brief, schedule, signals_of
+from configs.resolve import agent_brief, leader_brief, plant_brief, signals_of
 from configs.scenario import Scenario
 from fleetloop.in_process.run import InProcessRun
 from fleetloop.record.memory import MemoryRecord
+from fleetloop.sweep.kernel.layout import CONTROLLER_SIGNALS
 from fleetloop.sweep.kernel.outcome import KernelOutcome
 
 _NETWORK: Final = NetworkLink("in-process", "", "", "")
@@ -35,24 +37,20 @@ def referred(scenario: Scenario, stop: Stop, left_course: str) -> KernelOutcome:
     return KernelOutcome(memory.record(signals, ""), run.stopped_robots, run.events, left_course)
 
 
-def arming(scenario: Scenario) -> list[Event]:
+def arming(scenario: Scenario, ticks: Schedule) -> list[Event]:
     """The events of all robots before tick 0.
 
     Raises:
         InfrastructureError: the drives were not armed when control had to start.
     """
-    return [
-        event._replace(source=robot)
-        for robot in scenario.names
-        for event in _armed(_Countdown(scenario))
-    ]
+    events = _armed(_Countdown(scenario, ticks))
+    return [event._replace(source=robot) for robot in scenario.names for event in events]
 
 
 class _Countdown:
     """A scenario, equal to all others whose drives are armed alike."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        ticks = schedule(scenario)
+    def __init__(self, scenario: Scenario, ticks: Schedule) -> None:
         self.scenario = scenario
         self._key = (
             *(ticks.period_ns, ticks.countdown_ticks),
@@ -72,10 +70,10 @@ def _armed(countdown: _Countdown) -> tuple[Event, ...]:
     scenario = countdown.scenario
     plant = plant_brief(scenario, network=_NETWORK)
     agent = agent_brief(scenario, scenario.names[0], network=_NETWORK, bus=())
-    alone = replace(agent, hears=(), channels=())
+    alone = replace(agent, hears=(), channels=(), signals=CONTROLLER_SIGNALS, logs_inputs=False)
     run = InProcessRun(
         replace(plant, robots=plant.robots[:1], traffic=False),
-        [replace(alone, logs_inputs=False)],
+        [alone],
         leader_brief(scenario),
         MemoryRecord(),
         lambda _: None,

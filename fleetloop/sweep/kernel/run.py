@@ -4,12 +4,15 @@ from collections.abc import Collection, Sequence
 from typing import Final
 
 from bridge.process.lifecycle import Stop
+from configs.resolve import schedule
 from configs.scenario import Scenario
-from fleetloop.sweep.kernel import loop
+from configs.signals import AGE_PREFIX, age_signals
+from fleetloop.sweep.kernel import layout, loop
 from fleetloop.sweep.kernel.compilation import Simulate, compiled_loop
 from fleetloop.sweep.kernel.coverage import lacks
-from fleetloop.sweep.kernel.lowering import lowered
-from fleetloop.sweep.kernel.outcome import KernelOutcome, columns, controller_table, record_of
+from fleetloop.sweep.kernel.hearing import ages_s
+from fleetloop.sweep.kernel.lowering import Records, lowered
+from fleetloop.sweep.kernel.outcome import KernelOutcome, columns, record_of, with_ages
 from fleetloop.sweep.kernel.reference import arming, referred
 
 _LEFT: Final = {
@@ -21,9 +24,7 @@ _LEFT: Final = {
 }
 
 
-def run(
-    scenarios: Sequence[Scenario], signals: Collection[str], stop: Stop
-) -> list[KernelOutcome]:
+def run(scenarios: Sequence[Scenario], signals: Collection[str], stop: Stop) -> list[KernelOutcome]:
     """Run cases; with a stop, those before it.
 
     A case in which a robot stops itself or diverges is run again by the in-process reference, from
@@ -39,28 +40,47 @@ def run(
         InfrastructureError: the drives were not armed when control had to start.
     """
     simulate, asked = compiled_loop(), frozenset(signals)
+    rows = layout.one(layout.TRUTH), layout.one(layout.TOLD)
     outcomes = []
     for scenario in scenarios:
         if stop.requested:
             break
-        outcomes.append(_run_one(simulate, scenario, asked, stop))
+        outcomes.append(_run_one(simulate, scenario, asked, rows, stop))
     return outcomes
 
 
 def _run_one(
-    simulate: Simulate, scenario: Scenario, asked: frozenset[str], stop: Stop
+    simulate: Simulate,
+    scenario: Scenario,
+    asked: frozenset[str],
+    rows: tuple[Records, Records],
+    stop: Stop,
 ) -> KernelOutcome:
     if lacking := lacks(scenario):
         raise ValueError(f"{scenario.name}: the kernel has no {lacking}")
-    made = lowered(scenario)
-    kept = columns(controller_table(scenario), asked)
-    room = [one.rows(len(made.robots), made.schedule.ticks) for one in kept]
+    ticks = schedule(scenario)
+    made = lowered(scenario, ticks)
+    kept = columns(asked)
+    room = [one.rows(len(made.robots), ticks.ticks, ticks.period_ns) for one in kept]
     why, tick, number = simulate(
-        *(made.case, made.robots, made.states, made.edges, made.leader_m_s, made.curves),
+        *(made.cases, made.robots, made.states, made.edges, made.changes),
+        *(made.leader_m_s, made.curves),
+        rows,
         (kept[0].numbers, kept[1].numbers),
         (room[0][0], room[1][0]),
     )
     if why != loop.NOTHING:
-        where = f"{_LEFT[why]} ({scenario.names[number]}, {made.schedule.when(tick)})"
+        where = f"{_LEFT[why]} ({scenario.names[number]}, {ticks.when(tick)})"
         return referred(scenario, stop, where)
-    return KernelOutcome(record_of(scenario, kept, room[0][1], room[1][1]), {}, arming(scenario))
+    controller = dict(zip(scenario.names, room[1][1], strict=True))
+    tables = dict.fromkeys(scenario.names, kept[1].signals)
+    if scenario.ages_vary and any(name.startswith(AGE_PREFIX) for name in asked):
+        for robot, without in controller.items():
+            ages = {
+                speaker: ages_s(made.heard[robot][speaker], ticks)
+                for speaker in scenario.aged(robot)
+                if age_signals((speaker,))[0].name in asked
+            }
+            controller[robot], tables[robot] = with_ages(without, kept[1].signals, ages)
+    record = record_of(scenario, room[0][1], controller, tables)
+    return KernelOutcome(record, {}, arming(scenario, ticks))
