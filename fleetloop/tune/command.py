@@ -211,6 +211,7 @@ def _go(folder: Path, plan: TuningPlan, cases: Cases, ways: Ways) -> int:
             search.go(evaluate, stop)
             judged = search.judged()
             if tuning.check_cases is not None and not stop.requested:
+                meter.check()
                 judged = search.checked(evaluate, stop)
         if stop.requested:
             search.ended = "interrupted"
