@@ -49,7 +49,8 @@ def run(
         str | None,
         typer.Argument(
             metavar="STUDY",
-            help="A study file, or the name of a shipped one: delay_loss, mass_friction.",
+            help="A study file, or the name of a shipped one: delay_loss, mass_friction,"
+            " start_basin.",
             autocompletion=_shipped,
         ),
     ] = None,

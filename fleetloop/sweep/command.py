@@ -31,7 +31,7 @@ from fleetloop.sweep.extra import PACKAGES, require
 from fleetloop.sweep.plan import STUDY, Plan
 from fleetloop.sweep.progress import Meter
 from fleetloop.sweep.stopping import Tally, decided
-from fleetloop.sweep.worst import FOLDER, keep_worst, worst_of
+from fleetloop.sweep.worst import FOLDER, keep_worst, missing_of, worst_of
 from fleetloop.terminal import note, say, say_json
 
 NUMBERS = "sweep.json"
@@ -198,18 +198,24 @@ def _go(folder: Path, cases: Cases, ways: Ways) -> int:
                 raise ScenarioError(
                     f'{work.invalid}; invalid = "stop": go on without it with invalid = "go on"'
                 )
-            troubles: list[str] = []
+            finished = work.ended != "" or bool(dataset.done.all())
             if not stop.requested and dataset.done.any():
-                numbers = worst_of(folder, cases.study.keep.worst)
-                troubles = keep_worst(cases.plan, folder, numbers, stop, lambda: None)
-            for line in troubles:
-                note(line)
-            interrupted = stop.requested and not (dataset.done.all() or work.ended)
+                _keep_worst(work, stop)
+            interrupted = stop.requested and not (finished and not cases.study.keep.worst)
             if interrupted:
                 note(f"{stop.reason}: go on with fleetloop sweep --resume {folder}")
     finally:
         dataset.close()
     return _finish(work, interrupted)
+
+
+def _keep_worst(work: _Work, stop: Stop) -> None:
+    numbers = worst_of(work.folder, work.cases.study.keep.worst)
+    missing = missing_of(work.folder, numbers)
+    if missing and not work.ways.as_json:
+        note(f"{work.cases.study.title}: whole runs of the worst cases: {len(missing)}")
+    for line in keep_worst(work.cases.plan, work.folder, missing, stop):
+        note(line)
 
 
 def _tally_of(folder: Path, total: int, dataset: Dataset) -> Tally:

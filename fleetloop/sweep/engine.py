@@ -27,7 +27,7 @@ from fleetloop.sweep.versions import versions_here
 from fleetloop.sweep.work import Done, VersionMismatchError, work
 
 CHUNK_S, LONGEST_S = 2.0, 10.0
-FEW_CASES, MOST_CASES, FASTEST_GROWTH = 8, 2000, 4
+FEW_CASES, MOST_CASES, FASTEST_GROWTH = 16, 2000, 4
 MOST_DEATHS = 2
 LOOK_EVERY_S, COUNT_EVERY_S = 0.2, 2.0
 NO_WORKER_S = 60.0

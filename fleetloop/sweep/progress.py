@@ -54,11 +54,11 @@ class Meter(Bars):
         return f"{told}: {counts}" if counts else told
 
     def pace(self) -> str:
-        """Rate and time left, once there is a rate."""
+        """Rate and time left, once there is a rate: workers load, or compile, first."""
         made = self._done - self._before
         passed_s = self._clock.monotonic_s() - self._began_s
         if not made or passed_s <= 0:
-            return ""
+            return ", starting"
         rate = made / passed_s
         told = f"{rate:.0f} a second" if rate >= 10 else f"{60 * rate:.0f} a minute"
         left_s = round((self._total - self._done) / rate)

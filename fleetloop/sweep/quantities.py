@@ -99,8 +99,9 @@ class Quantities:
         margins = [one["margin"] for one in judged]
         known = [float(margin) for margin in margins if margin is not None]
         least = -inf if stopped else min(known, default=None)
+        seen: _Courses = {}
         values: dict[str, float | None] = {
-            one.name: _value(one, record, scenario) for one in self.statistics
+            one.name: _value(one, record, scenario, seen) for one in self.statistics
         }
         values |= dict.fromkeys(self.expected)
         values |= {
@@ -118,12 +119,20 @@ def _reason(verdict: str, judged: Sequence[Judged], stopped: Mapping[str, str]) 
     return "; ".join(claim(one) for one in judged if one["held"] is False)
 
 
-def _value(one: Quantity, record: Record, scenario: Scenario) -> float | None:
-    signals = TORQUES if one.signal == TORQUE else (one.signal,)
-    courses = [
-        course for signal in signals for course in _courses(signal, one.robots, record, scenario)
-    ]
-    return statistic(one.statistic, courses)
+_Courses = dict[tuple[str, tuple[str, ...]], list[Course]]
+
+
+def _value(one: Quantity, record: Record, scenario: Scenario, seen: _Courses) -> float | None:
+    """The value of a column; several are about the same courses, which are `seen` once."""
+    about = (one.signal, one.robots)
+    if about not in seen:
+        signals = TORQUES if one.signal == TORQUE else (one.signal,)
+        seen[about] = [
+            course
+            for signal in signals
+            for course in _courses(signal, one.robots, record, scenario)
+        ]
+    return statistic(one.statistic, seen[about])
 
 
 def _courses(
@@ -131,9 +140,9 @@ def _courses(
 ) -> Iterator[Course]:
     period_s = scenario.clock.control_period_s
     for series in series_of(signal, robots, record, scenario):
-        ticks = np.arange(len(series.values))[series.member.ticks]
-        there = ticks[series.known[series.member.ticks]]
-        yield Course(there * period_s, series.values[there])
+        t_s = np.arange(len(series.values))[series.member.ticks] * period_s
+        values, known = series.values[series.member.ticks], series.known[series.member.ticks]
+        yield Course(t_s, values) if known.all() else Course(t_s[known], values[known])
 
 
 # --- of a study -----------------------------------------------------------------------------------

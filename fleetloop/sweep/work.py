@@ -1,10 +1,13 @@
 """What a worker does: the rows of some cases of a plan."""
 
+import fcntl
 import gc
 import os
+import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bridge.process.clock import SYSTEM_CLOCK
@@ -56,8 +59,10 @@ def work(plan: Plan, numbers: tuple[int, ...], asked: Versions, *, kernel: bool)
         raise VersionMismatchError(differs)
     began_s = SYSTEM_CLOCK.monotonic_s()
     cases = cases_of(plan)
-    with _rare_collection(), Watch(cases.study.limit_s) as watch:
-        rows = rows_of(cases, numbers, watch, kernel_here() if kernel else None)
+    engine = kernel_here() if kernel else None
+    alone = _first_alone(compiles=engine is not None)
+    with alone, _rare_collection(), Watch(cases.study.limit_s) as watch:
+        rows = rows_of(cases, numbers, watch, engine)
     batch = Columns(cases).batch(rows)
     return Done(batch, began_s, SYSTEM_CLOCK.monotonic_s(), os.getpid())
 
@@ -71,3 +76,28 @@ def _rare_collection() -> Iterator[None]:
         yield
     finally:
         gc.set_threshold(*thresholds)
+
+
+_compiled = False
+"""Whether this process has run its first cases by the kernel."""
+
+
+@contextmanager
+def _first_alone(*, compiles: bool) -> Iterator[None]:
+    """The first cases of a process, one process of a user and machine after the other.
+
+    What the first one compiles for a minute, the others take from its cache.
+    """
+    global _compiled  # noqa: PLW0603
+    opened = None
+    if compiles and not _compiled:
+        path = Path(tempfile.gettempdir(), f"fleetloop-kernel-{os.getuid()}.lock")
+        with suppress(OSError):  # without it all of them compile
+            opened = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+            fcntl.flock(opened, fcntl.LOCK_EX)
+    try:
+        yield
+        _compiled |= compiles
+    finally:
+        if opened is not None:
+            os.close(opened)

@@ -7,7 +7,7 @@ Worst are the cases that failed, those with the least margin first, and then the
 
 import math
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -76,15 +76,21 @@ def worst_of(folder: Path, most: int) -> list[int]:
     return [number for number, *_ in sorted(judged, key=rank)[:most]]
 
 
-def keep_worst(
-    plan: Plan, folder: Path, numbers: Sequence[int], stop: Stop, on_look: Callable[[], None]
-) -> list[str]:
-    """Run the worst cases whose folders aren't there yet; what went wrong, a line each."""
-    jobs = [WholeRun(plan, number, folder / FOLDER / f"case-{number:06d}") for number in numbers]
-    left = [job for job in jobs if not job.folder.exists()]
-    done = pool.work(left, stop, lambda *_: on_look())
+def missing_of(folder: Path, numbers: Sequence[int]) -> list[int]:
+    """Those of these cases whose whole runs aren't there yet."""
+    return [number for number in numbers if not _place(folder, number).exists()]
+
+
+def keep_worst(plan: Plan, folder: Path, numbers: Sequence[int], stop: Stop) -> list[str]:
+    """Run cases whole; what went wrong, a line each."""
+    jobs = [WholeRun(plan, number, _place(folder, number)) for number in numbers]
+    done = pool.work(jobs, stop)
     return [
-        f"case {left[n].number}: its whole run: {brought}"
+        f"case {jobs[n].number}: its whole run: {brought}"
         for n, brought in sorted(done.items())
         if isinstance(brought, pool.Failed)
     ]
+
+
+def _place(folder: Path, number: int) -> Path:
+    return folder / FOLDER / f"case-{number:06d}"

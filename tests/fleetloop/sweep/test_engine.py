@@ -37,8 +37,8 @@ def test_a_chunk_takes_about_its_time_or_has_a_few_cases(each_s: float) -> None:
         assert size * each_s <= max(CHUNK_S, LONGEST_S) * 1.001
 
 
-@pytest.mark.parametrize(("each_s", "size"), [(0.25, 8), (0.01, 200), (3.0, 3), (60.0, 1)])
-def test_a_task_has_eight_cases_unless_they_take_ten_seconds(each_s: float, size: int) -> None:
+@pytest.mark.parametrize(("each_s", "size"), [(0.25, 16), (0.01, 200), (3.0, 3), (60.0, 1)])
+def test_a_task_has_sixteen_cases_unless_they_take_ten_seconds(each_s: float, size: int) -> None:
     assert after(each_s).size == size
 
 

@@ -9,7 +9,7 @@ def test_rate_and_time_left_are_those_of_this_command_alone() -> None:
     clock = ManualClock()
     meter = Meter("study", 1000, 400, quiet=True, clock=clock)
     meter.begin()
-    assert meter.pace() == ""
+    assert meter.pace() == ", starting"
     clock.passes(10.0)
     meter.advance(["held"] * 180 + ["failed"] * 20)
     assert meter.pace() == ", 20 a second, 0:20 left"
