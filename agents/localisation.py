@@ -29,7 +29,6 @@ Planar = tuple[float, float, float]
 """x, y [m], θ [rad]."""
 Anchor = tuple[float, float, float, float, float, float, float, float]
 """A fix, the odometry at its instant, and the turn from odometry's axes to the world's."""
-AT_START: Final[Anchor] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
 def along(right: float, left: float, half: float, half_over_b: float) -> tuple[float, float]:
@@ -97,7 +96,7 @@ class Localiser:
         self._odometry: Planar = (0.0, 0.0, 0.0)
         self._past = deque([self._odometry] * (delay_ticks + 1), maxlen=delay_ticks + 1)
         self._held = mode == "external"
-        self._anchor = AT_START
+        self._anchor: Anchor = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
     def remember(self, delay_ticks: int) -> None:
         """Keep the odometry of so many periods from now on; what isn't kept already is unknown."""

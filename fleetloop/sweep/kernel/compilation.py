@@ -37,16 +37,26 @@ from __future__ import annotations
 from numba import njit
 
 _equation = njit(error_model="numpy", nogil=True, forceinline=True)
+_seldom = njit(error_model="numpy", nogil=True)
 _loop = njit(error_model="numpy", nogil=True, cache=True)
 '''
+
+_SELDOM: Final = (
+    *("_take_map", "period_map", "matrix_exponential", "_product"),
+    *("_reference", "_centre", "turning_reference", "shifted_reference", "reference_of"),
+    *("line_jet", "cosine_jet", "circle_jet", "figure_eight_jet", "spline_jet", "varying_jet"),
+    *("_wave", "_add", "_polynomial", "bisect_right"),
+)
+"""What isn't called at every tick of most cases is called, and not put in where it is called: that
+takes a compiler long."""
 
 Simulate = Callable[..., tuple[int, int, int]]
 
 
 def linked_text() -> str:
     """The module that is compiled."""
-    linker = Linker("@_equation")
-    linker.add(LOOP, ROOT, "@_loop")
+    linker = Linker("@_equation", {ROOT: "@_loop", **dict.fromkeys(_SELDOM, "@_seldom")})
+    linker.add(LOOP, ROOT)
     return linker.text(_HEAD)
 
 

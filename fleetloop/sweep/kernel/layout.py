@@ -36,6 +36,7 @@ def _fields(kind: str, names: str) -> list[tuple[str, str]]:
 CASE = np.dtype(
     [
         *_fields(_WHOLE, "ticks period_ns share_every localise_every pose_delay_ticks substeps"),
+        *_fields(_WHOLE, "countdown_ns heartbeat_ns rearms"),
         *_fields(_WHOLE, "localisation extrapolates path closed last_knot"),
         *_fields(_FLOAT, "period_s half_period_s p q age_limit_s silence_limit_s"),
         *_fields(_FLOAT, "s_min_m s_max_m v_min_m_s v_max_m_s v_low_m_s v_high_m_s"),
@@ -70,7 +71,9 @@ ROBOT = np.dtype(
 
 STATE = np.dtype(
     [
-        *_fields(_WHOLE, "started"),  # whether the law has had its first tick
+        # whether the law has had its first tick; why and when the robot stopped, the body diverged
+        *_fields(_WHOLE, "started stopped stop_tick diverged diverged_tick"),
+        *_fields(_FLOAT, "diverged_v diverged_omega diverged_right diverged_left"),
         # the body; torques at the shafts, and what was asked of the motors, at the wheels
         *_fields(_FLOAT, "x y theta v omega right_wheel_rad left_wheel_rad"),
         *_fields(_FLOAT, "torque_right_shaft torque_left_shaft demand_right demand_left"),

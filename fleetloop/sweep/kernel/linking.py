@@ -162,16 +162,17 @@ class Linker:
     """Gathers what a function needs.
 
     Args:
-        decorator: of every function but the roots.
+        decorator: of every function but those that have another.
+        decorators: by the names of these.
     """
 
-    def __init__(self, decorator: str) -> None:
-        self._decorator = decorator
+    def __init__(self, decorator: str, decorators: Mapping[str, str] | None = None) -> None:
+        self._decorator, self._decorators = decorator, decorators or {}
         self._texts: dict[str, str] = {}  # by name, what it needs before it
         self._from: dict[str, str] = {}  # name -> module
         self._imports: set[str] = set()
 
-    def add(self, module: str, name: str, decorator: str | None = None) -> None:
+    def add(self, module: str, name: str) -> None:
         """Take in one name of a module, and all that it needs.
 
         Raises:
@@ -199,7 +200,7 @@ class Linker:
                 renamed[used] = needed
         text = ast.unparse(_Bare(renamed).visit(bare))
         if isinstance(node, ast.FunctionDef):
-            text = f"{decorator or self._decorator}\n{text}"
+            text = f"{self._decorators.get(name, self._decorator)}\n{text}"
         for one in _names_of(node):
             self._texts[one], self._from[one] = text, module
 

@@ -9,8 +9,10 @@ order in which the controller and the plant do. It is plain Python that numba co
 equations, as they stand in their sources (`fleetloop.sweep.kernel.linking`), and it runs uncompiled
 just as well, only slowly.
 
-A case that leaves the ordinary course (a robot stops itself, a body or a path variable diverges)
-isn't followed: `simulate` says at which tick, and the case belongs to the reference.
+A robot whose law asks for a torque that is no number stops itself; one whose body's motion diverges
+stands still, its drives disarm, and it stops itself at their next heartbeat. A case that leaves
+this course (a path variable or a pose out of reach, a robot that may arm again) isn't followed:
+`simulate` says at which tick, and the case belongs to the reference.
 
 Records of arrays have the fields of `fleetloop.sweep.kernel.layout`.
 """
@@ -68,8 +70,10 @@ from plant.integrate import net_torques, runge_kutta, within_bounds
 
 SATURATED = 3.4e38
 """What a torque beyond float32 is sent as: `bridge.drives.odrive.client.FLOAT32_MAX`."""
-NOTHING, PATH_VARIABLE, POSE, TORQUE, BODY, TURN = range(6)
-"""Why a case left the ordinary course."""
+NOTHING, PATH_VARIABLE, POSE, TURN, REARMING = range(5)
+"""Why a case left the course."""
+GOING, TORQUE, DRIVES = range(3)
+"""Why a robot stopped itself."""
 MOST_TURN_RAD = 1e15
 """Whole turns beyond are no whole numbers any more."""
 
@@ -86,7 +90,7 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
     kept: tuple[Any, Any],
     room: tuple[Any, Any],
 ) -> tuple[int, int, int]:
-    """Run one case from tick 0 to its end, or to the tick at which it leaves the ordinary course.
+    """Run one case from tick 0 to its end, or to the tick at which it leaves the course.
 
     Args:
         cases: one record of `layout.CASE`.
@@ -99,10 +103,11 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
         curves: knots of all splines; and their coefficients, twice: x and y, or ahead and left.
         rows: records of `layout.TRUTH` and of `layout.TOLD`, one each, to write in.
         kept: numbers of the columns of these that are kept.
-        room: for these columns of the plant and of the controllers: robot, tick, column.
+        room: for these columns of the plant and of the controllers: robot, tick, column; the first
+            two columns, tick and time, are there.
 
     Returns:
-        why it left the ordinary course, `NOTHING` if it didn't; the tick; the robot's number.
+        why it left the course, `NOTHING` if it didn't; the tick; the robot's number.
     """
     case, count, ticks = cases[0], len(robots), cases[0].ticks
     (truths, tolds), (kept_truth, kept_told), (plant_room, controller_room) = rows, kept, room
@@ -120,6 +125,8 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
         fix_tick = tick - case.pose_delay_ticks
         localises = tick % case.localise_every == 0
         fixes = fix_tick >= 0 and fix_tick % case.localise_every == 0
+        bus_ns = t_ns + case.countdown_ns
+        beats = bus_ns // case.heartbeat_ns > (bus_ns - case.period_ns) // case.heartbeat_ns
         slot, fix_slot = tick % slots, fix_tick % slots
         if tick % case.share_every == 0:
             share = tick // case.share_every
@@ -133,7 +140,7 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
             if len(kept_truth):
                 _tell_truth(truth, t_s, robot, state)
                 for column in range(len(kept_truth)):
-                    plant_room[i, tick, column] = truth_row[kept_truth[column]]
+                    plant_room[i, tick, column + 2] = truth_row[kept_truth[column]]
             _measure(robot, state)
             if localises:
                 if not within_world(state.x, state.y, state.theta):
@@ -205,15 +212,17 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
                 reference = _cosine(robot, s)
             else:
                 reference = _reference(case, robot, curves, s)
-            why = _control(case, robot, state, told, reference)
-            if why != NOTHING:
-                return why, tick, i
+            if beats and state.diverged and state.stopped == GOING:
+                state.stopped, state.stop_tick = DRIVES, tick
+            if not _control(case, robot, state, told, reference, tick):
+                return POSE, tick, i
+            if state.stopped != GOING and case.rearms:
+                return REARMING, tick, i
             for column in range(len(kept_told)):
-                controller_room[i, tick, column] = told_row[kept_told[column]]
+                controller_room[i, tick, column + 2] = told_row[kept_told[column]]
             if not _is_reached(case, t_s + case.period_s, state.s, state.v_hat):
                 return PATH_VARIABLE, tick, i
-            if not _advance(case.substeps, step_s, robot, state, t_s):
-                return BODY, tick, i
+            _advance(case.substeps, step_s, robot, state, t_s, tick)
     return NOTHING, ticks, 0
 
 
@@ -315,14 +324,15 @@ def _control(
     state: Any,
     told: Any,
     reference: tuple[float, float, float, float, float],
-) -> int:
-    """Torques to the drives, by what the controller knows; why it can't go on."""
+    tick: int,
+) -> bool:
+    """Torques to the drives, by what the controller knows; False: that isn't finite."""
     if case.localisation == EXTERNAL:
         x, y, theta = state.f_x, state.f_y, state.f_theta
     else:
         x, y, theta = carried(_anchor(state), (state.o_x, state.o_y, state.o_theta))
     if not isfinite(x + y + theta + state.v_used + state.omega_used):
-        return POSE
+        return False
     told.x_used_m, told.y_used_m, told.theta_used_rad = x, y, theta
     told.v_used_m_s, told.omega_used_rad_s = state.v_used, state.omega_used
     x_d, y_d, theta_d, v_bar_d, omega_bar_d = reference
@@ -330,18 +340,23 @@ def _control(
     x_e, y_e, theta_e = path_errors(x, y, theta, x_d, y_d, theta_d)
     told.x_e_m, told.y_e_m, told.theta_e_rad = x_e, y_e, theta_e
     right, left = _law(robot, state, told, v_bar_d, omega_bar_d)
-    if not isfinite(right + left):
-        return TORQUE
+    if state.stopped == GOING and not isfinite(right + left):
+        state.stopped, state.stop_tick = TORQUE, tick
+    if state.stopped != GOING:
+        right = left = 0.0
     _send(robot, state, right, left)
     told.tau_right_wheel_N_m = state.torque_right_shaft * robot.to_wheel_right
     told.tau_left_wheel_N_m = state.torque_left_shaft * robot.to_wheel_left
-    return NOTHING
+    return True
 
 
 def _law(
     robot: Any, state: Any, told: Any, v_bar_d: float, omega_bar_d: float
 ) -> tuple[float, float]:
-    """The torques of the paper's law or of the robust one, limited by the host; its next state."""
+    """The torques of the paper's law or of the robust one, limited by the host; its next state.
+
+    A robot that has stopped, or does so now, keeps its state.
+    """
     v, omega, s_dot = state.v_used, state.omega_used, told.s_dot
     x_e, y_e, theta_e = told.x_e_m, told.y_e_m, told.theta_e_rad
     k1, k2, k3, k4 = robot.k1, robot.k2, robot.k3, robot.k4
@@ -351,10 +366,9 @@ def _law(
     else:
         closing, bar_theta = approach(x_e, sense(s_dot) * y_e, k1, k2)
     bar_v, turn = virtual_controls(closing, bar_theta, theta_e, s_dot, v_bar_d, omega_bar_d, k3)
-    if not state.started:
-        state.started = 1
-        state.alpha_theta, state.alpha_v, state.alpha_omega = bar_theta, bar_v, turn
-    filters: Filters = (state.alpha_theta, state.alpha_v, state.alpha_omega)
+    filters: Filters = (bar_theta, bar_v, turn)
+    if state.started:
+        filters = (state.alpha_theta, state.alpha_v, state.alpha_omega)
     theta_1 = (state.theta_1, state.theta_2, state.theta_3, state.theta_4)
     theta_2 = (state.theta_5, state.theta_6, state.theta_7, state.theta_8)
     kappa = state.kappa
@@ -376,7 +390,7 @@ def _law(
     if robust and at_limit(right, left, robot.torque_limit):
         right, left = clip(right, robot.torque_limit), clip(left, robot.torque_limit)
         learns = False
-    if not isfinite(right + left):  # the case ends here
+    if state.stopped != GOING or not isfinite(right + left):
         return right, left
     if robot.host_limits:
         asked_right, asked_left = right, left
@@ -384,6 +398,7 @@ def _law(
         left = limited(left, state.limited_left, robot.host_limit, robot.host_step)
         state.limited_right, state.limited_left = right, left
         learns = learns and right == asked_right and left == asked_left
+    state.started = 1
     state.alpha_theta, state.alpha_v, state.alpha_omega = after
     if learns:
         bounds = Projection(robot.sigma, robot.sigma_square, robot.sigma_span, robot.sigma_limit)
@@ -459,11 +474,15 @@ def _centre(case: Any, curves: Any, s: float) -> PlanarJet:
 # --- the robot ------------------------------------------------------------------------------------
 
 
-def _advance(substeps: int, step_s: float, robot: Any, state: Any, t_s: float) -> bool:
-    """The body over one period, torques held; False: its motion diverged."""
-    right = state.torque_right_shaft * robot.gear_right
-    left = state.torque_left_shaft * robot.gear_left
+def _advance(substeps: int, step_s: float, robot: Any, state: Any, t_s: float, tick: int) -> None:
+    """The body over one period, torques held; where its motion diverges it stands still."""
+    right_shaft, left_shaft = state.torque_right_shaft, state.torque_left_shaft
+    if state.stopped != GOING or state.diverged:  # the drives are disarmed
+        right_shaft = left_shaft = 0.0
+    right, left = right_shaft * robot.gear_right, left_shaft * robot.gear_left
     state.demand_right, state.demand_left = right, left
+    if state.diverged:
+        return
     constants = (
         *(robot.centrifugal, robot.coriolis),
         *(robot.damping_11, robot.damping_12, robot.damping_21, robot.damping_22),
@@ -480,11 +499,16 @@ def _advance(substeps: int, step_s: float, robot: Any, state: Any, t_s: float) -
             net = net_torques(right, left, waves, t_s + n * step_s, step_s)
         else:
             net = (right, left, right, left, right, left)
-        motion = runge_kutta(
+        after = runge_kutta(
             body_rates, constants, motion, net, step_s, half_track, robot.inv_right, robot.inv_left
         )
-        if not within_bounds(motion, half_track, robot.fastest_m_s):
-            return False
+        if not within_bounds(after, half_track, robot.fastest_m_s):
+            x, y, theta, v, omega, right_rad, left_rad = motion
+            state.diverged, state.diverged_tick = 1, tick
+            state.diverged_v, state.diverged_omega = v, omega
+            state.diverged_right, state.diverged_left = right, left
+            motion = (x, y, theta, 0.0, 0.0, right_rad, left_rad)
+            break
+        motion = after
     state.x, state.y, state.theta, state.v, state.omega = motion[:5]
     state.right_wheel_rad, state.left_wheel_rad = motion[5], motion[6]
-    return True

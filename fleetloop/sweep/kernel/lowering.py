@@ -101,6 +101,8 @@ def _case(
     return (
         *(ticks.ticks, ticks.period_ns, ticks.share_every, ticks.localise_every),
         *(ticks.pose_delay_ticks, substeps(scenario.clock, ticks.period_ns)),
+        ticks.countdown_ticks * ticks.period_ns,
+        *(round(scenario.drive_choice.heartbeat_period_s * 1e9), scenario.host.rearm),
         _SOURCES[scenario.localisation.source],
         coordination.compensation == "extrapolate",
         *(kind, curves.closed, curves.centre_knots),
@@ -119,7 +121,7 @@ def _start(
     pose = robot.pose
     where = pose.x_m, pose.y_m, pose.theta_rad
     return (
-        0,
+        *(0, 0, 0, 0, 0, nan, nan, nan, nan),
         *(*where, robot.v_m_s, robot.omega_rad_s, 0.0, 0.0),
         *(
             0.0 * drives[0],

@@ -54,7 +54,7 @@ class Columns(NamedTuple):
 
     signals: tuple[Signal, ...]
     numbers: NDArray[np.int64]
-    """Of the columns that the loop fills, of all that a source has; the last ones of its rows."""
+    """Of the columns that the loop fills, of all that a source has: those behind tick and time."""
 
     @classmethod
     def of(cls, table: Sequence[Signal], wanted: Collection[str]) -> "Columns":
@@ -64,11 +64,10 @@ class Columns(NamedTuple):
         return cls((*time, *(table[n] for n in numbers)), np.array(numbers, np.int64))
 
     def rows(self, robots: int, ticks: int, period_ns: int) -> tuple[Rows, NDArray[np.void]]:
-        """Room for the rows of all robots: what the loop fills, and the rows that it is of."""
+        """Room for the rows of all robots: as numbers, for the loop, and as rows of a record."""
         rows = np.empty((robots, ticks), row_type(self.signals))
         rows[:] = _blank(self.signals, ticks, period_ns)
-        numbers = rows.view(np.float64).reshape(robots, ticks, len(self.signals) + 1)
-        return numbers[:, :, 2:], rows
+        return rows.view(np.float64).reshape(robots, ticks, len(self.signals) + 1), rows
 
 
 @lru_cache(maxsize=8)

@@ -4,6 +4,8 @@ from collections.abc import Collection, Sequence
 from typing import Final
 
 from bridge.process.lifecycle import Stop
+from configs.brief import Schedule
+from configs.events import Event
 from configs.resolve import schedule
 from configs.scenario import Scenario
 from configs.signals import AGE_PREFIX, age_signals
@@ -14,21 +16,21 @@ from fleetloop.sweep.kernel.hearing import ages_s
 from fleetloop.sweep.kernel.lowering import Records, lowered
 from fleetloop.sweep.kernel.outcome import KernelOutcome, columns, record_of, with_ages
 from fleetloop.sweep.kernel.reference import arming, referred
+from fleetloop.sweep.kernel.stops import divergences, stop_events
 
 _LEFT: Final = {
     loop.PATH_VARIABLE: "a path variable diverged",
     loop.POSE: "a robot left the world",
-    loop.TORQUE: "a law asked for a torque that is not finite",
-    loop.BODY: "the motion of a body diverged",
     loop.TURN: "a heading diverged",
+    loop.REARMING: "a robot that stopped itself may arm again",
 }
 
 
 def run(scenarios: Sequence[Scenario], signals: Collection[str], stop: Stop) -> list[KernelOutcome]:
     """Run cases; with a stop, those before it.
 
-    A case in which a robot stops itself or diverges is run again by the in-process reference, from
-    its beginning: `KernelOutcome.left_course` says so.
+    A case that leaves the course that the loop can follow is run again by the in-process reference,
+    from its beginning: `KernelOutcome.left_course` says so.
 
     Args:
         scenarios: of which `lacks` says nothing.
@@ -83,4 +85,24 @@ def _run_one(
             }
             controller[robot], tables[robot] = with_ages(without, kept[1].signals, ages)
     record = record_of(scenario, room[0][1], controller, tables)
-    return KernelOutcome(record, {}, arming(scenario, ticks))
+    return KernelOutcome(record, *_events(scenario, made.states, ticks))
+
+
+def _events(
+    scenario: Scenario, states: Records, ticks: Schedule
+) -> tuple[dict[str, str], list[Event]]:
+    """The robots that stopped, and why; all events."""
+    armed = arming(scenario, ticks)
+    if not (states["stopped"].any() or states["diverged"].any()):
+        return {}, armed
+    of_plant = divergences(scenario, states, ticks)
+    stopped: dict[str, str] = {}
+    events = list(of_plant)
+    for robot, state in zip(scenario.names, states, strict=True):
+        of_robot = stop_events(scenario, robot, state)
+        events += [*(event for event in armed if event.source == robot), *of_robot]
+        if of_robot:
+            stopped[robot] = f"{ticks.when(of_robot[-1].tick)}: {of_robot[-1].text}"
+    diverged = sorted(of_plant, key=lambda event: scenario.names.index(event.source))
+    stopped |= {event.source: f"{ticks.when(event.tick)}: {event.text}" for event in diverged}
+    return stopped, events

@@ -2,6 +2,7 @@
 
 import ast
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,6 +66,15 @@ def test_the_compiled_loop_does_what_the_same_text_does_uncompiled() -> None:
     for number, robot in enumerate(scenario.names):
         assert np.array_equal(room[0][1][number], compiled.record.plant[robot])
         assert np.array_equal(room[1][1][number], compiled.record.controller[robot])
+
+
+def test_the_loop_is_compiled_once_whatever_is_asked_of_it() -> None:
+    for signals in ({"s"}, {"x_m"}, {"s", "x_m", "kappa_hat"}, set()):
+        run([load("paper", ["until_s=0.01"])], signals, Stop())
+    run([load("spline_gate", ["until_s=0.01"])], {"s"}, Stop())
+    run([load("lossy_chain", ["until_s=0.01"])], {"s"}, Stop())
+    loop_compiled: Any = compilation.compiled_loop()
+    assert len(loop_compiled.signatures) == 1
 
 
 TEXT = """

@@ -79,3 +79,8 @@ def test_the_lists_have_no_key_that_scenarios_do_not_have() -> None:
     assert set(coverage._SECTIONS) <= set(Scenario.model_fields)
     drive = load("paper").drive_choice.parameters
     assert set(coverage._DRIVE) <= {field.name for field in fields(drive)}
+
+
+def test_without_the_compiler_nothing_is_covered(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(coverage, "_has_compiler", lambda: False)
+    assert lacks(load("paper")).startswith("numba, which isn't installed")

@@ -1,5 +1,6 @@
 """The kernel against the in-process reference: every signal of every tick, bit for bit."""
 
+import inspect
 from collections.abc import Mapping
 
 import numpy as np
@@ -7,13 +8,19 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from agents import guard
 from bridge.process.lifecycle import Stop
 from configs.loading import load
+from configs.resolve import schedule
 from configs.scenario import Scenario
 from configs.signals import PLANT_SIGNALS, age_signals
-from fleetloop.sweep.kernel import KernelOutcome, lacks, run
+from fleetloop.sweep.kernel import KernelOutcome, lacks, layout, loop, run
+from fleetloop.sweep.kernel.compilation import compiled_loop
 from fleetloop.sweep.kernel.layout import CONTROLLER_SIGNALS
+from fleetloop.sweep.kernel.lowering import lowered
+from fleetloop.sweep.kernel.outcome import columns
 from fleetloop.sweep.kernel.reference import referred
+from fleetloop.sweep.kernel.stops import NOT_FINITE, stop_events
 
 AGES = age_signals(("r1", "r2", "r3", "r4", "r5"))
 ALL = {signal.name for signal in (*PLANT_SIGNALS, *CONTROLLER_SIGNALS, *AGES)}
@@ -179,6 +186,55 @@ VARIANTS = {
 @pytest.mark.parametrize("name", VARIANTS)
 def test_what_a_scenario_may_say_is_as_in_process(name: str) -> None:
     assert_as_reference(load("paper", ["until_s=0.15", *VARIANTS[name]]))
+
+
+STOPS = {
+    "all at once": ["control.k4=400.0"],
+    "mirrored and geared": ["control.k4=40.0", "mounting.gear_ratio=7.0", "mounting.left_sign=-1"],
+    "one of four": ["robot.r1.pose.theta_rad=11.0", "robot.r2.pose.theta_rad=-9.5"],
+    "in substeps, limited": [
+        "control.k4=30.0",
+        "clock.plant_step_s=0.0003",
+        "host.torque_limit_wheel_N_m=1e12",
+    ],
+    "one later, seen at a later look of the plant": [
+        "robot.r1.control.k4=5.4",
+        "robot.r4.control.k4=400.0",
+    ],
+    "slow heartbeats": ["control.k4=400.0", "drive.heartbeat_period_s=0.12", "clock.countdown_s=1"],
+}
+
+
+@pytest.mark.parametrize("name", STOPS)
+def test_robots_that_diverge_stop_as_in_process(name: str) -> None:
+    scenario = load("paper", ["until_s=0.35", *STOPS[name]])
+    found = of_kernel(scenario)
+    assert found.left_course == ""
+    assert found.stopped
+    assert_identical(found, referred(scenario, Stop(), ""))
+
+
+def test_a_torque_that_is_no_number_stops_its_robot_alone() -> None:
+    scenario = load("paper", ["until_s=0.05"])
+    ticks = schedule(scenario)
+    made = lowered(scenario, ticks)
+    robots = made.robots.copy()
+    robots["k1"][1] = np.inf
+    kept = columns(frozenset({"tau_right_wheel_N_m", "x_e_m"}))
+    room = [one.rows(4, ticks.ticks, ticks.period_ns) for one in kept]
+    why, *_ = compiled_loop()(
+        *(made.cases, robots, made.states, made.edges, made.changes, made.leader_m_s),
+        made.curves,
+        (layout.one(layout.TRUTH), layout.one(layout.TOLD)),
+        (kept[0].numbers, kept[1].numbers),
+        (room[0][0], room[1][0]),
+    )
+    assert why == loop.NOTHING
+    assert made.states["stopped"].tolist() == [loop.GOING, loop.TORQUE, loop.GOING, loop.GOING]
+    assert not room[1][1]["tau_right_wheel_N_m"][1].any()
+    assert room[1][1]["tau_right_wheel_N_m"][0].all()
+    assert [event.text for event in stop_events(scenario, "r2", made.states[1])] == [NOT_FINITE]
+    assert f'"{NOT_FINITE}"' in inspect.getsource(guard)
 
 
 def test_a_graph_that_is_drawn_is_as_in_process() -> None:

@@ -51,8 +51,11 @@ def test_a_scenario_that_is_not_covered_is_refused_by_name_and_reason() -> None:
 
 
 def test_a_case_off_the_ordinary_course_is_the_references_and_says_so() -> None:
-    scenario = load("paper", ["until_s=0.3", "control.k4=400.0"])
+    scenario = load("paper", ["until_s=0.2", "control.k4=400.0", "host.rearm=true"])
     (outcome,) = run([scenario], {"s"}, Stop())
-    assert "diverged" in outcome.left_course or "not finite" in outcome.left_course
+    assert outcome.left_course == (
+        "a robot that stopped itself may arm again (r1, tick 50 (t = 0.050 s))"
+    )
+    assert outcome.record.controller["r1"]["kappa_hat"].size  # it has all signals
     assert "r1" in outcome.stopped
     assert any(event.kind == "stopped" for event in outcome.events)
