@@ -15,6 +15,8 @@ from fleetloop.sweep import study as studies
 from fleetloop.sweep.app import StudyFirst
 from fleetloop.sweep.cases import Cases
 from fleetloop.sweep.plan import Base, Plan
+from fleetloop.tune import tuning as tunings
+from fleetloop.tune.plan import TuningPlan
 
 HEAD = 'schema = 1\nname = "shown"\n'
 FLEET = "".join(
@@ -36,6 +38,10 @@ TABLES = [
 @pytest.mark.parametrize("snippet", TABLES, ids=lambda s: s.where)
 def test_files_that_are_shown_are_taken(snippet: Snippet, tmp_path: Path) -> None:
     data = tomllib.loads(snippet.text)
+    if "parameter" in data:
+        tuning = tunings.loads("shown.toml", snippet.text)
+        TuningPlan(tuning, Base.beside("shown.toml", tuning.base)).check("shown.toml")
+        return
     if "factor" in data:
         Cases(Plan(studies.loads("shown.toml", snippet.text).to_toml(), BASE))
         return

@@ -18,6 +18,7 @@ from docs.generate.scenario import (
     laws_page,
     scenario_page,
     study_page,
+    tuning_page,
 )
 from docs.generate.vocabulary import door_page, events_page, network_page, signals_page
 
@@ -85,6 +86,12 @@ _PAGES = {
         """What `fleetloop sweep` varies, how often, and what it keeps ([sweeps](../sweeps.md)).
         `fleetloop sweep schema` prints the same as JSON Schema, for editors.""",
         study_page,
+    ),
+    "tuning.md": _Page(
+        "Tuning file",
+        """What `fleetloop tune` searches, over which cases, for what ([tuning](../tuning.md)): a
+        study file, and more.""",
+        tuning_page,
     ),
     "deployment.md": _Page(
         "Deployment file",

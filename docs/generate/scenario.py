@@ -15,6 +15,7 @@ from configs.tables import adapter_of
 from docs.generate.markdown import Schema, Tables, code, doc_block, prose, table
 from fleetloop.fault.kinds import describe
 from fleetloop.sweep.study import json_schema as study_schema
+from fleetloop.tune.tuning import json_schema as tuning_schema
 
 _ELSEWHERE = {
     "control": ("laws.md", "The law and its gains: keys and defaults are those of the law."),
@@ -40,6 +41,11 @@ def deployment_page() -> str:
 def study_page() -> str:
     """Every key of a study file."""
     return _Page(study_schema()).text()
+
+
+def tuning_page() -> str:
+    """Every key of a tuning file."""
+    return _Page(tuning_schema()).text()
 
 
 class _Page:

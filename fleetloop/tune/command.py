@@ -20,6 +20,7 @@ from fleetloop.results.summary import finite, to_json
 from fleetloop.signals import stop_on_signals
 from fleetloop.sweep.cases import Cases
 from fleetloop.sweep.cluster import Place
+from fleetloop.sweep.extra import require
 from fleetloop.terminal import note, say, say_json
 from fleetloop.tune import results, scores
 from fleetloop.tune.evaluation import Evaluation, evaluation_of
@@ -30,7 +31,7 @@ from fleetloop.tune.progress import Meter
 from fleetloop.tune.results import BASELINE_NAME, BEST_NAME
 from fleetloop.tune.rows import rows_kept, write_rows
 from fleetloop.tune.scores import Trial
-from fleetloop.tune.storage import Asked, Storage, alone, storage_of
+from fleetloop.tune.storage import Asked, Storage, alone, optuna_here, storage_of
 from fleetloop.tune.tables import Judged, print_table
 from fleetloop.tune.tuning import Tuning, differences
 
@@ -53,6 +54,7 @@ def begin(source: str, trials: int | None, seed: int | None, out: Path | None, w
         ScenarioError: the file, its base or an option is wrong; nothing was started.
         InfrastructureError: a file or a process can't be had.
     """
+    _require(ways)
     plan = TuningPlan.of(source, trials=trials, seed=seed)
     cases = plan.check(source)
     created = run_folder.create(f"{Path(source).stem}-tune", out, SYSTEM_CLOCK.wall_ns())
@@ -76,6 +78,7 @@ def resume(
         ScenarioError: there is none, or it is another one.
         InfrastructureError: a file or a process can't be had.
     """
+    _require(ways)
     plan = TuningPlan.resume(folder)
     if seed is not None and seed != plan.tuning.seed:
         raise ScenarioError(f"--seed {seed}: this tuning was begun with seed {plan.tuning.seed}")
@@ -95,6 +98,16 @@ def resume(
         plan = TuningPlan.resume(folder, trials=trials)
         plan.save(folder)
     return _go(folder, plan, plan.check(str(folder / TUNING)), ways)
+
+
+def _require(ways: Ways) -> None:
+    """Refuse to go on without the packages of the extra.
+
+    Raises:
+        ScenarioError: one isn't installed.
+    """
+    optuna_here()
+    require("pyarrow", *(("distributed",) if ways.place.workers > 1 else ()))
 
 
 # --- the work -------------------------------------------------------------------------------------
@@ -143,6 +156,12 @@ class Search:
                 return
             write_rows(_path(self.folder, TRIALS, asked.number), rows)
             known = scores.score(self.tuning, rows)
+            if self.tuning.invalid == "stop" and "invalid" in known.verdicts:
+                self.storage.drop(asked)
+                raise ScenarioError(
+                    f'trial {asked.number}: {known.reason}; invalid = "stop": go on without such'
+                    ' cases with invalid = "go on"'
+                )
         self.trials.append(self.storage.tell(asked, known))
         if self.meter is not None:
             self.meter.advance(len(self.trials), self.best)
@@ -192,6 +211,7 @@ def _go(folder: Path, plan: TuningPlan, cases: Cases, ways: Ways) -> int:
             search.go(evaluate, stop)
             judged = search.judged()
             if tuning.check_cases is not None and not stop.requested:
+                meter.check()
                 judged = search.checked(evaluate, stop)
         if stop.requested:
             search.ended = "interrupted"

@@ -21,6 +21,8 @@ _FEASIBLE, _INFEASIBLE, _BEST, _BASELINE = COLOURS[0], COLOURS[6], COLOURS[1], C
 _COLUMNS = 3
 _BEYOND = 0.15
 """Of the range of the feasible trials, that is shown beside it."""
+_DECADE = 10.0
+"""A scale is logarithmic if its numbers span more."""
 
 
 def all_figures(
@@ -173,5 +175,10 @@ def _bound(axes: Axes, trials: Sequence[Trial]) -> None:
         for trial in trials
         if trial.score.objective is not None and (trial.score.feasible or trial.number == 0)
     ]
-    if len(shown) > 1 and (span := max(shown) - min(shown)) > 0:
-        axes.set_ylim(min(shown) - _BEYOND * span, max(shown) + _BEYOND * span)
+    least, most = min(shown, default=0.0), max(shown, default=0.0)
+    if least > 0.0 and most > _DECADE * least:
+        axes.set_yscale("log")
+        axes.set_ylim(least / (1.0 + _BEYOND), most * (1.0 + _BEYOND))
+    elif most > least:
+        span = most - least
+        axes.set_ylim(least - _BEYOND * span, most + _BEYOND * span)

@@ -27,6 +27,7 @@ class Meter(Bars):
         self._clock = clock
         self._began_s = clock.monotonic_s()
         self._best: Trial | None = None
+        self._checking = False
         self._task = self._bars.add_task(name, total=total, state="")
 
     def begin(self) -> None:
@@ -36,6 +37,10 @@ class Meter(Bars):
     def advance(self, done: int, best: Trial | None) -> None:
         """So many trials are done, and this is the best of them."""
         self._done, self._best = done, best
+
+    def check(self) -> None:
+        """All trials are done; other cases come now."""
+        self._checking = True
 
     def show(self) -> None:
         """Show how far it is."""
@@ -48,7 +53,9 @@ class Meter(Bars):
         best, made = self._best, self._done - self._before
         parts = [] if best is None else [f"best {told(best)}"]
         passed_s = self._clock.monotonic_s() - self._began_s
-        if made and passed_s > 0:
+        if self._checking:
+            parts.append("judged on other cases now")
+        elif made and passed_s > 0:
             left_s = round((self._total - self._done) * passed_s / made)
             parts.append(f"{left_s // 60}:{left_s % 60:02d} left")
         return "".join(f", {part}" for part in parts)

@@ -71,7 +71,7 @@ def storage_of(folder: Path, tuning: Tuning) -> Iterator["Storage"]:
         ScenarioError: Optuna isn't there.
         InfrastructureError: the file is damaged, or can't be read or written.
     """
-    optuna = _optuna()
+    optuna = optuna_here()
     from optuna.storages.journal import JournalFileBackend
 
     path = folder / FILE
@@ -207,7 +207,7 @@ def _mend(path: Path) -> None:
             )
 
 
-def _optuna() -> Any:
+def optuna_here() -> Any:
     """Optuna, silent.
 
     Raises:

@@ -173,7 +173,7 @@ def test_without_optuna_one_line_says_what_to_install(
 
 
 @pytest.mark.system
-@pytest.mark.timeout(240)
+@pytest.mark.timeout(400)
 def test_ctrl_c_keeps_what_is_done_and_workers_change_nothing(tuned: Path, tmp_path: Path) -> None:
     path = written(tmp_path, SPEED)
     words = ("tune", str(path), "--jobs", "2", "--in-process", "--out", str(tmp_path / "out"))
