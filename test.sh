@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything that has to hold, in the order of cost; stops at the first failure.
-# Run as `uv run ./test.sh`; arguments go to pytest, e.g. `uv run ./test.sh -m 'not system'`, or
+# Run as `uv run --group dev ./test.sh`; arguments go to pytest, e.g. `-m 'not system'`, or
 # `-m 'not wall_clock'` on a machine that others keep busy. Without any, what needs a kernel with CAN
 # runs as well, in a guest if there is a tool for one.
 set -euo pipefail

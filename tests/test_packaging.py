@@ -35,5 +35,5 @@ def test_every_import_is_a_declared_dependency_and_every_dependency_is_imported(
 
 def test_ci_runs_the_test_command_of_the_readme() -> None:
     readme = (ROOT / "README.md").read_text("utf-8").splitlines()
-    (command,) = [line for line in readme if line.endswith("uv run ./test.sh")]
+    (command,) = [line for line in readme if line.endswith("uv run --group dev ./test.sh")]
     assert (ROOT / ".ci" / "run").read_text("utf-8").splitlines()[-1] == command

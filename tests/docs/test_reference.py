@@ -14,7 +14,7 @@ PAGES = pages()
 @pytest.mark.parametrize("name", PAGES)
 def test_a_page_is_made_of_the_types_of_today(name: str) -> None:
     committed = (FOLDER / name).read_text("utf-8") if (FOLDER / name).is_file() else ""
-    assert committed == PAGES[name], "run: uv run python -m docs.generate"
+    assert committed == PAGES[name], "run: uv run --group dev python -m docs.generate"
 
 
 def test_no_page_of_the_folder_is_left_over() -> None:
