@@ -71,6 +71,7 @@ class RowSocket:
         self._kept: deque[tuple[bytes, bytes]] = deque()
         self._kept_bytes = 0
         self._lost = 0
+        self._gave_up = False  # it has taken nothing since it was last waited for
         self._writable = select.poll()
         self._writable.register(sock, select.POLLOUT)
 
@@ -89,9 +90,11 @@ class RowSocket:
         if not self._kept and self._sent(head, block):
             return
         size = len(block) + _OVERHEAD_BYTES
-        if self._kept_bytes + size > ROOM_BYTES and not self._await_room(size):
-            self._lost += 1
-            return
+        if self._kept_bytes + size > ROOM_BYTES:
+            self._gave_up = self._gave_up or not self._await_room(size)
+            if self._gave_up:
+                self._lost += 1
+                return
         self._kept.append((head, block))
         self._kept_bytes += size
 
@@ -131,6 +134,7 @@ class RowSocket:
         kept = self._kept
         while kept and self._sent(*kept[0]):
             self._kept_bytes -= len(kept.popleft()[1]) + _OVERHEAD_BYTES
+            self._gave_up = False
 
     def _sent(self, head: bytes, block: bytes) -> bool:
         """Whether it is off one's hands; False if there is no room for it now."""

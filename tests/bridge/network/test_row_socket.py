@@ -171,11 +171,11 @@ class Reader(threading.Thread):
         self.start()
 
     def run(self) -> None:
-        while len(self.came) < self._count:
-            arrival = self._lines.recorder.receive(5.0)
-            if arrival is None:
-                return
-            self.came.append((arrival.tag, arrival.payload))
+        deadline_s = SYSTEM_CLOCK.monotonic_s() + 20.0
+        while len(self.came) < self._count and SYSTEM_CLOCK.monotonic_s() < deadline_s:
+            # None, too, when it was woken to take an end.
+            if (arrival := self._lines.recorder.receive(1.0)) is not None:
+                self.came.append((arrival.tag, arrival.payload))
 
 
 def test_in_lockstep_a_run_waits_for_its_recorder_and_loses_nothing(lines: Lines) -> None:
@@ -199,6 +199,24 @@ def test_a_recorder_that_never_reads_again_is_not_waited_for(lines: Lines) -> No
     sender.flush()
     assert SYSTEM_CLOCK.monotonic_s() - began_s < 4 * PATIENCE_S
     assert sender.remarks()
+
+
+def test_a_recorder_that_stands_still_is_waited_for_once_and_again_when_it_goes_on(
+    lines: Lines,
+) -> None:
+    sender, block = lines.sender("agent/r1", PATIENCE_S), bytes(1 << 16)
+    for _ in range(ROOM_BYTES // len(block)):
+        sender.send(b"controller/r1\0", block)
+    began_s = SYSTEM_CLOCK.monotonic_s()
+    while not sender.remarks():
+        sender.send(b"controller/r1\0", block)
+    for _ in range(20):
+        sender.send(b"controller/r1\0", block)
+    assert SYSTEM_CLOCK.monotonic_s() - began_s < 4 * PATIENCE_S
+    assert lines.received()
+    before = sender.remarks()
+    sender.send(b"controller/r1\0", block)
+    assert sender.remarks() == before
 
 
 def test_a_recorder_that_has_ended_takes_nothing_and_keeps_nobody_waiting(lines: Lines) -> None:
