@@ -33,6 +33,7 @@ from bridge.can_bus.packet import (
     encode_frames,
     encode_text,
 )
+from bridge.can_bus.pythoncan import BusClosedError
 from bridge.can_bus.transport import connect
 from bridge.frame import Frame, flaw
 from bridge.process.clock import SYSTEM_CLOCK
@@ -44,10 +45,6 @@ PATIENCE_S = 1.0
 TimedFrame = tuple[int, Frame]
 """A frame and the bus time of its end [ns]."""
 _LOG = logging.getLogger("can.fleetloop")  # as python-can's own interfaces name theirs
-
-
-class BusClosedError(can.CanOperationError):
-    """The bus was closed, at the end of its run; the text has the reason."""
 
 
 class BusClient:

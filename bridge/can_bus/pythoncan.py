@@ -1,4 +1,4 @@
-"""Conversion between python-can messages and frames; opening a bus of any interface.
+"""Conversion between python-can messages and frames; opening a bus of any interface; its end.
 
 A message is made slot by slot: its constructor checks what a frame of ours can't get wrong, and
 would cost a good part of a control period.
@@ -16,6 +16,13 @@ from configs.errors import InfrastructureError
 _Message = can.Message
 _new = object.__new__
 _new_frame = tuple.__new__
+
+
+class BusClosedError(can.CanOperationError):
+    """The bus was closed, at the end of its run; the text has the reason.
+
+    Here, as a class of python-can can't be the base of a compiled one.
+    """
 
 
 def open_bus(user: str, settings: Settings) -> can.BusABC:

@@ -10,9 +10,8 @@ from typing import NamedTuple, Self
 
 import can
 
-from bridge.can_bus.client import BusClosedError
 from bridge.can_bus.interface import FleetloopBus
-from bridge.can_bus.pythoncan import to_frame
+from bridge.can_bus.pythoncan import BusClosedError, to_frame
 from bridge.frame import Frame
 from configs.errors import FleetloopError, InfrastructureError
 

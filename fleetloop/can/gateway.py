@@ -18,8 +18,7 @@ from dataclasses import dataclass, field
 
 import can
 
-from bridge.can_bus.client import BusClosedError
-from bridge.can_bus.pythoncan import to_frame, to_message
+from bridge.can_bus.pythoncan import BusClosedError, to_frame, to_message
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.client import open_bus

@@ -17,9 +17,8 @@ from pathlib import Path
 
 import can
 
-from bridge.can_bus.client import BusClosedError
 from bridge.can_bus.interface import FleetloopBus
-from bridge.can_bus.pythoncan import to_frame, to_message
+from bridge.can_bus.pythoncan import BusClosedError, to_frame, to_message
 from configs.errors import ExitStatus, InfrastructureError
 from fleetloop.can.client import open_bus
 from fleetloop.can.slcan_adapter import Adapter
