@@ -1,9 +1,11 @@
 """The build hook: what it compiles, and what it says where it can't."""
 
+import ast
 import importlib.util
 import json
 import shutil
 import sys
+import tomllib
 from hashlib import blake2b
 from pathlib import Path
 from types import ModuleType
@@ -60,3 +62,23 @@ def test_the_environment_asks_for_a_pure_one(
 ) -> None:
     monkeypatch.setenv(hook.PURE, "1")
     assert hook._compile_apart(ROOT, tmp_path, [SMALL]) == f"{hook.PURE} is set"
+
+
+def test_the_base_of_a_compiled_class_is_compiled_or_pythons_own() -> None:
+    """A class from elsewhere has a layout that mypyc doesn't know: making one would be a crash."""
+    config = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    wheel = config["tool"]["hatch"]["build"]["targets"]["wheel"]
+    classes = [
+        node
+        for module in wheel["hooks"]["custom"]["modules"]
+        for node in ast.walk(ast.parse((ROOT / module).read_text("utf-8")))
+        if isinstance(node, ast.ClassDef)
+    ]
+    pythons = {"Enum", "Exception", "Generic", "IntEnum", "IntFlag", "NamedTuple", "Protocol"}
+    known = {node.name for node in classes} | pythons | {"Law", "StrEnum"}
+    bases = {
+        ast.unparse(base.value if isinstance(base, ast.Subscript) else base): node.name
+        for node in classes
+        for base in node.bases
+    }
+    assert {base: name for base, name in bases.items() if base not in known} == {}
