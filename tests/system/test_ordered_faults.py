@@ -130,6 +130,8 @@ def test_in_real_time_they_act_at_the_tick_that_is_answered_and_again_after_a_re
     with running(tmp_path / "run", *args) as run, open_run("") as client:
         push = inject(client, "push", robots=["r1"], force_body_N=1.0, for_s=0.5)
         delay = inject(client, "link_delay", edges=["r1 -> r2"], delay_s=0.1)
+        # It is answered before it acts: the controller is to have acted when it is killed.
+        run.await_line(r"r2: tick \d+ .*: fault_applied: link_delay on r1 -> r2", 20.0)
         run.child("r2").kill()
         _, out = run.end()
     summary = run.summary()
