@@ -17,8 +17,9 @@ from agents.inputs import LoggedAgent
 from agents.lockstep import LockstepLoop, deliver, did_not_start
 from agents.realtime import RealtimeLoop
 from agents.subscriptions import Subscriptions
+from bridge.can_bus.frame_bus import in_frames
 from bridge.can_bus.interface import FleetloopBus
-from bridge.can_bus.pythoncan import open_bus, to_message
+from bridge.can_bus.pythoncan import open_bus
 from bridge.network import keys
 from bridge.network.barrier import Hellos, await_hellos
 from bridge.network.client import StoppedError, open_polled
@@ -262,11 +263,12 @@ class _Connections(NamedTuple):
         """Disarm the drives, as far as the bus still sends, after a loop that ended early."""
         if self.agent.phase is Phase.DONE:
             return
-        for can_id, data in self.agent.shut_down():
+        bus = in_frames(self.bus)
+        for frame in self.agent.shut_down():
             with suppress(can.CanError, OSError):
-                self.bus.send(to_message(can_id, data))
+                bus.send(frame)
         with suppress(can.CanError, OSError):
-            self.bus.recv(0.0)  # flushes batched frames
+            bus.receive_frames(0.0)  # sends what is batched
 
 
 def _lockstep(connections: _Connections, stop: Stop) -> str:
@@ -296,7 +298,7 @@ def _lockstep(connections: _Connections, stop: Stop) -> str:
 def _realtime(connections: _Connections, stop: Stop) -> str:
     loop = RealtimeLoop(
         connections.agent,
-        connections.bus,
+        in_frames(connections.bus),
         connections.link,
         connections.subscriptions,
         connections.path,

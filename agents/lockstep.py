@@ -261,7 +261,7 @@ class LockstepLoop:
 
     def _receive(self, timeout_s: float) -> Sequence[TimedFrame] | None:
         try:
-            return self._bus.receive_frames(timeout_s)
+            return self._bus.receive_timed_frames(timeout_s)
         except can.CanOperationError as error:
             raise PeerLostError(
                 f"{self._robot}: lost its bus after {self.counters.ticks} ticks: {error}"

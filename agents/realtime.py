@@ -27,7 +27,7 @@ from agents.process_faults import ProcessFaults
 from agents.status import Narrator
 from agents.subscriptions import Subscriptions
 from bridge.can_bus.echo import Echoes, hands_back
-from bridge.can_bus.pythoncan import can_id_of, to_frame, to_message
+from bridge.can_bus.frame_bus import FrameBus
 from bridge.frame import ERR, Frame
 from bridge.network.barrier import Hellos
 from bridge.network.launcher import CUT_OFF, LauncherWatch
@@ -75,7 +75,7 @@ class RealtimeLoop:
     def __init__(
         self,
         agent: Agent,
-        bus: can.BusABC,
+        bus: FrameBus,
         link: Link,
         subscriptions: Subscriptions,
         path: Publisher,
@@ -213,7 +213,7 @@ class RealtimeLoop:
             if schedule.shares(tick) and agent.speaks(tick):
                 self._path.put(agent.share(tick).encode())
         with suppress(can.CanError, OSError):
-            self._bus.recv(0.0)  # flushes batched frames
+            self._bus.receive_frames(0.0)  # sends what is batched
 
     def _name_stall(self, tick: int, late_s: float) -> None:
         """Note a stall: a fault soon after it may be its consequence."""
@@ -229,8 +229,9 @@ class RealtimeLoop:
         """
         deadline = self._clock.monotonic_s() + BACKLOG_S
         with suppress(can.CanError, OSError):
-            while self._bus.recv(0.0) is not None and self._clock.monotonic_s() < deadline:
-                pass
+            while self._bus.receive_frames(0.0) is not None:
+                if self._clock.monotonic_s() >= deadline:
+                    return
 
     def _receive_messages(self) -> None:
         """Deliver waiting messages, at most as many as a tick has time for."""
@@ -240,10 +241,10 @@ class RealtimeLoop:
     def _send(self, frames: Sequence[Frame], tick: int) -> None:
         send, health = self._bus.send, self._health
         try:
-            for can_id, data in frames:
-                send(to_message(can_id, data))
+            for frame in frames:
+                send(frame)
                 if self._echoes is not None:
-                    self._echoes.sent(Frame(can_id, data), self._clock.monotonic_s())
+                    self._echoes.sent(frame, self._clock.monotonic_s())
         except (can.CanError, OSError) as error:
             self._on_bus_error(error)
             self._agent.note_unsent(tick)
@@ -262,35 +263,39 @@ class RealtimeLoop:
 
     def _read_until(self, due_ns: int) -> None:
         """Receive frames until the due time."""
-        agent = self._agent
+        receive, now_ns = self._bus.receive_frames, self._clock.monotonic_ns
         polled = False
         while True:
-            left_ns = due_ns - self._clock.monotonic_ns()
+            left_ns = due_ns - now_ns()
             if left_ns <= 0 and polled:
                 return
             try:
-                message = self._bus.recv(min(max(left_ns, 0) * 1e-9, self._look_s))
+                frames = receive(min(max(left_ns, 0) * 1e-9, self._look_s))
             except (can.CanError, OSError) as error:
                 self._on_bus_error(error)
                 # An interface that is down may fail at once at every call.
-                self._clock.sleep(max(due_ns - self._clock.monotonic_ns(), 0) * 1e-9)
+                self._clock.sleep(max(due_ns - now_ns(), 0) * 1e-9)
                 return
-            polled = message is None
-            came_ns = self._clock.monotonic_ns()
-            if message is None:
+            polled = frames is None
+            came_ns = now_ns()
+            if frames is None:
                 self._rows.look(came_ns)
                 continue
             if came_ns - due_ns > _STALL_NS:
                 self._drop_backlog()
                 return
-            bus_ns = came_ns - self._power_up_ns
-            can_id = can_id_of(message)
-            if can_id & ERR:
-                self.counters.error_frames += 1
-                continue
-            if self._echoes is not None and self._echoes.is_echo(to_frame(message), came_ns * 1e-9):
-                continue
-            agent.on_frame(can_id, message.data, bus_ns)
-            if self._sent_ns and agent.feedback_since(self._sent_ns - self._power_up_ns):
-                self._round_trip_s = (came_ns - self._sent_ns) * 1e-9
-                self._sent_ns = 0
+            for frame in frames:
+                self._take(frame, came_ns)
+
+    def _take(self, frame: Frame, came_ns: int) -> None:
+        """Give the agent one frame that came at a time; measure the round trip that it ends."""
+        agent, (can_id, data) = self._agent, frame
+        if can_id & ERR:
+            self.counters.error_frames += 1
+            return
+        if self._echoes is not None and self._echoes.is_echo(frame, came_ns * 1e-9):
+            return
+        agent.on_frame(can_id, data, came_ns - self._power_up_ns)
+        if self._sent_ns and agent.feedback_since(self._sent_ns - self._power_up_ns):
+            self._round_trip_s = (came_ns - self._sent_ns) * 1e-9
+            self._sent_ns = 0

@@ -1,8 +1,8 @@
 """A client of an emulated bus, in frames: below python-can's messages, and compiled.
 
-`bridge.can_bus.interface` makes it a python-can bus; the controller's loop in lockstep uses it as
-it is. Waits end with a packet or with the kernel's timer, so the time that is left of one is read
-from the system's clock: no other clock could shorten it.
+`bridge.can_bus.interface` makes it a python-can bus; a controller's loops use it as it is. Waits
+end with a packet or with the kernel's timer, so the time that is left of one is read from the
+system's clock: no other clock could shorten it.
 
 What a program doesn't read is kept for it within bounds; what is lost beyond them is counted in
 `lost`, logged, and told by the error with which the bus ends.
@@ -12,7 +12,7 @@ import errno
 import logging
 import socket
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import can
 
@@ -128,8 +128,13 @@ class BusClient:
                     deadline_s = now_s + timeout_s
                 wait_s = max(0.0, deadline_s - now_s)
 
-    def receive_frames(self, timeout_s: float) -> list[TimedFrame] | None:
+    def receive_frames(self, timeout_s: float) -> Sequence[Frame] | None:
         """The frames of the next packet, as `receive` has them."""
+        packet = self.receive(timeout_s)
+        return None if packet is None else packet.frames
+
+    def receive_timed_frames(self, timeout_s: float) -> list[TimedFrame] | None:
+        """The frames of the next packet, each with its end."""
         packet = self.receive(timeout_s)
         if packet is None:
             return None

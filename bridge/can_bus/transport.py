@@ -93,8 +93,8 @@ class UnixTransport:
                 if wait_s != self._bound_s:
                     self._limit(wait_s)
                 return self._recv(MAX_BYTES)
-            if wait_s > 0.0:
-                readable([self._socket], wait_s)
+            if wait_s > 0.0 and not readable([self._socket], wait_s):
+                return None
             return self._recv(MAX_BYTES, socket.MSG_DONTWAIT)
         except BlockingIOError:
             return None

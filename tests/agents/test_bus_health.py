@@ -14,6 +14,7 @@ from agents.bus_health import TOLERATED_NS, BusHealth
 from agents.guard import Phase
 from agents.realtime import RealtimeLoop
 from agents.subscriptions import Subscriptions
+from bridge.can_bus.frame_bus import in_frames
 from bridge.can_bus.pythoncan import to_frame, to_message
 from bridge.frame import ERR, Frame
 from bridge.network import keys
@@ -155,7 +156,7 @@ class Rig:
         nowhere = SimpleNamespace(put=lambda _: None)
         self.loop = RealtimeLoop(
             self.bench.agent,
-            self.wire,
+            in_frames(self.wire),
             self.link,
             Subscriptions(self.link, self.bench.agent.brief),
             nowhere,

@@ -40,7 +40,7 @@ def answer_messages(bus: FleetloopBus) -> None:
 
 def answer_frames(bus: FleetloopBus) -> None:
     while True:
-        for _, (can_id, data) in bus.client.receive_frames(10.0) or ():
+        for _, (can_id, data) in bus.client.receive_timed_frames(10.0) or ():
             if can_id == LEAVE:
                 return
             if can_id == 0x009:
@@ -93,9 +93,9 @@ def test_a_synchronous_client_with_nothing_to_say_still_answers(synchronous) -> 
 
 def test_frames_come_together_and_with_their_times(running, join) -> None:
     client = join(batched=True).client
-    assert client.receive_frames(0.0) is None
+    assert client.receive_timed_frames(0.0) is None
     running.deliver(Frame(0x009, b"abc"), Frame(0x029, b""), stamp_ns=1_500_000_000)
-    heard = client.receive_frames(5.0)
+    heard = client.receive_timed_frames(5.0)
     assert heard == [
         (1_500_000_000, Frame(0x009, b"abc")),
         (1_500_000_000, Frame(0x029, b"")),
