@@ -23,6 +23,7 @@ from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.network.refused_messages import Refusals
 from configs.brief import LEAD_TICKS, AgentBrief
 from configs.reach import within_world
+from configs.ticks import Ticks
 
 LOCALISATION: Final = "the localisation system"
 LEADER: Final = "the leader"
@@ -46,7 +47,8 @@ class Admission:
         self._ahead_ticks = schedule.ticks if schedule.on_late == "hold" else _AHEAD_TICKS
         self.now_ns = self.tick * schedule.period_ns
         """Scenario time [ns] by the wall clock; set by the loop in real time."""
-        self._schedule = schedule
+        self._ticks = Ticks(schedule)
+        self._realtime = schedule.realtime
         self._period_ns = schedule.period_ns
         self.reach = brief.reach
         """Of the scenario, and of what was ordered since."""
@@ -75,7 +77,7 @@ class Admission:
         sender = f"{LOCALISATION}, of {robot}" if robot else LOCALISATION
         if fix.tick < 0 <= self.tick:
             return self._late(sender)
-        delay_ticks = self._schedule.place_delay_ticks if robot else self._delay_ticks
+        delay_ticks = self._ticks.place_delay_ticks if robot else self._delay_ticks
         wrong = self._pose_date(fix, sender, delay_ticks)
         if wrong is None and not within_world(fix.x_m, fix.y_m, fix.theta_rad):
             wrong = "reach", f"({fix.x_m:.6g} m, {fix.y_m:.6g} m, {fix.theta_rad:.6g} rad)"
@@ -89,7 +91,7 @@ class Admission:
     def admits_silence(self, robot: str, tick: int) -> bool:
         """Whether an in-neighbour can be silent at a tick; what is implausible is counted."""
         wrong: tuple[str, str] | None = None
-        if self._schedule.realtime or not self._schedule.shares(tick):
+        if self._realtime or not self._ticks.shares(tick):
             wrong = "tick", f"nothing is shared at tick {tick}"
         if wrong := wrong or self._due(tick):
             self.refusals.note("silence", robot, *wrong)
@@ -121,9 +123,9 @@ class Admission:
             return "time", f"tick {tick} is not at {t_ns * 1e-9:.6g} s"
         if tick < 0:
             return None
-        if not self._schedule.shares(tick):
+        if not self._ticks.shares(tick):
             return "tick", f"nothing is shared at tick {tick}"
-        if self._schedule.realtime:
+        if self._realtime:
             return self._distance(t_ns) or self._order(t_ns, self._newest_ns.get(robot))
         return self._due(tick) or self._order(t_ns, self._newest_ns.get(robot))
 
@@ -133,9 +135,9 @@ class Admission:
             return None
         if not 0 <= t_ns - tick * self._period_ns < self._period_ns:
             return "time", f"tick {tick} is not at {t_ns * 1e-9:.6g} s"
-        if self._schedule.realtime:
+        if self._realtime:
             return self._distance(t_ns)
-        if not self._schedule.localises(tick):
+        if not self._ticks.localises(tick):
             return "tick", f"no pose is taken at tick {tick}"
         wrong = self._due(tick, delay_ticks)
         return wrong or self._order(t_ns, self._newest_ns.get(sender))

@@ -26,6 +26,7 @@ from configs.brief import AgentBrief, ChannelModel
 from configs.edges import LEADER
 from configs.leader_speed import speed_at
 from configs.netem import LOCALISATION
+from configs.ticks import Ticks
 
 HERE: Final = ""
 """This robot among those that have poses."""
@@ -47,6 +48,7 @@ class EmulatedNetwork:
         "_schedule",
         "_seed_of",
         "_silence_ns",
+        "_ticks",
         "_v_r",
         "_v_r_ns",
         "distances_m",
@@ -62,6 +64,7 @@ class EmulatedNetwork:
             self._add(model)
         self._aged = frozenset(model.source for model in brief.channels)
         self._schedule = brief.schedule
+        self._ticks = Ticks(brief.schedule)
         self._silence_ns = round(brief.coordination.silence_limit_s * 1e9)
         self._v_r, self._v_r_ns = nan, 0
         self._fix_ns: int | None = None  # of the newest pose that arrived
@@ -190,7 +193,7 @@ class EmulatedNetwork:
             channel.receive(now_ns, exists=False)
             self._v_r = nan
             return without
-        if self._schedule.shares(tick):
+        if self._ticks.shares(tick):
             channel.send(now_ns, speed_at(leader.changes, now_ns))
         for sent_ns, v_r in channel.receive(now_ns):
             if self._v_r != self._v_r or sent_ns >= self._v_r_ns:

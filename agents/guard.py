@@ -18,6 +18,7 @@ from bridge.frame import Frame
 from configs.brief import AgentBrief
 from configs.errors import InfrastructureError
 from configs.events import Event, EventLog
+from configs.ticks import Ticks
 
 
 class Phase(Enum):
@@ -70,7 +71,7 @@ class Guard:
         self.bus_fault: str | None = None
         """The fault of the bus, None if sends succeed; set by the agent."""
         self._brief = brief
-        self._bus_time_ns = schedule.bus_time_ns
+        self._ticks = Ticks(schedule)
         self._when = schedule.when
         self._limiter = TorqueLimiter(
             host.torque_limit_wheel_N_m, host.torque_slew_limit_wheel_N_m_s, schedule.period_s
@@ -123,7 +124,7 @@ class Guard:
         Raises:
             InfrastructureError: the drives were not armed when control had to start.
         """
-        drives, now_ns = self.drives, self._bus_time_ns(tick)
+        drives, now_ns = self.drives, self._ticks.bus_time_ns(tick)
         if self.begun:  # of a controller that re-joins, until the drives are heard
             return drives.rest(now_ns)
         if tick >= 0:
@@ -146,7 +147,7 @@ class Guard:
         Raises:
             InfrastructureError: the drives were not armed when control had to start.
         """
-        now_ns, drives = self._bus_time_ns(tick), self.drives
+        now_ns, drives = self._ticks.bus_time_ns(tick), self.drives
         reason = self._refusal or self.bus_fault or drives.fault(now_ns)
         if reason is None and self.phase is not Phase.READY:
             reason = drives.missing(now_ns) or "armed in the last tick only"
@@ -167,7 +168,7 @@ class Guard:
 
         `trouble`: the reason for torques that are not finite, if it is known.
         """
-        drives, now_ns = self.drives, self._bus_time_ns(tick)
+        drives, now_ns = self.drives, self._ticks.bus_time_ns(tick)
         self.outcome = TorqueOutcome.WITHHELD
         if self.phase is not _DRIVING:
             return self._recover(tick, now_ns)
@@ -192,7 +193,7 @@ class Guard:
         """The frames of a robot that has left the formation: torque 0 and idle for both wheels."""
         self.outcome = TorqueOutcome.WITHHELD
         if self.phase is Phase.LEFT:
-            return self.drives.rest(self._bus_time_ns(tick))
+            return self.drives.rest(self._ticks.bus_time_ns(tick))
         self._change(tick, Phase.LEFT, "left")
         return self.drives.disarm()
 

@@ -18,6 +18,7 @@ from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.network.run_orders import LeaderOrder
 from bridge.network.telemetry import RowBuffer
 from configs.brief import AgentBrief
+from configs.ticks import Ticks
 
 
 class LoggedAgent(Agent):
@@ -26,6 +27,7 @@ class LoggedAgent(Agent):
     def __init__(self, brief: AgentBrief, rows: RowBuffer, log: InputBuffer) -> None:
         super().__init__(brief, rows)
         self._log = log
+        self._ticks = Ticks(brief.schedule)
         self._start_messages: dict[tuple[Kind, str], bytes] = {}
         log.begin(rejoins=brief.rejoins, resumes_tick=brief.resumes_tick)
         on_frame, log_frame = self.on_frame, log.frame
@@ -49,7 +51,7 @@ class LoggedAgent(Agent):
     def step(self, tick: int) -> Sequence[Frame]:
         """As `Agent.step`."""
         frames = super().step(tick)
-        self._log.tick(tick, self._schedule.bus_time_ns(tick), frames)
+        self._log.tick(tick, self._ticks.bus_time_ns(tick), frames)
         return frames
 
     def shut_down(self) -> Sequence[Frame]:

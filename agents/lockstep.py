@@ -16,7 +16,6 @@ import can
 from agents.admission import LEADER, LOCALISATION
 from agents.agent import Agent
 from agents.bus_clock import BusClock
-from agents.dues import Dues
 from agents.guard import Phase
 from agents.process_faults import ProcessFaults
 from agents.status import Narrator
@@ -36,6 +35,7 @@ from configs.brief import Schedule
 from configs.errors import InfrastructureError, PeerLostError, PeerSilentError
 from configs.faults.base import Fault
 from configs.roles import PLANT
+from configs.ticks import Ticks
 
 LISTEN_SHARE: Final = 0.75
 """Part of the tick deadline for the wait for messages: a controller reports a silent peer before
@@ -90,7 +90,7 @@ class LockstepLoop:
         self._orders = orders
         self._agent = agent
         self._schedule = schedule = agent.brief.schedule
-        self._dues = Dues(schedule)
+        self._ticks = Ticks(schedule)
         self._tell_every_ns = int(schedule.status_every_s * 1e9)
         self._resumes = agent.brief.rejoins
         self._robot = agent.brief.robot
@@ -165,7 +165,7 @@ class LockstepLoop:
         came_ns = self._clock.monotonic_ns()
         if tick >= faults.due_tick:
             faults.begin(tick)
-        if self._dues.owes(tick):
+        if self._ticks.owes(tick):
             self._await_messages(tick, stop)
         heard_ns = self._clock.monotonic_ns()
         orders = self._orders
@@ -174,7 +174,7 @@ class LockstepLoop:
         self._send(agent.step(tick) if not stop.requested else agent.shut_down())
         if tick >= self._subscriptions.next_change:
             self._subscriptions.change(tick)
-        if tick >= faults.mute_tick and self._dues.shares(tick + 1):
+        if tick >= faults.mute_tick and self._ticks.shares(tick + 1):
             silent = self._resumes and not agent.speaks(tick + 1)
             said = Silence(tick + 1) if silent else agent.share(tick + 1)
             self._path.put(said.encode())

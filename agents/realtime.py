@@ -4,11 +4,11 @@
     before it            receive frames at once, and measure the round trip of feedback
     at it                receive messages, compute, send torques, share when due
 
-Controllers have different phases, so that they don't all wake at one instant. The controller does
-not wait for feedback: a *miss* is a tick whose torques had no feedback when the next tick was due.
-A tick later than a period is computed without sending, so that the path variable keeps time. Frames
-received before the start of the run are dropped. Echoes of the controller's own frames are ignored.
-Errors of the interface are handled in `agents.bus_health`.
+Controllers have different phases, so that they and the plant don't all wake at one instant. The
+controller does not wait for feedback: a *miss* is a tick whose torques had no feedback when the
+next tick was due. A tick later than a period is computed without sending, so that the path variable
+keeps time. Frames received before the start of the run are dropped, echoes of the controller's own
+frames are ignored. Errors of the interface are handled in `agents.bus_health`.
 """
 
 from collections.abc import Sequence

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from agents.admission import Admission
-from agents.dues import Dues
 from agents.emulated_network import HERE, EmulatedNetwork
 from agents.in_edges import InEdges
 from agents.neighbours import Neighbours
@@ -23,6 +22,7 @@ from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from configs.brief import LEAD_TICKS, AgentBrief
 from configs.leader_speed import SpeedChange, speed_at, with_change
 from configs.reach import Reach
+from configs.ticks import Ticks
 
 
 class Reception:
@@ -31,7 +31,7 @@ class Reception:
     def __init__(self, brief: AgentBrief) -> None:
         self._brief = brief
         self._schedule = brief.schedule
-        self._dues = Dues(brief.schedule)
+        self._ticks = Ticks(brief.schedule)
         self._realtime = brief.schedule.realtime
         self._rejoins = brief.rejoins
         self._follows_leader = brief.leader_link is not None
@@ -147,14 +147,14 @@ class Reception:
         """Messages that are due at this tick by the schedule and have not arrived."""
         schedule, missing = self._schedule, []
         pose_tick = tick - schedule.pose_delay_ticks
-        owed = schedule.localises(pose_tick) and pose_tick >= self._resumes_tick
+        owed = self._ticks.localises(pose_tick) and pose_tick >= self._resumes_tick
         if owed and pose_tick not in self._fixes:
             missing.append("pose")
-        place_tick = tick - schedule.place_delay_ticks
-        owed = schedule.localises(place_tick) and place_tick >= self._listens_tick
+        place_tick = tick - self._ticks.place_delay_ticks
+        owed = self._ticks.localises(place_tick) and place_tick >= self._listens_tick
         if self.network is not None and owed:
             missing += self.network.missing(place_tick)
-        if schedule.shares(tick) and tick >= self._listens_tick:
+        if self._ticks.shares(tick) and tick >= self._listens_tick:
             heard, silent = self._path_states.get(tick, {}), self._silent.get(tick, ())
             missing += [
                 f"path state of {r}"
@@ -170,7 +170,7 @@ class Reception:
             if self._fixes:
                 fixes = [self._fixes[number] for number in sorted(self._fixes)]
                 self._fixes.clear()
-        elif self._dues.owes(tick):
+        elif self._ticks.owes(tick):
             fixes = self._due(tick)
         if self.network is not None:
             return self._through(self.network, tick, fixes)
@@ -214,7 +214,7 @@ class Reception:
             for fix in fixes:
                 network.send_pose(fix)
             fixes = ()
-        network.measure(tick if self._realtime else tick - self._schedule.place_delay_ticks)
+        network.measure(tick if self._realtime else tick - self._ticks.place_delay_ticks)
         for robot, state in network.path_states(now_ns, self.edges.heard):
             self.neighbours.receive(robot, state.t_ns, state.s, state.v_hat)
         newest = network.newest_pose(now_ns)

@@ -179,7 +179,7 @@ class AgentBrief:
     channels: tuple[ChannelModel, ...]  # the emulated edges to it; others have no effects
     faults: tuple[PlannedFault, ...]  # of messages to it, and of its process
     seed: int  # of the scenario
-    phase_ns: int  # in real time, this much after a tick's time the controller acts
+    phase_ns: int  # in real time, this much after a tick's time, the plant's, the controller acts
     bus: Settings  # keyword arguments of can.Bus, verbatim
     network: NetworkLink
     detached: bool = False  # no launcher is its parent: the run's end is when the launcher's

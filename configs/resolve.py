@@ -114,7 +114,7 @@ def agent_brief(
         channels=channels(scenario, name),
         faults=agent_faults(planned_faults(scenario), name),
         seed=scenario.seed,
-        phase_ns=round(scenario.names.index(name) * ticks.period_ns / len(scenario.names)),
+        phase_ns=round((scenario.names.index(name) + 0.5) * ticks.period_ns / len(scenario.names)),
         bus=bus,
         network=network,
         logs_inputs=scenario.records_inputs,

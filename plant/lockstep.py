@@ -31,6 +31,7 @@ from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, launcher_stopped
 from configs.brief import PlantBrief
 from configs.errors import InfrastructureError, PeerLostError
+from configs.ticks import Ticks
 from plant.absent import AbsentControllers
 from plant.bus.build import build_buses
 from plant.bus.sockets import SocketPort
@@ -81,7 +82,8 @@ class LockstepLoop:
         self._clock = clock
         self._orders = orders
         self._schedule = schedule = brief.schedule
-        self._period_ns, self._ticks = schedule.period_ns, schedule.ticks
+        self._period_ns, self._last_tick = schedule.period_ns, schedule.ticks
+        self._ticks = Ticks(schedule)
         pacing = orders.pacing if orders is not None else None
         self._pacing = pacing or Pacing(schedule, brief.speed)
         self._limit_s = ANSWER_SHARE * schedule.tick_deadline_s
@@ -196,10 +198,11 @@ class LockstepLoop:
     def _begin(self, robots: Sequence[tuple[EmulatedRobot, _Ends]], tick: int) -> None:
         """A tick begins: what is true now goes to the record, where a robot is to the robot."""
         t_ns = tick * self._period_ns
+        recorded, localised = 0 <= tick < self._last_tick, self._ticks.localises(tick)
         for robot, ends in robots:
-            if 0 <= tick < self._ticks:
+            if recorded:
                 ends.rows.add(tick, robot.row(t_ns * 1e-9))
-            if self._schedule.localises(tick):
+            if localised:
                 ends.pose.put(robot.pose_fix(tick, t_ns).encode())
 
     def _start_tick(self, lane: Lane, now_ns: int) -> None:
@@ -235,7 +238,7 @@ class LockstepLoop:
             self._look_at(lane)
         lane.asked_ns = 0
         lane.tick = tick + 1
-        lane.done = tick >= self._ticks
+        lane.done = tick >= self._last_tick
         if tick == self._slowest:
             self._at_slowest -= 1
             if not self._at_slowest:
@@ -332,7 +335,7 @@ class LockstepLoop:
             when = self._schedule.when(lane.tick)
             robot = lane.asked or " or ".join(lane.robots)
             # Each controller leaves when it has answered the closing tick.
-            if lane.tick < self._ticks and (gone := left.intersection(lane.robots)):
+            if lane.tick < self._last_tick and (gone := left.intersection(lane.robots)):
                 names = " and ".join(sorted(gone))
                 raise PeerLostError(f"{when}: the controller of {names} left its bus")
             if lane.asked_ns and now_ns - lane.asked_ns > limit_ns:
@@ -353,7 +356,7 @@ class LockstepLoop:
         self._left += len(gone)
         for robot in gone:
             lane = self._lane_of[robot]
-            if lane.tick < self._ticks:
+            if lane.tick < self._last_tick:
                 self._absent.gone(robot, lane.tick)
                 self._look_at(lane)
                 if lane.asked_ns and not (lane.awaits or self._hub.owing(lane.name)):

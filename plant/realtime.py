@@ -20,6 +20,7 @@ from bridge.process.awake import Lateness
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop
 from configs.brief import PlantBrief
+from configs.ticks import Ticks
 from plant.bus.build import build_buses, no_begin
 from plant.bus.sockets import SocketPort
 from plant.counters import PlantCounters
@@ -29,6 +30,10 @@ from plant.robot import EmulatedRobot
 
 FAREWELL_S = 0.5
 """Time for which the plant outlasts its last tick, for controllers that act later."""
+
+
+def _record_nobody(_tick: int) -> None:
+    pass
 
 
 class RealtimeLoop:
@@ -44,7 +49,7 @@ class RealtimeLoop:
         rows: Sequence[RowBuffer],
         report: Callable[[Progress], None],
         taps: Mapping[str, Tap],
-        record_others: Callable[[int], None] = lambda _: None,
+        record_others: Callable[[int], None] = _record_nobody,
         other_rows: Sequence[RowBuffer] = (),
         orders: PlantOrders | None = None,
         *,
@@ -52,6 +57,7 @@ class RealtimeLoop:
     ) -> None:
         self._clock = clock
         self._schedule = brief.schedule
+        self._ticks = Ticks(brief.schedule)
         self._record_others = record_others
         self._orders = orders
         self._zero_ns = brief.schedule.bus_time_ns(0)
@@ -86,7 +92,7 @@ class RealtimeLoop:
         self._epoch_ns = epoch_ns
         power_up_ns = epoch_ns - self._zero_ns
         while self._tick <= schedule.ticks and not stop.requested:
-            due_ns = power_up_ns + schedule.bus_time_ns(self._tick)
+            due_ns = power_up_ns + self._ticks.bus_time_ns(self._tick)
             now_ns = self._clock.monotonic_ns()
             self._looks.look(now_ns)
             if now_ns < due_ns:
@@ -124,18 +130,19 @@ class RealtimeLoop:
 
     def _keep_tick(self, power_up_ns: int) -> None:
         """One tick, bus by bus; torques that come meanwhile are served between two buses."""
-        schedule, tick = self._schedule, self._tick
-        bus_ns, t_ns = schedule.bus_time_ns(tick), tick * schedule.period_ns
-        if 0 <= tick < schedule.ticks:
+        schedule, tick, ticks = self._schedule, self._tick, self._ticks
+        bus_ns, t_ns = ticks.bus_time_ns(tick), tick * schedule.period_ns
+        recorded, localised = 0 <= tick < schedule.ticks, ticks.localises(tick)
+        if recorded:
             self._record_others(tick)
         for bus in self.buses.values():
             bus.move(bus_ns)
             bus.faults.begin(tick)
             for robot in bus.robots:
-                if 0 <= tick < schedule.ticks:
+                if recorded:
                     self._rows[robot].add(tick, robot.row(t_ns * 1e-9))
             bus.send_due(bus_ns)
-            if schedule.localises(tick):
+            if localised:
                 for robot in bus.robots:
                     self._poses[robot].put(robot.pose_fix(tick, t_ns).encode())
             self._serve(0.0, power_up_ns)

@@ -243,7 +243,8 @@ class AdaptiveDsc(Law):
     def hold(self, before: DscState | None, after: DscState) -> DscState:
         """Filters go on; Θ̂ and κ̂ hold still, or would learn the limit."""
         theta_1, theta_2, kappa = self.estimates if before is None else before[3:]
-        return after._replace(theta_1=theta_1, theta_2=theta_2, kappa=kappa)
+        alpha_theta, alpha_v, alpha_omega, _, _, _ = after
+        return DscState(alpha_theta, alpha_v, alpha_omega, theta_1, theta_2, kappa)
 
     # --- what follows from the equations, for `fleetloop check` ---------------------------------
 

@@ -182,7 +182,7 @@ class Hub:
 
     def serve(self, timeout_s: float) -> None:
         """Handle what happens on the buses; waits at most `timeout_s`, to the microsecond."""
-        if readable([self._server], max(timeout_s, 0.0)):
+        if timeout_s <= 0.0 or readable([self._server], timeout_s):
             self._handle(0.0)
 
     @property

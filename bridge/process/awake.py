@@ -26,6 +26,10 @@ def _never() -> bool:
     return False
 
 
+def _ignore(_stall_s: float) -> None:
+    pass
+
+
 class AwakeClock:
     """Counts the seconds in which this process was awake; keep it looked at.
 
@@ -48,7 +52,7 @@ class AwakeClock:
         look_s: float = LOOK_S,
         stall_s: float = STALL_S,
         held: Callable[[], bool] = _never,
-        on_stall: Callable[[float], None] = lambda _: None,
+        on_stall: Callable[[float], None] = _ignore,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         self._look_s = look_s

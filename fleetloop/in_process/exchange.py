@@ -6,10 +6,10 @@ It goes through the same bytes as over the network, in the same order.
 from collections.abc import Iterable, Sequence
 
 from agents.agent import Agent
-from agents.dues import Dues
 from bridge.network.messages import PathState, PoseFix
 from bridge.network.telemetry import RowBuffer
 from configs.brief import Schedule
+from configs.ticks import Ticks
 from plant.robot import EmulatedRobot
 
 
@@ -30,9 +30,9 @@ class Exchange:
         agents: Sequence[Agent],
         truths: Sequence[RowBuffer],
     ) -> None:
-        self._ticks = schedule.ticks
+        self._last_tick = schedule.ticks
         self._period_ns = schedule.period_ns
-        self._dues = Dues(schedule)
+        self._ticks = Ticks(schedule)
         self._agents = list(agents)
         self._places = {
             robot.brief.robot: _Place(robot, agent, truth)
@@ -56,7 +56,7 @@ class Exchange:
 
     def share(self, tick: int) -> None:
         """Exchange path states, if they are due at this tick."""
-        if self._dues.shares(tick):
+        if self._ticks.shares(tick):
             self._share(tick)
 
     def _share(self, tick: int) -> None:
@@ -71,9 +71,9 @@ class Exchange:
         """Begin a tick as a plant's process does: rows of the robots, and poses that are due."""
         t_ns = tick * self._period_ns
         for place in places:
-            if 0 <= tick < self._ticks:
+            if 0 <= tick < self._last_tick:
                 place.truth.add(tick, place.robot.row(t_ns * 1e-9))
-            if self._dues.localises(tick):
+            if self._ticks.localises(tick):
                 place.localise(tick, t_ns)
 
 

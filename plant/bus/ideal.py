@@ -17,6 +17,7 @@ from typing import Final
 from bridge.frame import Frame
 from bridge.network.telemetry import FROM_DRIVE, Tap
 from configs.brief import Schedule
+from configs.ticks import Ticks
 from plant.bus.interference import Interference
 from plant.bus.port import ALL, Begin, Port, Steps
 from plant.faults import BusFaults
@@ -66,13 +67,14 @@ class IdealBus:
     def steps(self) -> Steps:
         """The ticks from the first of the countdown to the closing one."""
         schedule, begin, substeps = self._schedule, self._begin, self._substeps
+        ticks = Ticks(schedule)
         tap, deliver, receive = self._tap, self._port.deliver, self._port.receive
         period_s, period_ns, last = schedule.period_s, schedule.period_ns, schedule.ticks
         robots, begin_faults, interference = self.robots, self.faults.begin, self._interference
         (single,) = robots if len(robots) == 1 else (None,)
         late: list[Frame] = []  # replies that wait for the next tick
         for tick in range(-schedule.countdown_ticks, last + 1):
-            self.now_ns = bus_ns = schedule.bus_time_ns(tick)
+            self.now_ns = bus_ns = ticks.bus_time_ns(tick)
             begin_faults(tick)
             begin(tick)
             if interference.acts:

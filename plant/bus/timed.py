@@ -31,6 +31,7 @@ from bridge.wire.node import Delivered, ErrorFrame, Node, StateChanged
 from bridge.wire.queues import Fifo, Mailboxes
 from bridge.wire.wire import Wire
 from configs.brief import Schedule, WireModel
+from configs.ticks import Ticks
 from plant.bus.port import Begin, Port, Steps
 from plant.bus.wire_nodes import WireDrive, WireHost, disturb, has_to_send
 from plant.disturbance import Disturbance
@@ -114,9 +115,9 @@ class TimedBus:
 
     def steps(self) -> Steps:
         """The ticks from the first of the countdown to the closing one."""
-        schedule = self._schedule
+        schedule, ticks = self._schedule, Ticks(self._schedule)
         for tick in range(-schedule.countdown_ticks, schedule.ticks + 1):
-            start_ns = schedule.bus_time_ns(tick)
+            start_ns = ticks.bus_time_ns(tick)
             end_ns = start_ns + schedule.period_ns
             self._move(start_ns)
             self.faults.begin(tick)

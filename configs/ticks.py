@@ -1,18 +1,28 @@
-"""Ticks at which messages are due at controllers."""
+"""What loops ask a schedule at every tick, compiled: what is due at one, and when one is."""
 
 from configs.brief import Schedule
 
 
-class Dues:
-    """Of one schedule, in numbers of its own: it is asked at every tick."""
+class Ticks:
+    """Of one schedule, in numbers of its own.
 
-    __slots__ = ("_localise_every", "_place_delay_ticks", "_pose_delay_ticks", "_share_every")
+    Args:
+        schedule: of the run.
+    """
+
+    __slots__ = (
+        *("_countdown_ticks", "_localise_every", "_period_ns", "_pose_delay_ticks"),
+        *("_share_every", "place_delay_ticks"),
+    )
 
     def __init__(self, schedule: Schedule) -> None:
+        self._countdown_ticks = schedule.countdown_ticks
+        self._period_ns = schedule.period_ns
         self._share_every = schedule.share_every
         self._localise_every = schedule.localise_every
         self._pose_delay_ticks = schedule.pose_delay_ticks
-        self._place_delay_ticks = schedule.place_delay_ticks
+        self.place_delay_ticks: int = schedule.place_delay_ticks
+        """As `Schedule.place_delay_ticks`."""
 
     def shares(self, tick: int) -> bool:
         """Whether path states are due at a tick, as `Schedule.shares`."""
@@ -27,5 +37,9 @@ class Dues:
         return (
             self.shares(tick)
             or self.localises(tick - self._pose_delay_ticks)
-            or self.localises(tick - self._place_delay_ticks)
+            or self.localises(tick - self.place_delay_ticks)
         )
+
+    def bus_time_ns(self, tick: int) -> int:
+        """Bus time of a tick, as `Schedule.bus_time_ns`."""
+        return (tick + self._countdown_ticks) * self._period_ns
