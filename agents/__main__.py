@@ -32,7 +32,7 @@ from bridge.network.orders import OrderInbox
 from bridge.network.reports import AgentReport
 from bridge.network.row_socket import RowSocket, row_publisher
 from bridge.network.telemetry import RowBuffer, put_rows, row_of
-from bridge.network.zenoh_link import POLLED_DEPTH, ZenohLink
+from bridge.network.zenoh_link import POLLED_DEPTH, ZenohLink, heard
 from bridge.process.awake import LOOK_S, AwakeClock
 from bridge.process.clock import process_cpu_ns
 from bridge.process.lifecycle import (
@@ -81,16 +81,16 @@ def _run(brief: AgentBrief, stop: Stop, link: ZenohLink, watch: LauncherWatch | 
     # A neighbour that comes again has to hear the first path state that is due.
     path = link.publisher(keys.path(name, robot), steady=may_be_absent)
     line = RowSocket.of(brief.recorder, brief.schedule)
-    heard = link.publisher(keys.telemetry(name, robot))
-    telemetry = row_publisher(line, f"controller/{robot}", heard)
+    over_network = link.publisher(keys.telemetry(name, robot))
+    telemetry = row_publisher(line, f"controller/{robot}", over_network)
     report = link.publisher(keys.report(name, AGENT.process(robot)))
     progress = link.publisher(keys.progress(name, AGENT.process(robot)))
     within_ns = brief.schedule.rows_within_ns
-    rows = RowBuffer(row_of(brief.signals), partial(put_rows, telemetry), within_ns)
+    watched = partial(heard, over_network)
+    rows = RowBuffer(row_of(brief.signals), partial(put_rows, telemetry), within_ns, watched)
     log = None
     if brief.logs_inputs:
-        heard = link.publisher(keys.inputs(name, robot))
-        inputs = row_publisher(line, f"inputs/{robot}", heard)
+        inputs = row_publisher(line, f"inputs/{robot}", link.publisher(keys.inputs(name, robot)))
         log = InputBuffer(
             lambda first, block, final: put_rows(inputs, first, len(block), block, final)
         )

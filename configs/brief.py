@@ -38,6 +38,8 @@ LEAD_TICKS = 16
 """In lockstep a bus may be this many ticks ahead of the slowest."""
 ROWS_WITHIN_NS = 40_000_000
 """In this time rows for the record are handed on, so that a viewer sees a run at 25 Hz."""
+UNWATCHED_ROWS_WITHIN_NS = 250_000_000
+"""In this time where nobody hears them on the network: larger blocks cost the recorder less."""
 
 
 # --- the controller -------------------------------------------------------------------------------

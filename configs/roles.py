@@ -138,16 +138,18 @@ ROLES = (PLANT, AGENT, RECORDER, LOCALISATION, VIEWER, LAUNCHER)
 """In the order in which a run starts them."""
 STARTED = tuple(role for role in ROLES if role.module and not role.on_request)
 """At its start."""
+_OBSERVERS = frozenset(role.name for role in ROLES if role.observer)
+_ORDERED = frozenset(role.name for role in ROLES if role.takes_orders)
 
 
 def is_observer(process: str) -> bool:
     """Whether a process takes no part in the run."""
-    return any(role.observer and role.name == process.partition("/")[0] for role in ROLES)
+    return process.partition("/")[0] in _OBSERVERS
 
 
 def takes_orders(process: str) -> bool:
     """Whether a process carries out faults that are ordered during a run."""
-    return any(role.takes_orders and role.name == process.partition("/")[0] for role in ROLES)
+    return process.partition("/")[0] in _ORDERED
 
 
 def identity_of(process: str) -> str:

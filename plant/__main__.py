@@ -23,7 +23,7 @@ from bridge.network.refused_messages import Refusals
 from bridge.network.reports import PlantReport
 from bridge.network.row_socket import RowSocket, row_publisher
 from bridge.network.telemetry import PLANT_ROW, FrameBuffer, RowBuffer, put_rows
-from bridge.network.zenoh_link import ZenohLink
+from bridge.network.zenoh_link import ZenohLink, heard
 from bridge.process.awake import Stall
 from bridge.process.clock import SYSTEM_CLOCK, implausible_start, monotonic_of, process_cpu_ns
 from bridge.process.lifecycle import (
@@ -122,17 +122,21 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
     silences = _silences(brief, link)
     robots = [*(robot.brief.robot for robot in emulated), *(other.robot for other in others)]
     line = RowSocket.of(brief.recorder, brief.schedule)
+    over_network = [link.publisher(keys.truth(name, robot)) for robot in robots]
     truths = [
-        row_publisher(line, f"plant/{robot}", link.publisher(keys.truth(name, robot)))
-        for robot in robots
+        row_publisher(line, f"plant/{robot}", publisher)
+        for robot, publisher in zip(robots, over_network, strict=True)
     ]
     within_ns = brief.schedule.rows_within_ns
-    rows = [RowBuffer(PLANT_ROW, partial(put_rows, truth), within_ns) for truth in truths]
+    rows = [
+        RowBuffer(PLANT_ROW, partial(put_rows, truth), within_ns, partial(heard, publisher))
+        for truth, publisher in zip(truths, over_network, strict=True)
+    ]
     logs: dict[str, FrameBuffer] = {}
     if brief.traffic:
         for bus in dict.fromkeys(robot.bus for robot in brief.robots):
-            heard = link.publisher(keys.traffic(name, bus), express=False)
-            traffic = row_publisher(line, f"can/{bus}", heard)
+            publisher = link.publisher(keys.traffic(name, bus), express=False)
+            traffic = row_publisher(line, f"can/{bus}", publisher)
             truths.append(traffic)
             logs[bus] = FrameBuffer(partial(put_rows, traffic))
     taps = {bus: log.add for bus, log in logs.items()}

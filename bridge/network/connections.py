@@ -11,7 +11,7 @@ import os
 import socket
 import stat
 import struct
-from collections.abc import Container, Iterator
+from collections.abc import Collection, Iterator
 
 import zenoh
 from zenoh.handlers import Callback
@@ -20,20 +20,35 @@ _AT_ONCE = struct.pack("ii", 0, 0)
 """Linux's struct linger: off."""
 
 
-def connections(peers: Container[str]) -> Iterator[tuple[str, socket.socket]]:
-    """This process's connections to these peers, each by a descriptor of its own.
+class Connections:
+    """This process's connections by their peers; remembers which descriptors they had.
 
     A peer is "address:port", IPv6 addresses in brackets, as in Zenoh's locators.
     """
-    found = set()
-    for connection in _sockets():
-        with contextlib.suppress(OSError):
-            host, port = connection.getpeername()[:2]
-            peer = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
-            if peer in peers and peer not in found:  # which Zenoh may have more descriptors of
-                found.add(peer)
+
+    __slots__ = ("_descriptors",)
+
+    def __init__(self) -> None:
+        self._descriptors: dict[str, int] = {}
+
+    def to(self, peers: Collection[str]) -> Iterator[tuple[str, socket.socket]]:
+        """The connections to these peers, each by a descriptor of its own."""
+        found = {
+            peer: descriptor
+            for peer, descriptor in self._descriptors.items()
+            if peer in peers and _peer(descriptor) == peer
+        }
+        if len(found) < len(peers):
+            found = {}
+            for descriptor in _descriptors():
+                peer = _peer(descriptor)
+                if peer in peers:  # Zenoh may have more descriptors of it: the first will do
+                    found.setdefault(peer, descriptor)
+        self._descriptors = found
+        for peer, descriptor in found.items():
+            with contextlib.suppress(OSError):
                 # Not its own dup(), which would make it, and so Zenoh's, a blocking one.
-                yield peer, socket.socket(fileno=os.dup(connection.fileno()))
+                yield peer, socket.socket(fileno=os.dup(descriptor))
 
 
 def never_linger(session: zenoh.Session) -> object:
@@ -55,8 +70,10 @@ def never_linger(session: zenoh.Session) -> object:
 def _close_at_once(link: zenoh.Link) -> None:
     """Let close(2) return at once for a link; the ports of both ends are enough to find it."""
     ports = [_port(link.src), _port(link.dst)]
-    for connection in _sockets():
-        with contextlib.suppress(OSError):
+    for descriptor in _descriptors():
+        with contextlib.suppress(OSError), _borrowed(descriptor) as connection:
+            if connection is None:
+                continue
             ends = connection.getsockname(), connection.getpeername()
             if [str(port) for _, port, *_ in ends] == ports:
                 connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _AT_ONCE)
@@ -67,14 +84,32 @@ def _port(locator: str) -> str:
     return locator.rpartition(":")[2]
 
 
-def _sockets() -> Iterator[socket.socket]:
-    """This process's TCP sockets, which stay open when the object here goes."""
-    for name in os.listdir("/proc/self/fd"):  # noqa: PTH208
-        with contextlib.suppress(OSError):
-            if stat.S_ISSOCK(os.fstat(int(name)).st_mode):
-                found = socket.socket(fileno=int(name))
-                try:
-                    if found.family in (socket.AF_INET, socket.AF_INET6):
-                        yield found
-                finally:
-                    found.detach()
+def _descriptors() -> Iterator[int]:
+    """This process's, as far as they are open."""
+    return map(int, os.listdir("/proc/self/fd"))  # noqa: PTH208
+
+
+def _peer(descriptor: int) -> str:
+    """The peer of a TCP connection, "" if the descriptor is of none."""
+    with contextlib.suppress(OSError), _borrowed(descriptor) as connection:
+        if connection is not None:
+            host, port = connection.getpeername()[:2]
+            return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    return ""
+
+
+@contextlib.contextmanager
+def _borrowed(descriptor: int) -> Iterator[socket.socket | None]:
+    """A TCP socket, which stays open when the object here goes; None if it is none.
+
+    Raises:
+        OSError: the descriptor is closed.
+    """
+    if not stat.S_ISSOCK(os.fstat(descriptor).st_mode):
+        yield None
+        return
+    found = socket.socket(fileno=descriptor)
+    try:
+        yield found if found.family in (socket.AF_INET, socket.AF_INET6) else None
+    finally:
+        found.detach()

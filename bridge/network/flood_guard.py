@@ -18,11 +18,11 @@ together count once, and cost as little.
 import ctypes
 import socket
 import struct
-from collections.abc import Container
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from bridge.network.connections import connections
+from bridge.network.connections import Connections
 
 MESSAGES_PER_TICK, BYTES_PER_TICK = 4, 1024
 """Three times a row and a path state."""
@@ -74,10 +74,11 @@ class FloodGuard:
     """Looks at the connections of one router; told the time and the ticks."""
 
     def __init__(self) -> None:
+        self._connections = Connections()
         self._buckets: dict[str, Bucket] = {}  # by peer
         self._before: tuple[int, float] | None = None  # ticks and seconds at the last look
 
-    def look(self, users: Container[str], ticks: int, now_s: float) -> list[str]:
+    def look(self, users: Collection[str], ticks: int, now_s: float) -> list[str]:
         """Take nothing more from peers that say too much; return which.
 
         Args:
@@ -89,7 +90,7 @@ class FloodGuard:
         went_on, passed_s = max(ticks - before[0], 0), now_s - before[1]
         buckets, self._buckets = self._buckets, {}
         cut = []
-        for peer, connection in connections(users):
+        for peer, connection in self._connections.to(users):
             with connection:
                 received = _received(connection)
                 bucket = buckets.get(peer) or Bucket(received)
@@ -103,7 +104,7 @@ class FloodGuard:
 
 def deafen(peer: str) -> None:
     """Take nothing more from this peer; after Zenoh's lease the router ends its session."""
-    for _, connection in connections({peer}):
+    for _, connection in Connections().to({peer}):
         with connection:
             _take_nothing(connection)
 

@@ -11,7 +11,7 @@ from typing import Final
 from bridge.frame import Frame
 from bridge.network.link import Publisher
 from bridge.network.messages import Rows
-from configs.brief import ROWS_WITHIN_NS
+from configs.brief import ROWS_WITHIN_NS, UNWATCHED_ROWS_WITHIN_NS
 from configs.signals import PLANT_SIGNALS, Signal
 
 
@@ -33,6 +33,10 @@ def put_rows(publisher: Publisher, first: int, count: int, block: bytes, final: 
     publisher.put(Rows(first, count, block, final).encode())
 
 
+def _always() -> bool:
+    return True
+
+
 class RowBuffer:
     """Gathers the rows of consecutive ticks and hands them on as blocks.
 
@@ -45,11 +49,13 @@ class RowBuffer:
         hand_on: called with each block.
         within_ns: a block is handed on so long after its first row, if `look` is called `LOOKS`
             times in that time.
+        watched: whether somebody waits for the rows; of those that nobody waits for a block is
+            handed on after `UNWATCHED_ROWS_WITHIN_NS`.
     """
 
     __slots__ = (
-        *("_age_ns", "_block", "_count", "_first_tick", "_hand_on", "_pack_into", "_seen_ns"),
-        "_size",
+        *("_age_ns", "_block", "_count", "_due_ns", "_first_tick", "_hand_on", "_late_ns"),
+        *("_look_ns", "_pack_into", "_seen", "_size", "_unwatched_age_ns", "_watched"),
     )
 
     def __init__(
@@ -57,10 +63,16 @@ class RowBuffer:
         row: struct.Struct,
         hand_on: Callable[[int, int, bytes, bool], None],
         within_ns: int = ROWS_WITHIN_NS,
+        watched: Callable[[], bool] = _always,
     ) -> None:
         self._hand_on = hand_on
+        self._watched = watched
         self._age_ns = within_ns * (LOOKS - 1) // LOOKS
-        self._seen_ns: int | None = None  # since when there is a row
+        self._look_ns = look_ns = within_ns // LOOKS
+        self._unwatched_age_ns = max(UNWATCHED_ROWS_WITHIN_NS - look_ns, self._age_ns)
+        self._seen = False  # whether it is known since when there is a row, and so:
+        self._due_ns = 0  # when the block goes on if somebody watches
+        self._late_ns = 0  # and when in any case
         self._pack_into = row.pack_into
         self._size = row.size
         self._block = bytearray(BLOCK_TICKS * row.size)
@@ -79,11 +91,17 @@ class RowBuffer:
 
     def look(self, now_ns: int) -> None:
         """Hand on what has been there for so long, by a clock [ns]."""
-        if self._count:
-            if self._seen_ns is None:
-                self._seen_ns = now_ns
-            elif now_ns - self._seen_ns >= self._age_ns:
+        if not self._count:
+            return
+        if not self._seen:
+            self._seen = True
+            self._due_ns = now_ns + self._age_ns
+            self._late_ns = now_ns + self._unwatched_age_ns
+        elif now_ns >= self._due_ns:
+            if now_ns >= self._late_ns or self._watched():
                 self._flush(final=False)
+            else:
+                self._due_ns = min(now_ns + self._look_ns, self._late_ns)
 
     def hand_on(self) -> None:
         """Hand on what is there."""
@@ -111,7 +129,7 @@ class RowBuffer:
         self._hand_on(self._first_tick, self._count, rows, final)
         self._first_tick += self._count
         self._count = 0
-        self._seen_ns = None
+        self._seen = False
 
 
 class RowLooks:

@@ -50,6 +50,14 @@ class _SteadyPublisher:
         )
 
 
+def heard(publisher: Publisher) -> bool:
+    """Whether somebody subscribes to what a publisher puts, as far as its session knows."""
+    if not isinstance(publisher, zenoh.Publisher):
+        return True
+    status: object = publisher.matching_status  # typed as a bool, but has one
+    return bool(getattr(status, "matching", status))
+
+
 @mypyc_attr(allow_interpreted_subclasses=True)
 class ZenohLink:
     """One Zenoh session as a `bridge.network.link.Link`."""

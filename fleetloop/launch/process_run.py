@@ -59,6 +59,8 @@ GO_AHEAD_NS = 200_000_000
 UNREAD_SHARE = 0.25
 """Part of the tick deadline after which a client that doesn't read is cut off: all wait for it."""
 LOOK_EVERY_S = 0.1
+BETWEEN_LOOKS_S = 0.01
+"""Shortest time between two looks at the processes of a run, however much they say."""
 """Interval between inspections of connections for floods."""
 _MOST_OTHERS = 3
 
@@ -115,7 +117,7 @@ class ProcessRun:
         limit_s = self._schedule.tick_deadline_s
         self._ending = Ending(self._plane, self._run, self._machine, record, limit_s)
         self._hellos = Hellos(self._schedule.hello_every_s, clock=clock)
-        self._next_look_s = 0.0
+        self._next_look_s = self._next_turn_s = 0.0
         self._clocks = ClockGate(scenario, self._deployment, self._plane.clocks, self._now)
         self._links: dict[str, NetworkLink] = {}
         self._lines: RowLines
@@ -314,7 +316,7 @@ class ProcessRun:
     ) -> Failure | None:
         plane, supervision = self._plane, self._supervision
         while not stop.requested:
-            plane.receive(link, WATCH_EVERY_S)
+            self._take_messages(link)
             door.look()
             self._asked.look()
             self._report_refusals(link)
@@ -344,6 +346,16 @@ class ProcessRun:
                 plane.settle(link, actors, CONSEQUENCES_S)
                 return supervision.failure() or silent
         return None
+
+    def _take_messages(self, link: LauncherLink) -> None:
+        """Take messages, at least until `BETWEEN_LOOKS_S` after the last time.
+
+        Looking at all processes costs more than a message, and a large fleet says much.
+        """
+        self._plane.receive(link, WATCH_EVERY_S)
+        while (left_s := self._next_turn_s - self._clock.monotonic_s()) > 0.0:
+            self._plane.receive(link, left_s)
+        self._next_turn_s = self._clock.monotonic_s() + BETWEEN_LOOKS_S
 
     def _respawned(self, robot: str, fork_server: ForkServer, tick: int) -> Child:
         """The process of a controller that was started again."""

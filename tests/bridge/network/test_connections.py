@@ -3,11 +3,12 @@
 import os
 import socket
 import struct
+from contextlib import ExitStack
 from pathlib import Path
 
 from bridge.network import access, keys
 from bridge.network.client import open_client
-from bridge.network.connections import connections
+from bridge.network.connections import Connections
 from bridge.network.router import open_router
 from bridge.network.zenoh_link import ZenohLink
 from configs.connections import NetworkLink
@@ -22,7 +23,7 @@ def lingering(session: ZenohLink) -> list[bool]:
     """Of each connection of a session, whether close(2) waits for what is under way."""
     peers = {link.dst.partition("/")[2] for link in session._session.info.links()}
     found = []
-    for _, connection in connections(peers):
+    for _, connection in Connections().to(peers):
         with connection:
             option = connection.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, 8)
             found.append(bool(struct.unpack("ii", option)[0]))
@@ -51,10 +52,33 @@ def test_looking_at_a_connection_leaves_it_nonblocking_as_zenoh_has_it() -> None
         host, port = server.getsockname()
         with socket.create_connection((host, port)) as ours:
             ours.setblocking(False)
-            for peer, connection in connections({f"{host}:{port}"}):
+            for peer, connection in Connections().to({f"{host}:{port}"}):
                 assert peer == f"{host}:{port}"
                 connection.close()
                 break
             else:
                 raise AssertionError("not found")
             assert not os.get_blocking(ours.fileno())
+
+
+def test_a_descriptor_that_has_another_peer_now_is_looked_for_again() -> None:
+    connections = Connections()
+    with ExitStack() as stack:
+        ends = []
+        for _ in range(2):
+            server = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
+            ends.append(stack.enter_context(socket.create_connection(server.getsockname())))
+        first, second = ("{}:{}".format(*end.getpeername()) for end in ends)
+
+        def peers_of(*wanted: str) -> dict[str, str]:
+            """By each peer that is found, the one that its connection has."""
+            found = {}
+            for peer, connection in connections.to(wanted):
+                with connection:
+                    found[peer] = "{}:{}".format(*connection.getpeername())
+            return found
+
+        assert peers_of(first) == {first: first}
+        os.dup2(ends[1].fileno(), ends[0].fileno())
+        assert peers_of(first) == {}
+        assert peers_of(first, second) == {second: second}

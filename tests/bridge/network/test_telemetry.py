@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from support.controller_rows import SIGNALS
 
 from bridge.network.telemetry import BLOCK_TICKS, PLANT_ROW, RowBuffer, RowLooks
+from configs.brief import ROWS_WITHIN_NS, UNWATCHED_ROWS_WITHIN_NS
 from configs.signals import PLANT_SIGNALS
 
 
@@ -49,12 +50,17 @@ def test_before_an_absence_all_is_handed_on_and_the_end_of_the_run_is_named() ->
     ]
 
 
-def handed_on(row_every_ns: int, within_ns: int, rows: int) -> list[tuple[int, int, int]]:
+def handed_on(
+    row_every_ns: int, within_ns: int, rows: int, *, watched: bool = True
+) -> list[tuple[int, int, int]]:
     """When blocks are handed on, their first tick and length; rows and looks come evenly."""
     blocks: list[tuple[int, int, int]] = []
     now_ns = tick = 0
     buffer = RowBuffer(
-        PLANT_ROW, lambda first, count, *_: blocks.append((now_ns, first, count)), within_ns
+        PLANT_ROW,
+        lambda first, count, *_: blocks.append((now_ns, first, count)),
+        within_ns,
+        lambda: watched,
     )
     looks = RowLooks([buffer], within_ns)
     while tick < rows:
@@ -67,17 +73,27 @@ def handed_on(row_every_ns: int, within_ns: int, rows: int) -> list[tuple[int, i
     return blocks
 
 
-@given(row_every_ns=st.integers(200_000, 100_000_000))
-@settings(max_examples=20)
-def test_a_row_is_handed_on_within_a_time_and_no_row_is_lost(row_every_ns: int) -> None:
-    within_ns = 40_000_000
-    blocks = handed_on(row_every_ns, within_ns, 2 * BLOCK_TICKS)
+@given(row_every_ns=st.integers(200_000, 100_000_000), watched=st.booleans())
+@settings(max_examples=40)
+def test_a_row_is_handed_on_within_a_time_and_no_row_is_lost(
+    row_every_ns: int, watched: bool
+) -> None:
+    blocks = handed_on(row_every_ns, ROWS_WITHIN_NS, 2 * BLOCK_TICKS, watched=watched)
     expected = 0
     for at_ns, first, count in blocks:
         assert first == expected
+        within_ns = ROWS_WITHIN_NS if watched else UNWATCHED_ROWS_WITHIN_NS
         assert at_ns - first * row_every_ns <= within_ns
         expected += count
     assert 2 * BLOCK_TICKS - expected < BLOCK_TICKS
+
+
+def test_rows_that_nobody_watches_travel_in_larger_blocks() -> None:
+    few, many = (
+        handed_on(4_000_000, ROWS_WITHIN_NS, 2 * BLOCK_TICKS, watched=watched)
+        for watched in (False, True)
+    )
+    assert 5 * len(few) < len(many)
 
 
 def test_blocks_that_fill_in_time_are_not_divided() -> None:

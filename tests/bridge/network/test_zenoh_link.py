@@ -4,11 +4,19 @@ import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
+from bridge.network import access, keys
+from bridge.network.client import open_client
+from bridge.network.link import Publisher
+from bridge.network.router import open_router
 from bridge.network.session import few_threads
+from bridge.network.zenoh_link import heard
+from configs.connections import NetworkLink
+from configs.roles import AGENT, VIEWER
 
 DROPS = """
 import gc, itertools, sys, threading
@@ -132,3 +140,25 @@ def test_threads_may_open_their_first_sessions_at_once(monkeypatch: pytest.Monke
         with other:
             assert os.environ["ZENOH_RUNTIME"] == "other"
     assert "ZENOH_RUNTIME" not in os.environ
+
+
+def test_a_publisher_is_heard_while_somebody_subscribes(tmp_path: Path) -> None:
+    plan = access.plan("test", ("r1",), {"r1": ()}, ("r1",))
+    agent, viewer = AGENT.identity("r1"), VIEWER.identity()
+    key = keys.telemetry("test", "r1")
+
+    def await_heard(publisher: Publisher, *, expected: bool) -> bool:
+        deadline_s = time.monotonic() + 20.0
+        while heard(publisher) is not expected and time.monotonic() < deadline_s:
+            os.sched_yield()
+        return heard(publisher)
+
+    with open_router(None, plan, tmp_path) as router:
+        at = router.endpoint
+        with open_client(NetworkLink("test", at, agent, plan.passwords[agent]), 10.0) as link:
+            publisher = link.publisher(key)
+            assert not heard(publisher)
+            with open_client(NetworkLink("test", at, viewer, plan.passwords[viewer]), 10.0) as eye:
+                eye.subscribe(key, "rows")
+                assert await_heard(publisher, expected=True)
+            assert not await_heard(publisher, expected=False)
