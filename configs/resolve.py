@@ -44,8 +44,10 @@ TICK_DEADLINE_S, TICK_DEADLINE_PER_ROBOT_S = 2.0, 0.02
 """On two busy cores a tick of 250 robots takes up to 0.7 s."""
 HELLO_EVERY_S, HELLO_EVERY_PER_ROBOT_S = 0.02, 0.001
 """All processes send hellos at once, so those of a large fleet are less frequent."""
-STATUS_EVERY_S, STATUS_EVERY_PER_ROBOT_S = 0.1, 0.004
-"""What processes say for people costs the launcher at most 250 messages a second."""
+STATUS_EVERY_S, STATUS_EVERY_PER_ROBOT_S = 0.1, 0.0125
+"""What processes say for people costs the launcher at most 80 messages a second."""
+RARE_STATUS_S, RARE_STATUS_PER_ROBOT_S = 1.0, 0.004
+"""Of a large fleet every second, until that is more than 250 messages a second."""
 ROWS_WITHIN_PER_ROBOT_NS = 2_500_000
 """Blocks of rows of a large fleet are handed on less often, 800 in a second from all processes."""
 SERIAL_NUMBER = 0x3858_0000_0000
@@ -74,7 +76,11 @@ def schedule(scenario: Scenario, speed: float = 0.0, *, profile: bool = False) -
         realtime=clock.mode == "realtime",
         on_late="abort" if clock.mode == "realtime" else clock.on_late,
         profile=profile,
-        status_every_s=max(STATUS_EVERY_S, STATUS_EVERY_PER_ROBOT_S * robots),
+        status_every_s=max(
+            STATUS_EVERY_S,
+            min(STATUS_EVERY_PER_ROBOT_S * robots, RARE_STATUS_S),
+            RARE_STATUS_PER_ROBOT_S * robots,
+        ),
         rows_within_ns=max(ROWS_WITHIN_NS, ROWS_WITHIN_PER_ROBOT_NS * robots),
     )
 
