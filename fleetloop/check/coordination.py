@@ -245,7 +245,7 @@ def _map(degree: float, h: float, p: float, q: float, step_s: float, *, ageing: 
 
 
 def _exponential(a: Matrix) -> Matrix:
-    """exp(a) as `agents.coordination.matrix_exponential`, in a hundredth of its time."""
+    """exp(a) as `agents.coordination.matrix_exponential`, in less than a tenth of its time."""
     norm = float(np.abs(a).sum(axis=1).max())
     squarings = max(ceil(log2(norm / 0.125)), 0) if norm > 0.0 else 0
     scaled = a * 0.5**squarings
