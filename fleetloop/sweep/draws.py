@@ -7,6 +7,7 @@ significant digits, so that a command that repeats them is short and exact.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from statistics import NormalDist
 from typing import Annotated, Any, Literal, Protocol
 
@@ -158,9 +159,15 @@ class Graphs:
             del kept["weights"]
         return {"edges": [edge_text(edge) for edge in edges], **kept}
 
-    def _edges(self, value: Value) -> list[Edge]:
-        make = random_ring if self.kind == "ring" else random_rooted
-        return make(self.robots, max_in_degree=self.max_in_degree, seed=int(value))
+    def _edges(self, value: Value) -> tuple[Edge, ...]:
+        return _graph(self, int(value))
+
+
+@lru_cache(maxsize=64)
+def _graph(graphs: Graphs, seed: int) -> tuple[Edge, ...]:
+    """The edges of one graph: a case needs them for its scenario, its row and its command."""
+    make = random_ring if graphs.kind == "ring" else random_rooted
+    return tuple(make(graphs.robots, max_in_degree=graphs.max_in_degree, seed=seed))
 
 
 @dataclass(frozen=True, slots=True)
