@@ -223,6 +223,25 @@ def random_rooted(robots: Sequence[str], *, max_in_degree: int, seed: int) -> li
     return edges
 
 
+def random_ring(robots: Sequence[str], *, max_in_degree: int, seed: int) -> list[Edge]:
+    """Edges of a random ring with chords: each robot reaches all others.
+
+    Every robot hears the one before it in a random order, the first one the last, and up to
+    `max_in_degree` robots in all; one robot alone hears none. The same seed gives the same graph.
+    Most of these graphs have complex eigenvalues of L, of `random_rooted` most small ones have not.
+    """
+    draw = random.Random(seed)
+    order = draw.sample(list(robots), len(robots))
+    edges = []
+    for n, robot in enumerate(order):
+        before = order[n - 1]
+        others = [other for other in order if other not in (robot, before)]
+        more = min(draw.randint(0, max_in_degree - 1), len(others))
+        heard = [before, *draw.sample(others, more)] if before != robot else []
+        edges += [(speaker, robot) for speaker in heard]
+    return edges
+
+
 def of_matrix(robots: Sequence[str], rows: Sequence[Sequence[float]]) -> dict[Edge, float]:
     """Weights of the edges of an adjacency matrix: row i holds a_ij, what robot i hears."""
     return {

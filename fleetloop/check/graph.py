@@ -7,6 +7,7 @@ switching between graphs whose union is rooted. Values shared now and then are h
 that makes of it is `fleetloop.check.coordination`'s.
 """
 
+import cmath
 from dataclasses import replace
 from itertools import islice
 from math import inf
@@ -160,10 +161,22 @@ def right_side(graph: Graph) -> float:
     if graph.switches:
         instants = {one.edges: one for _, one in islice(graph.phases(), _MOST_INSTANTS)}
         return max(map(right_side, instants.values()))
-    eigenvalues = np.linalg.eigvals(graph.laplacian())
-    largest = np.abs(eigenvalues).max()
-    sides = [z.imag**2 / z.real for z in eigenvalues if z.real > 1e-9 * largest]
-    return float(max(sides, default=0.0))
+    return max((z.imag**2 / z.real for z in _other_eigenvalues(graph)), default=0.0)
+
+
+def continuous_growth_1_s(graph: Graph, p: float, q: float) -> float:
+    """Max Re λ of λ² + p λ + q ζ over the eigenvalues ζ ≠ 0 of L [1/s]: negative iff (46) holds."""
+    return max(
+        (0.5 * (cmath.sqrt(p * p - 4.0 * q * z).real - p) for z in _other_eigenvalues(graph)),
+        default=-inf,
+    )
+
+
+def _other_eigenvalues(graph: Graph) -> list[complex]:
+    """The eigenvalues ζ ≠ 0 of L."""
+    eigenvalues: list[complex] = np.linalg.eigvals(graph.laplacian()).tolist()
+    largest = max(map(abs, eigenvalues))
+    return [z for z in map(complex, eigenvalues) if z.real > 1e-9 * largest]
 
 
 def _sharing(scenario: Scenario, ahead: Forecast) -> Finding:

@@ -51,7 +51,7 @@ def run(
         typer.Argument(
             metavar="STUDY",
             help="A study file, or the name of a shipped one: delay_loss, mass_friction,"
-            " start_basin.",
+            " stability_map, start_basin.",
             autocompletion=_shipped,
         ),
     ] = None,

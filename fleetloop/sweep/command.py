@@ -23,6 +23,7 @@ from fleetloop.results import run_folder
 from fleetloop.results.summary import finite, to_json
 from fleetloop.signals import stop_on_signals
 from fleetloop.sweep import study as studies
+from fleetloop.sweep import theory
 from fleetloop.sweep.cases import Cases
 from fleetloop.sweep.cluster import Place, client_of
 from fleetloop.sweep.dataset import PARTS, Dataset, read
@@ -260,6 +261,10 @@ def _numbers(work: _Work, interrupted: bool) -> dict[str, Any]:
     everything = work.tally.rate_of_all(study.stop.confidence)
     shown = rate if study.stop.failure_rate_within is not None and work.ended else everything
     pace = work.pace
+    against = []
+    if study.theory is not None and work.dataset.done.any():
+        columns = theory.of_table(read(work.folder, ["case", *theory.LABELS]))
+        against = theory.agreements(study.theory.stability, columns)
     done = int(work.dataset.done.sum())
     return {
         "study": study.title,
@@ -275,6 +280,7 @@ def _numbers(work: _Work, interrupted: bool) -> dict[str, Any]:
         "failure_rate_interval": None if study.design == "grid" else list(shown.interval),
         "confidence": study.stop.confidence,
         "judged": shown.judged,
+        "theory": [one._asdict() for one in against],
         "computed": pace.cases,
         "wall_s": round(work.wall_s, 3),
         "cases_per_s": round(pace.cases / work.wall_s, 3) if work.wall_s > 0 else None,
@@ -296,6 +302,8 @@ def _say(work: _Work, numbers: dict[str, Any]) -> None:
             told += f"; {100 * numbers['confidence']:g} % interval"
             told += f" {100 * least:.2f} to {100 * most:.2f} %"
         say(f"failed   {told}")
+    for one in numbers["theory"]:
+        say(f"theory   {theory.Agreement(**one).words}")
     if engines := ", ".join(f"{n} {engine}" for engine, n in numbers["engines"].items()):
         say(f"engine   {engines}")
     if work.pace.cases:

@@ -216,6 +216,7 @@ def _numbers(parts: Path) -> Sequence[tuple[Path, np.ndarray | None]]:
 def _about(cases: Cases) -> dict[str, Any]:
     study, quantities = cases.study, cases.quantities
     kept = [{"name": one.name, "unit": one.unit} for one in quantities.statistics]
+    kept += [{"name": name, "unit": "1/s"} for name in quantities.predicted]
     expected = zip(quantities.expected, quantities.units, quantities.claims, strict=True)
     kept += [{"name": name, "unit": unit, "meaning": said} for name, unit, said in expected]
     return {
@@ -229,6 +230,7 @@ def _about(cases: Cases) -> dict[str, Any]:
         "factors": [one.name for one in cases.factors],
         "keys": {one.name: list(one.keys) for one in cases.factors},
         "quantities": kept,
+        "theory": quantities.condition,
         "verdicts": list(VERDICTS),
     }
 

@@ -7,18 +7,20 @@ significant digits, so that a command that repeats them is short and exact.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from statistics import NormalDist
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, Literal, Protocol
 
 from configs import patterns
-from configs.edges import edge_text
-from configs.graph import random_rooted
+from configs.edges import Edge, edge_text
+from configs.graph import random_ring, random_rooted
 from configs.parameters import Pattern
 
 DIGITS = 9
 _U_LEAST = 2.0**-53
 """Of a normal distribution u = 0 is no number."""
 
+GraphKind = Literal["rooted", "ring"]
 Value = bool | int | float | str
 Column = Annotated[str, Pattern(patterns.COLUMN, max_length=64)]
 """The name of a column of a dataset."""
@@ -129,6 +131,7 @@ class Graphs:
     last: int
     max_in_degree: int
     robots: tuple[str, ...]
+    kind: GraphKind = "rooted"
 
     @property
     def count(self) -> int | None:
@@ -145,16 +148,26 @@ class Graphs:
 
     def shown(self, value: Value) -> Value:
         """Its edges: "r1>r2 r2>r3"."""
-        edges = random_rooted(self.robots, max_in_degree=self.max_in_degree, seed=int(value))
+        edges = self._edges(value)
         return " ".join(f"{speaker}>{hearer}" for speaker, hearer in edges)
 
     def overrides(self, value: Value, table: dict[str, Any]) -> object:
         """The section with this graph; its leader links and normalised weights stay."""
-        edges = random_rooted(self.robots, max_in_degree=self.max_in_degree, seed=int(value))
+        edges = self._edges(value)
         kept: dict[str, Any] = {key: table[key] for key in ("leader", "weights") if key in table}
         if isinstance(kept.get("weights"), dict):  # of edges that aren't there any more
             del kept["weights"]
         return {"edges": [edge_text(edge) for edge in edges], **kept}
+
+    def _edges(self, value: Value) -> tuple[Edge, ...]:
+        return _graph(self, int(value))
+
+
+@lru_cache(maxsize=64)
+def _graph(graphs: Graphs, seed: int) -> tuple[Edge, ...]:
+    """The edges of one graph: a case needs them for its scenario, its row and its command."""
+    make = random_ring if graphs.kind == "ring" else random_rooted
+    return tuple(make(graphs.robots, max_in_degree=graphs.max_in_degree, seed=seed))
 
 
 @dataclass(frozen=True, slots=True)

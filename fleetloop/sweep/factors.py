@@ -3,7 +3,8 @@
     values       these, in turn
     range        steps values from least to most, both included; evenly, or evenly in the logarithm
     integers     all whole numbers from the first to the last, as of seeds
-    graph        random graphs whose first robot reaches all others (`configs.graph.random_rooted`)
+    graph        random graphs: the first robot reaches all others (`configs.graph.random_rooted`),
+                 or a ring with chords (`configs.graph.random_ring`)
     uniform      between two bounds
     log_uniform  between two bounds above 0, evenly in the logarithm
     normal       mean and standard deviation; what is beyond least or most is drawn to the bound's
@@ -23,6 +24,7 @@ from configs.parameters import MOST_INTEGER, Finite, Parameters, Positive, Seed,
 from fleetloop.sweep.draws import (
     Column,
     Draw,
+    GraphKind,
     Graphs,
     Integers,
     Levels,
@@ -65,7 +67,11 @@ class Normal(Parameters):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RandomGraph(Parameters):
-    """Random graphs whose first robot reaches all others, one for each seed."""
+    """Random graphs, one for each seed."""
+
+    kind: GraphKind = parameter(
+        "rooted", "the first robot reaches all others; ring: with chords, each reaches all others"
+    )
 
     seeds: tuple[Seed, Seed] = parameter((1, MOST_INTEGER), "the first and the last one")
     max_in_degree: Annotated[int, Ge(1), Le(256)] = parameter(2, "robots that one hears at most")
@@ -135,7 +141,7 @@ class FactorSection(Parameters):
         if self.integers is not None:
             return Integers(*self.integers)
         if (graph := self.graph) is not None:
-            return Graphs(*graph.seeds, graph.max_in_degree, tuple(robots))
+            return Graphs(*graph.seeds, graph.max_in_degree, tuple(robots), graph.kind)
         if self.uniform is not None:
             return Uniform(*self.uniform)
         if self.log_uniform is not None:

@@ -1,9 +1,11 @@
 """What is kept of a case: statistics of signals, the margin of each expectation, the verdict.
 
 statistics       the columns of [keep] (`fleetloop.sweep.statistics`)
+growth           by theory, and as simulated, of a study with [theory] (`fleetloop.sweep.theory`)
 expect_N_margin  of the N-th expectation, from 1 on, as `fleetloop report` has it; null: unknown
-margin           the least of these; minus infinity if a robot stopped or diverged
-verdict          as that of a run (`fleetloop.results.expectations`): held, failed, not checked
+margin           the least of these, and of theory; minus infinity if a robot stopped or diverged
+verdict          as that of a run (`fleetloop.results.expectations`): held, failed, not checked;
+                 what theory says is expected, too
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,8 +26,9 @@ from fleetloop.record.reader import Record
 from fleetloop.results import expectations
 from fleetloop.results.expectations import Judged, judge, series_of
 from fleetloop.results.tables import claim
-from fleetloop.sweep.statistics import TORQUE, TORQUES, Course, Kind, parts_of, statistic
-from fleetloop.sweep.study import Study
+from fleetloop.sweep import theory
+from fleetloop.sweep.statistics import TORQUE, TORQUES, UNITS, Course, Kind, parts_of, statistic
+from fleetloop.sweep.study import CONTINUOUS, MEASURED, SAMPLED, Condition, Study
 
 _MADE_OF = {
     SPREAD: ("s",),
@@ -73,11 +76,18 @@ class Quantities:
     """What each expectation of the base says."""
     signals: frozenset[str]
     """The recorded signals that are needed for all of it."""
+    condition: Condition | None = None
+    """Of theory, that each case is held against."""
+
+    @property
+    def predicted(self) -> tuple[str, ...]:
+        """Columns of what theory says."""
+        return () if self.condition is None else (SAMPLED, CONTINUOUS)
 
     @property
     def names(self) -> tuple[str, ...]:
         """All columns."""
-        return (*(one.name for one in self.statistics), *self.expected)
+        return (*(one.name for one in self.statistics), *self.predicted, *self.expected)
 
     def find(
         self,
@@ -97,8 +107,6 @@ class Quantities:
         judged = [judge(expect, record, scenario, events) for expect in scenario.expect]
         verdict = expectations.verdict(judged, stopped=bool(stopped), cut_short=False)
         margins = [one["margin"] for one in judged]
-        known = [float(margin) for margin in margins if margin is not None]
-        least = -inf if stopped else min(known, default=None)
         seen: _Courses = {}
         values: dict[str, float | None] = {
             one.name: _value(one, record, scenario, seen) for one in self.statistics
@@ -108,7 +116,34 @@ class Quantities:
             name: None if margin is None else float(margin)
             for name, margin in zip(self.expected, margins, strict=False)
         }
-        return Finding(verdict, _reason(verdict, judged, stopped), least, values)
+        reason = _reason(verdict, judged, stopped)
+        if self.condition is not None:
+            values |= theory.predicted(scenario)
+            margins.append(theory.margin_1_s(self.condition, values))
+            verdict, reason = _held_against(
+                self.condition, values, verdict, reason, expects=bool(judged)
+            )
+        known = [float(margin) for margin in margins if margin is not None]
+        return Finding(verdict, reason, -inf if stopped else min(known, default=None), values)
+
+
+def _held_against(
+    condition: Condition,
+    values: Mapping[str, float | None],
+    verdict: str,
+    reason: str,
+    *,
+    expects: bool,
+) -> tuple[str, str]:
+    """Verdict and reason of a case that theory is expected of, too."""
+    if verdict == "failed":
+        return verdict, reason
+    agrees = theory.agrees(condition, values)
+    if agrees is None:
+        return "not checked", "no growth is found in its run, or none by theory"
+    if not agrees:
+        return "failed", theory.contradiction(condition, values)
+    return (verdict, reason) if expects else ("held", "")
 
 
 def _reason(verdict: str, judged: Sequence[Judged], stopped: Mapping[str, str]) -> str:
@@ -132,7 +167,18 @@ def _value(one: Quantity, record: Record, scenario: Scenario, seen: _Courses) ->
             for signal in signals
             for course in _courses(signal, one.robots, record, scenario)
         ]
-    return statistic(one.statistic, seen[about])
+    courses = seen[about]
+    if one.statistic == "growth_1_s_of":
+        courses = [_when_shared(course, scenario) for course in courses]
+    return statistic(one.statistic, courses)
+
+
+def _when_shared(course: Course, scenario: Scenario) -> Course:
+    """A course at the instants of shares: from one to the next a fleet's map is the same."""
+    clock = scenario.clock
+    ticks = np.rint(course.t_s / clock.control_period_s).astype(np.int64)
+    here = ticks % round(clock.share_period_s / clock.control_period_s) == 0
+    return Course(course.t_s[here], course.values[here])
 
 
 def _courses(
@@ -167,6 +213,9 @@ def quantities_of(study: Study, base: Scenario, name: str) -> tuple[Quantities, 
             found.append(Complaint(name, f"keep.quantities.{n}", text, remedy))
             continue
         made.append(Quantity(text, "", *parts, ()))
+    if study.theory is not None:
+        found += theory.unfit(base, name)
+        made.append(Quantity(MEASURED, "", "growth_1_s_of", "mu", ()))
     made += [
         Quantity(one.name, "", one.statistic, one.signal, one.robots or ())
         for one in study.keep.quantity
@@ -181,14 +230,17 @@ def quantities_of(study: Study, base: Scenario, name: str) -> tuple[Quantities, 
                 remedy = f"no such robot; known: {', '.join(base.names)}"
                 found.append(Complaint(name, f"keep: {one.name}", robot, remedy))
     kept = tuple(
-        one._replace(unit="s" if one.statistic == "settle_s_of" else units.get(one.signal, ""))
-        for one in made
+        one._replace(unit=UNITS.get(one.statistic) or units.get(one.signal, "")) for one in made
     )
-    return _with_expectations(kept, base, units), found
+    condition = None if study.theory is None else study.theory.stability
+    return _with_expectations(kept, base, units, condition), found
 
 
 def _with_expectations(
-    kept: tuple[Quantity, ...], base: Scenario, units: Mapping[str, str]
+    kept: tuple[Quantity, ...],
+    base: Scenario,
+    units: Mapping[str, str],
+    condition: Condition | None,
 ) -> Quantities:
     of_expectations = [expect.signal for expect in base.expect if expect.signal is not None]
     sources = [_MADE_OF.get(signal, (signal,)) for signal in of_expectations]
@@ -202,6 +254,7 @@ def _with_expectations(
         ),
         tuple(sentence(expect) for expect in base.expect),
         frozenset({"s", *needed}),
+        condition,
     )
 
 

@@ -1,12 +1,15 @@
 """Statistics of a signal over a run: what a column of a dataset holds.
 
-    peak_SIGNAL         greatest magnitude
-    final_SIGNAL        greatest magnitude in the last `FINAL_S`
-    rms_SIGNAL          root mean square over ticks and robots
-    mean_SIGNAL         mean over ticks and robots
-    least_SIGNAL        least value
-    greatest_SIGNAL     greatest value
-    settle_s_of_SIGNAL  time from which on it stays within ±`SETTLE_BAND` [s]; none: it ends outside
+    peak_SIGNAL           greatest magnitude
+    final_SIGNAL          greatest magnitude in the last `FINAL_S`
+    rms_SIGNAL            root mean square over ticks and robots
+    mean_SIGNAL           mean over ticks and robots
+    least_SIGNAL          least value
+    greatest_SIGNAL       greatest value
+    settle_s_of_SIGNAL    time from which on it stays within ±`SETTLE_BAND` [s]; none: it ends
+                          outside
+    growth_1_s_of_SIGNAL  growth of its fastest mode, over all robots together [1/s]; above 0 it is
+                          unstable (`fleetloop.sweep.growth`); none: it is no linear motion
 
 Of several robots, or pairs, the worst one; a robot counts while it is a member. A signal is a
 recorded or derived one (`configs.signals`), or `torque_wheel_N_m`: the commands to both wheels.
@@ -23,8 +26,11 @@ from annotated_types import Len
 from configs.parameters import Parameters, parameter
 from fleetloop.settling import FINAL_S, settle_s
 from fleetloop.sweep.draws import Column
+from fleetloop.sweep.growth import growth_1_s
 
-Kind = Literal["peak", "final", "rms", "mean", "least", "greatest", "settle_s_of"]
+Kind = Literal["peak", "final", "rms", "mean", "least", "greatest", "settle_s_of", "growth_1_s_of"]
+UNITS: Mapping[Kind, str] = {"settle_s_of": "s", "growth_1_s_of": "1/s"}
+"""Of statistics that haven't the signal's."""
 TORQUE = "torque_wheel_N_m"
 TORQUES = ("tau_right_wheel_N_m", "tau_left_wheel_N_m")
 
@@ -82,6 +88,13 @@ def _settle_s(courses: Sequence[Course]) -> float | None:
     return max(known) if len(known) == len(times) else None
 
 
+def _growth_1_s(courses: Sequence[Course]) -> float | None:
+    first = courses[0].t_s
+    if any(not np.array_equal(course.t_s, first) for course in courses[1:]):
+        return None  # robots that joined late, or left
+    return growth_1_s(first, [course.values for course in courses])
+
+
 _STATISTICS: Mapping[Kind, Callable[[Sequence[Course]], float | None]] = {
     "peak": _magnitude,
     "final": _final,
@@ -90,4 +103,5 @@ _STATISTICS: Mapping[Kind, Callable[[Sequence[Course]], float | None]] = {
     "least": lambda courses: float(np.min(_all(courses))),
     "greatest": lambda courses: float(np.max(_all(courses))),
     "settle_s_of": _settle_s,
+    "growth_1_s_of": _growth_1_s,
 }

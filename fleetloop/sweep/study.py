@@ -58,6 +58,9 @@ RESERVED = (
     *("seed", "wall_s", "command", "version"),
 )
 """Columns that every dataset has; a factor whose key is `seed` is that column."""
+MEASURED, SAMPLED, CONTINUOUS = "growth_1_s", "growth_sampled_1_s", "growth_46_1_s"
+"""Columns of a study that is held against theory (`fleetloop.sweep.theory`)."""
+Condition = Literal["sampled", "(46)"]
 
 Cases = Annotated[int, Ge(1), Le(MOST_CASES)]
 
@@ -89,6 +92,17 @@ class Stopping(Parameters):
     budget_s: Seconds | None = parameter(None, "longest wall time of one command")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Theory(Parameters):
+    """What each case is held against: whether its path variables' disagreement grows."""
+
+    stability: Condition = parameter(
+        "sampled",
+        "a case whose simulation has another sign fails: of the law as it is sampled, or (46), of"
+        " the law in continuous time",
+    )
+
+
 class Study(BaseModel):
     """One study."""
 
@@ -116,6 +130,7 @@ class Study(BaseModel):
     )
     factor: Annotated[tuple[FactorSection, ...], Len(1, 200)]
     keep: Keep = Keep()
+    theory: Theory | None = Field(None, description="if given, what each case is held against")
     stop: Stopping = Stopping()
 
     def to_toml(self) -> str:
@@ -236,15 +251,16 @@ def _problems(study: Study) -> Iterator[Problem]:
 
 def _names(study: Study) -> Iterator[Problem]:
     seen: dict[str, int] = {}
+    reserved = RESERVED if study.theory is None else (*RESERVED, MEASURED, SAMPLED, CONTINUOUS)
     for n, factor in enumerate(study.factor):
         where, name = f"factor.{n}.name", factor.column
-        if name in RESERVED and factor.every_key != (name,):
-            yield Problem(where, name, f"is a column of every dataset ({', '.join(RESERVED)})")
+        if name in reserved and factor.every_key != (name,):
+            yield Problem(where, name, f"is a column of every dataset ({', '.join(reserved)})")
         elif name in seen:
             yield Problem(where, name, f"factor {seen[name]} has it already; give another name")
         seen.setdefault(name, n)
     for n, one in enumerate(study.keep.quantity):
-        if one.name in seen or one.name in RESERVED:
+        if one.name in seen or one.name in reserved:
             yield Problem(f"keep.quantity.{n}.name", one.name, "another column has this name")
         seen.setdefault(one.name, n)
     for n, text in enumerate(study.keep.quantities):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from configs.brief import NetworkLink
 from configs.edges import LEADER, InEdge, parse_edge
-from configs.graph import Graph, generated, of_matrix, random_rooted
+from configs.graph import Graph, generated, of_matrix, random_ring, random_rooted
 from configs.loading import load, loads, to_toml
 from configs.resolve import agent_brief
 
@@ -94,6 +94,18 @@ def test_random_graphs_are_rooted_bounded_and_reproducible(n: int, degree: int, 
     assert graph.max_in_degree <= degree
     assert len(set(edges)) == len(edges)
     assert edges == random_rooted(names, max_in_degree=degree, seed=seed)
+
+
+@given(n=st.integers(1, 20), degree=st.integers(1, 5), seed=st.integers(0, 1000))
+def test_in_random_rings_each_reaches_all_others(n: int, degree: int, seed: int) -> None:
+    names = [f"r{k}" for k in range(n)]
+    edges = random_ring(names, max_in_degree=degree, seed=seed)
+    graph = Graph.of(names, edges, names[:1])
+    assert graph.roots() == tuple(names)
+    assert graph.max_in_degree <= degree
+    assert len(set(edges)) == len(edges)
+    assert all(speaker != hearer for speaker, hearer in edges)
+    assert edges == random_ring(names, max_in_degree=degree, seed=seed)
 
 
 def test_the_rows_of_an_adjacency_matrix_hear_its_columns() -> None:

@@ -46,6 +46,26 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+THEORY = """
+schema = 1
+title = "against theory"
+base = "two_robots"
+design = "grid"
+set = [
+    "until_s=1.6",
+    'graph={ edges = ["r1 -> r2", "r2 -> r1"], leader = ["r1"] }',
+    "robot.r2.s_0=0.001",
+    "expect=[]",
+]
+[[factor]]
+key = "coordination.p"
+values = [1.0, 2.0]
+[keep]
+quantities = []
+[theory]
+"""
+
+
 def assert_every_case_once(out: Path, cases: int = CASES) -> None:
     assert sorted(cases_in(out)) == list(range(cases))
 
@@ -53,6 +73,18 @@ def assert_every_case_once(out: Path, cases: int = CASES) -> None:
 def assert_gone(processes: Sequence[psutil.Process], within_s: float = 5.0) -> None:
     _, alive = psutil.wait_procs(processes, timeout=within_s)
     assert alive == []
+
+
+def test_a_study_against_theory_ends_with_how_many_cases_agree(tmp_path: Path) -> None:
+    (tmp_path / "theory.toml").write_text(THEORY, "utf-8")
+    with sweeping(tmp_path, "theory.toml", "--workers", "1", "--in-process") as sweep:
+        status, out = sweep.end()
+    assert status == 0
+    assert "against theory: 2 of 2 cases: 2 held" in out
+    assert "theory   the law as sampled: 2 of 2 cases agree, 0 disagree\n" in out
+    assert "theory   (46), in continuous time: 2 of 2 cases agree, 0 disagree\n" in out
+    told = json.loads((sweep.out / "sweep.json").read_text("utf-8"))
+    assert [one["condition"] for one in told["theory"]] == ["sampled", "(46)"]
 
 
 def test_a_worker_that_is_killed_loses_no_case_and_all_of_it_is_on_loopback(folder: Path) -> None:

@@ -11,10 +11,16 @@ from fleetloop.results.figures import Captioned
 from fleetloop.results.publication import write_figures
 from fleetloop.results.summary import finite
 from fleetloop.sweep.report.derived import with_derived
-from fleetloop.sweep.report.figures import THEORY_MAP, heat_map, main_effects, synchronisation
+from fleetloop.sweep.report.figures import (
+    THEORY_MAP,
+    growth,
+    heat_map,
+    main_effects,
+    synchronisation,
+)
 from fleetloop.sweep.report.page import PAGE, page
 from fleetloop.sweep.report.parallel import parallel_coordinates
-from fleetloop.sweep.report.results import results_of
+from fleetloop.sweep.report.results import RATES, results_of
 from fleetloop.sweep.report.tables import print_view, remarks
 from fleetloop.sweep.report.view import Choice, View, numbers_of, view_of
 from fleetloop.terminal import note, say, say_json
@@ -49,6 +55,10 @@ def figures_of(view: View) -> list[Captioned]:
     effects = [one for one in view.effects if one.bins]
     if effects:
         found.append(main_effects(effects, results.confidence))
-    last = view.result if view.result.name != results.failure_rate.name else results.quantities[-1]
-    more = synchronisation(results), parallel_coordinates(results, view.factors, last)
+    last = results.quantities[-1] if view.result.name in RATES else view.result
+    more = (
+        synchronisation(results),
+        growth(results),
+        parallel_coordinates(results, view.factors, last),
+    )
     return found + [one for one in more if one is not None]

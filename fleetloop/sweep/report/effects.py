@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from fleetloop.sweep.extra import require
 from fleetloop.sweep.report.columns import Column, Series
-from fleetloop.sweep.report.results import FAILURE_RATE, Results
+from fleetloop.sweep.report.results import RATES, Results
 from fleetloop.sweep.stopping import Rate
 
 MEASURE = (
@@ -71,7 +71,7 @@ def effect_of(factor: Column, result: Column, confidence: float) -> Effect:
         values = y[here]
         if not len(values):
             continue
-        of_rate = result.name == FAILURE_RATE
+        of_rate = result.name in RATES
         low, high = (
             rate_interval(values, confidence) if of_rate else mean_interval(values, confidence)
         )
@@ -156,10 +156,11 @@ def mean_interval(values: Series, confidence: float) -> tuple[float, float]:
 def varying_result(results: Results) -> Column:
     """What is coloured if nothing is asked for.
 
-    The failure rate if some cases held and some failed; else the least margin; else the first
-    quantity that varies; else the failure rate.
+    Of a study that is held against theory the share of unstable cases; else the failure rate if
+    some cases held and some failed; else the least margin; else the first quantity that varies;
+    else the failure rate.
     """
     margin = results.quantities[-1]
     others = (margin, *results.quantities[:-1])
-    rate = results.failure_rate
-    return next((one for one in (rate, *others) if one.varies), rate)
+    found = (*results.rates, *others)
+    return next((one for one in found if one.varies), results.failure_rate)

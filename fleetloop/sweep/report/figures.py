@@ -14,18 +14,29 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis as Ticks
 from matplotlib.colors import AsinhNorm, LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, PercentFormatter
+from matplotlib.ticker import (
+    FixedLocator,
+    FuncFormatter,
+    NullFormatter,
+    NullLocator,
+    PercentFormatter,
+)
 
 from fleetloop.results.drawing import DPI, PAGE_IN, STYLE, legend_above
 from fleetloop.results.figures import Captioned
-from fleetloop.results.palette import STATE_LINES
+from fleetloop.results.palette import ROBOTS, STATE_LINES
 from fleetloop.sweep.report.boundary import Boundary
 from fleetloop.sweep.report.columns import Column, Series, linear_width, nice_marks, wrapped
 from fleetloop.sweep.report.effects import Effect
 from fleetloop.sweep.report.heat import Axis, Heat
-from fleetloop.sweep.report.results import FAILURE_RATE, Results
+from fleetloop.sweep.report.results import RATES, Results
+from fleetloop.sweep.study import CONTINUOUS, MEASURED, SAMPLED
+from fleetloop.sweep.theory import NEAR_1_S, agreements
 
 MAP, THEORY_MAP, INEQUALITY = "map", "map_with_theory", "inequality_46"
+GROWTH = "growth"
+_LINEAR_1_S = 1e-4
+"""Growth within which its scale is linear."""
 MOST_NUMBERS = 12
 """Cells of a row and of a column into which their values are written."""
 MOST_PANELS = 12
@@ -56,12 +67,12 @@ def heat_map(heat: Heat, found: Sequence[Boundary], name: str = MAP) -> Captione
                 [x[0], x[-1]], y[0], y[-1], hatch="////", facecolor="none",
                 edgecolor="#a8a8a8", linewidth=0, zorder=0,
             )  # fmt: skip
-        colours = "OrRd" if heat.result.name == FAILURE_RATE else "cividis"
+        colours = "OrRd" if heat.result.name in RATES else "cividis"
         mesh = axes.pcolormesh(
             x, y, np.ma.masked_invalid(heat.means), norm=norm, cmap=colours, rasterized=True
         )
         bar = figure.colorbar(mesh, ax=axes, label=_plain(heat.result.label))
-        if heat.result.name == FAILURE_RATE:
+        if heat.result.name in RATES:
             bar.ax.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
         _scale(axes, "x", heat.x)
         _scale(axes, "y", heat.y)
@@ -97,7 +108,8 @@ def _caption_of_map(heat: Heat, found: Sequence[Boundary]) -> str:
     if kinds == {True, False}:
         cells = "levels, or equal parts of the range"
     text = f"Mean {_words(heat.result)} over {_words(heat.x.column)} and {_words(heat.y.column)};"
-    text = text.replace("Mean failure rate", "Failure rate")
+    if heat.result.name in RATES:
+        text = f"{heat.result.label.capitalize()}{text.removeprefix(f'Mean {heat.result.label}')}"
     text += f" cells: {cells}, {many} cases each"
     if heat.empty:
         text += f"; hatched: {heat.empty} of {heat.counts.size} cells without a value"
@@ -115,7 +127,7 @@ def _write(axes: Axes, heat: Heat, norm: Normalize, colours: str) -> None:
         if np.isfinite(value) and wide[column] and high[row]:
             red, green, blue, _ = shades(norm(value))
             ink = "black" if 0.3 * red + 0.59 * green + 0.11 * blue > 0.5 else "white"
-            text = f"{100 * value:.0f}" if heat.result.name == FAILURE_RATE else f"{value:.3g}"
+            text = f"{100 * value:.0f}" if heat.result.name in RATES else f"{value:.3g}"
             axes.text(
                 float(middles[0][column]), float(middles[1][row]), text, color=ink,
                 ha="center", va="center", fontsize=6,
@@ -161,7 +173,7 @@ def _scale(axes: Axes, side: Literal["x", "y"], axis: Axis) -> None:
 
 def _norm(values: Series, result: Column) -> Normalize:
     known = values[np.isfinite(values)]
-    if result.name == FAILURE_RATE:
+    if result.name in RATES:
         highest = float(known.max(initial=0.0))
         return Normalize(0.0, next((top for top in _TOPS if highest <= top), 1.0))
     if not len(known):
@@ -196,11 +208,11 @@ def main_effects(effects: Sequence[Effect], confidence: float) -> Captioned:
             axes.set_axis_off()
         for axes in panels[:, 0]:
             axes.set_ylabel(_plain(_short(result)))
-        if result.name == FAILURE_RATE:
+        if result.name in RATES:
             panels[0, 0].yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
     left_out = len(effects) - len(shown)
     more = f"; {left_out} factors with less effect are left out" if left_out else ""
-    interval = "Wilson's" if result.name == FAILURE_RATE else "Student's"
+    interval = "Wilson's" if result.name in RATES else "Student's"
     caption = (
         f"Main effects on {_words(result)}: its mean by level or quantile bin of each factor, with"
         f" {interval} {100 * confidence:g} % intervals; ε² is the share of the"
@@ -248,18 +260,21 @@ def synchronisation(results: Results) -> Captioned | None:
     if not results.derived:
         return None
     left, right = results.derived
-    if not (left.varies or right.varies) or np.isnan(results.failed).all():
+    grows = results.rates[0] if results.condition is not None else None
+    marks = results.failed if grows is None else grows.values
+    if not (left.varies or right.varies) or np.isnan(marks).all():
         return None
+    words = ("held", "failed") if grows is None else ("stable as simulated", "unstable")
     with mpl.rc_context(STYLE), np.errstate(all="ignore"):
         figure = Figure(figsize=(0.6 * PAGE_IN, 3.0), dpi=DPI, layout="constrained")
         axes = figure.subplots()
         for state, value, mark in (("held", 0.0, "o"), ("failed", 1.0, "x")):
-            here = results.failed == value
+            here = marks == value
             if here.any():
                 axes.plot(
                     right.values[here], left.values[here], mark, color=STATE_LINES[state],
                     markersize=3.0, markeredgewidth=0.8, alpha=0.7, linestyle="none",
-                    label=f"{state}: {here.sum()}", rasterized=True,
+                    label=f"{words[int(value)]}: {here.sum()}", rasterized=True,
                 )  # fmt: skip
         low, high = 0.0, float(np.nanmax(right.values))
         line = np.linspace(low, 1.1 * high or 1.0, 200)
@@ -273,7 +288,51 @@ def synchronisation(results: Results) -> Captioned | None:
         legend_above(figure, axes, 3)
     caption = f"Both sides of (46) in every case that held or failed: {agreement(results)}."
     caption += " (46) says what becomes of the path variables in the end, not how soon."
+    if results.condition is not None:
+        said = "; ".join(one.words for one in agreements(results.condition, results.growths))
+        caption = f"Both sides of (46) in every case, and what simulation says: {said}."
     return Captioned(INEQUALITY, caption, figure)
+
+
+def growth(results: Results) -> Captioned | None:
+    """Growth as simulated over growth by theory; None of a study that isn't held against it."""
+    if results.condition is None:
+        return None
+    columns = results.growths
+    ours = columns[MEASURED]
+    with mpl.rc_context(STYLE), np.errstate(all="ignore"):
+        figure = Figure(figsize=(0.6 * PAGE_IN, 3.0), dpi=DPI, layout="constrained")
+        axes = figure.subplots()
+        largest = max(float(np.nanmax(np.abs(one), initial=0.0)) for one in columns.values())
+        reach = 2.0 * (largest or 1.0)
+        for x, y in ((-reach, reach), (reach, -reach)):
+            axes.fill_between([0.0, x], 0.0, y, color=_EMPTY, linewidth=0, zorder=0)
+        kinds = ((CONTINUOUS, "x", "(46), continuous"), (SAMPLED, ".", "as sampled"))
+        for n, (name, mark, label) in enumerate(kinds):
+            axes.plot(
+                columns[name], ours, mark, color=ROBOTS[1 - n], markersize=3.0, alpha=0.6,
+                markeredgewidth=0.7, linestyle="none", label=label, rasterized=True,
+            )  # fmt: skip
+        for set_scale in (axes.set_xscale, axes.set_yscale):
+            set_scale("symlog", linthresh=_LINEAR_1_S)
+        axes.set_xlim(-reach, reach)
+        axes.set_ylim(-reach, reach)
+        for ticks in (axes.xaxis, axes.yaxis):
+            ticks.set_major_locator(FixedLocator([-1.0, -0.01, -0.0001, 0.0, 0.0001, 0.01, 1.0]))
+            ticks.set_minor_locator(NullLocator())
+            ticks.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.set_xlabel("growth by theory [1/s]")
+        axes.set_ylabel("growth as simulated [1/s]")
+        legend_above(figure, axes, 2)
+    first = agreements(results.condition, columns)[0]
+    caption = (
+        "Growth of the path variables' disagreement, as simulated, over that by theory; scales are"
+        f" linear within ±{_LINEAR_1_S:g} 1/s. Shaded: they contradict each other. The least growth"
+        f" of any case is {first.least_1_s:.2g} 1/s; within {NEAR_1_S:g} 1/s of the boundary"
+        f" simulation and the condition that judges ({first.condition}) are at most"
+        f" {first.off_1_s:.2g} 1/s apart."
+    )
+    return Captioned(GROWTH, caption, figure)
 
 
 def agreement(results: Results) -> str:

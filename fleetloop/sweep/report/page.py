@@ -12,8 +12,8 @@ from fleetloop.results.pages import figure_tag, table_tag
 from fleetloop.results.publication import Drawn
 from fleetloop.sweep.dataset import PARTS
 from fleetloop.sweep.report.effects import MEASURE
-from fleetloop.sweep.report.figures import INEQUALITY, MAP, THEORY_MAP
-from fleetloop.sweep.report.results import FAILURE_RATE
+from fleetloop.sweep.report.figures import GROWTH, INEQUALITY, MAP, THEORY_MAP
+from fleetloop.sweep.report.results import RATES
 from fleetloop.sweep.report.tables import (
     bin_row,
     effect_row,
@@ -23,9 +23,10 @@ from fleetloop.sweep.report.tables import (
     value_text,
 )
 from fleetloop.sweep.report.view import View, Worst
+from fleetloop.sweep.theory import NEAR_1_S
 
 PAGE = "report.html"
-MAPS = MAP, THEORY_MAP, INEQUALITY
+MAPS = MAP, THEORY_MAP, INEQUALITY, GROWTH
 """Figures side by side."""
 MOST_REASON = 240
 """Characters; the dataset has all."""
@@ -53,6 +54,7 @@ def page(view: View, figures: Sequence[Drawn]) -> str:
         remarks="".join(f'<p class="lost">{escape(text)}</p>' for text in remarks(view)),
         rate=escape(f"Failure rate {rate_words(view)}"),
         facts=escape(_facts(view)),
+        theory=_theory(view),
         verdicts=_verdicts(view),
         engines=table_tag(
             ("engine", "why not the kernel", "cases"),
@@ -89,6 +91,32 @@ def _facts(view: View) -> str:
     return "; ".join(facts)
 
 
+def _theory(view: View) -> str:
+    """How often simulation and theory say the same."""
+    if not view.against:
+        return ""
+    rows = (
+        (
+            one.words.partition(":")[0] + (", the verdict" if one.judges else ""),
+            str(one.agree),
+            str(one.disagree),
+            f"{one.farthest_1_s:.2g}" if one.disagree else "-",
+            f"{one.off_1_s:.2g}",
+        )
+        for one in view.against
+    )
+    header = (
+        "simulation against", "agree", "disagree", "of at most [1/s]",
+        f"apart, within {NEAR_1_S:g} 1/s of the boundary [1/s]",
+    )  # fmt: skip
+    first = view.against[0]
+    note = (
+        f"{first.unstable} of {first.unstable + first.stable} cases are unstable as simulated;"
+        f" the least growth of any, in magnitude, is {first.least_1_s:.2g} 1/s."
+    )
+    return f'<div class="wide">{table_tag(header, rows)}</div><p class="note">{escape(note)}</p>'
+
+
 def _verdicts(view: View) -> str:
     results = view.results
     rows = "".join(
@@ -123,8 +151,8 @@ def _effects(view: View) -> str:
 
 
 def _bins(view: View) -> str:
-    rate = view.result.name == FAILURE_RATE
-    header = ("", "cases", "failure rate" if rate else "mean", "interval")
+    rate = view.result.name in RATES
+    header = ("", "cases", (view.result.label if rate else "mean"), "interval")
     tables = "".join(
         f'<h3>{escape(one.factor.label)}</h3><div class="wide">'
         f"{table_tag(header, (bin_row(found, rate=rate) for found in one.bins))}</div>"

@@ -16,18 +16,22 @@ import numpy as np
 
 from configs.errors import FleetloopError, InfrastructureError, ScenarioError
 from configs.wording import guess
+from fleetloop.sweep import theory
 from fleetloop.sweep.cases import Cases
 from fleetloop.sweep.dataset import KEY, LOCK, PARTS, about
 from fleetloop.sweep.extra import require
 from fleetloop.sweep.plan import STUDY, Plan
 from fleetloop.sweep.report.columns import Column, Series, of_texts, unit_of
+from fleetloop.sweep.study import MEASURED, Condition
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 SUMMARY = "sweep.json"
 """Of the command that computed the study."""
-FAILURE_RATE = "failure_rate"
+FAILURE_RATE, UNSTABLE_RATE = "failure_rate", "unstable_rate"
+RATES = FAILURE_RATE, UNSTABLE_RATE
+"""Results that are 1 or 0 in a case, so that their means are shares of cases."""
 MARGIN = "margin"
 
 
@@ -115,7 +119,7 @@ class Results:
         Raises:
             ScenarioError: there is none, or it has no value.
         """
-        known = {one.name: one for one in (self.failure_rate, *self.quantities)}
+        known = {one.name: one for one in (*self.rates, *self.quantities)}
         with_values = [one.name for one in known.values() if np.isfinite(one.values).any()]
         if name not in known:
             raise ScenarioError(
@@ -130,6 +134,26 @@ class Results:
     def failure_rate(self) -> Column:
         """As a result: its mean is the rate."""
         return Column(FAILURE_RATE, self.failed, symbol="failure rate")
+
+    @property
+    def condition(self) -> Condition | None:
+        """Of theory, that each case was held against."""
+        found: Condition | None = self.told.get("theory")
+        return found
+
+    @property
+    def growths(self) -> dict[str, Series]:
+        """Of a study that is held against theory: growth of each case by column [1/s]."""
+        return theory.of_table(self.table)
+
+    @property
+    def rates(self) -> tuple[Column, ...]:
+        """All results whose means are rates, the one that tells most first."""
+        if self.condition is None:
+            return (self.failure_rate,)
+        measured = self.growths[MEASURED]
+        grows = np.where(np.isnan(measured), np.nan, theory.grows(measured))
+        return Column(UNSTABLE_RATE, grows, symbol="share of unstable cases"), self.failure_rate
 
 
 def _choose(names: list[str]) -> str:
@@ -255,10 +279,14 @@ def _quantities(table: "pa.Table", told: dict[str, Any]) -> list[Column]:
     found = []
     for one in told["quantities"]:
         symbol = one.get("meaning") and f"margin of: {one['meaning']}"
+        symbol = symbol or theory.LABELS.get(one["name"], "")
         values = _numbers(table.column(one["name"]))
         found.append(Column(one["name"], values, one["unit"], symbol=symbol or ""))
     units = {one["unit"] for one in told["quantities"] if one.get("meaning")}
     symbol = "least margin of the expectations"
+    if told.get("theory"):
+        units.add("1/s")
+        symbol = "margin of theory" if units == {"1/s"} else symbol
     unit = units.pop() if len(units) == 1 else ""
     return [*found, Column(MARGIN, _numbers(table.column(MARGIN)), unit, symbol=symbol)]
 

@@ -9,7 +9,7 @@ from rich.table import Table
 
 from fleetloop.results.tables import table_box
 from fleetloop.sweep.report.effects import MEASURE, Bin, Effect
-from fleetloop.sweep.report.results import FAILURE_RATE
+from fleetloop.sweep.report.results import RATES
 from fleetloop.sweep.report.view import METHOD, View
 from fleetloop.terminal import ResultConsole
 
@@ -26,6 +26,8 @@ def print_view(view: View) -> None:
 
     line(counts_line(view))
     line(f"failed   {rate_words(view)}")
+    for one in view.against:
+        line(f"theory   {one.words}")
     for text in engine_lines(view):
         line(f"engine   {text}")
     if view.effects:
@@ -114,7 +116,7 @@ def effect_row(effect: Effect) -> tuple[str, ...]:
         return effect.factor.label, share, "-", "-", "-", "-"
     low = min(effect.bins, key=lambda one: one.mean)
     high = max(effect.bins, key=lambda one: one.mean)
-    rate = effect.result.name == FAILURE_RATE
+    rate = effect.result.name in RATES
     return (
         effect.factor.label,
         share,

@@ -24,6 +24,7 @@ from fleetloop.sweep.report.effects import (
 from fleetloop.sweep.report.heat import Heat, heat_of
 from fleetloop.sweep.report.results import MARGIN, Results
 from fleetloop.sweep.stopping import Rate
+from fleetloop.sweep.theory import Agreement, agreements
 from fleetloop.sweep.worst import place_of, worst_in
 
 METHOD = "Wilson"
@@ -73,6 +74,8 @@ class View:
     more: tuple[tuple[Heat, tuple[Boundary, ...]], ...]
     """Another map, where theory has a boundary, if it has none on the first."""
     worst: tuple[Worst, ...]
+    against: tuple[Agreement, ...] = ()
+    """Simulation against theory, of a study that is held against it."""
 
     @property
     def factors(self) -> list[Column]:
@@ -85,7 +88,7 @@ class View:
         confidence = results.confidence
         return [
             (result, [effect_of(one, result, confidence).share for one in self.factors])
-            for result in (results.failure_rate, *results.quantities)
+            for result in (*results.rates, *results.quantities)
             if result.varies
         ]
 
@@ -137,7 +140,10 @@ def view_of(results: Results, choice: Choice) -> View:
     if unasked and not any(one.lines for one in found):
         more = _with_theory(results, result, [one.factor for one in effects])
     worst = _worst(results, choice.worst)
-    return View(results, result, rate, effects, heat, why_not, found, more, worst)
+    against: tuple[Agreement, ...] = ()
+    if results.condition is not None:
+        against = tuple(agreements(results.condition, results.growths))
+    return View(results, result, rate, effects, heat, why_not, found, more, worst, against)
 
 
 def _with_theory(
@@ -230,6 +236,7 @@ def numbers_of(view: View) -> dict[str, Any]:
         "judged": rate.judged,
         "failure_rate": rate.value,
         "failure_rate_interval": list(rate.interval),
+        "theory_agreement": [one._asdict() for one in view.against],
         "interval": {"method": METHOD, "confidence": rate.confidence},
         "result": view.result.name,
         "measure": MEASURE,

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from support.coordinated_fleet import coordinated_fleet
 
-from configs.graph import Graph, generated
+from configs.graph import Graph, generated, random_ring
 from configs.loading import load
 from configs.scenario import Scenario
-from fleetloop.check.coordination import delay_margin_s, forecast, radii
+from fleetloop.check.coordination import delay_margin_s, forecast, radii, sampled_growth_1_s
+from fleetloop.check.graph import continuous_growth_1_s
 
 
 def shape(kind: str, n: int) -> Graph:
@@ -103,3 +104,14 @@ def test_the_moving_leader_is_followed_stands_and_goes_on_in_the_forecast() -> N
     assert ahead.spread[stands].max() < 0.02
     assert np.abs(ahead.s_dot[stands]).max() < 0.01
     assert ahead.s_dot[ahead.t_s >= 76.0] == pytest.approx(0.5, abs=0.03)
+
+
+@pytest.mark.parametrize("p", [0.3, 1.0])
+def test_the_sampled_growth_tends_to_the_continuous_one_with_the_share_period(p: float) -> None:
+    robots = [f"r{k}" for k in range(5)]
+    graph = Graph.of(robots, random_ring(robots, max_in_degree=2, seed=3), ["r1"])
+    limit = continuous_growth_1_s(graph, p, 1.0)
+    off = [sampled_growth_1_s(graph, p, 1.0, t, 2.0) - limit for t in (0.01, 0.005, 0.0025)]
+    assert abs(off[0]) < 0.01
+    assert off[0] == pytest.approx(2.0 * off[1], rel=0.05)
+    assert off[1] == pytest.approx(2.0 * off[2], rel=0.05)

@@ -1,16 +1,21 @@
 """Checks before a run, against what is known in closed form."""
 
+import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from agents.laws.adaptive_dsc import AdaptiveDsc
-from configs.graph import Graph, generated
+from configs.graph import Graph, generated, random_ring
 from configs.loading import load
 from fleetloop.check.coordination import forecast
 from fleetloop.check.finding import Finding
 from fleetloop.check.graph import (
+    continuous_growth_1_s,
     gain_class,
     graph_conditions,
     graph_findings,
+    right_side,
     synchronisation,
 )
 
@@ -153,3 +158,20 @@ def test_sharing_beyond_the_age_limit_is_warned_of_and_unstable_sharing_an_error
     assert text_of("shared every 3 s", *slow).level == "warning"
     ring = "graph={generator='ring'}", "coordination.p=0.5", "clock.share_period_s=1.5"
     assert text_of("shared every 1.5 s", *ring).level == "error"
+
+
+@settings(deadline=None)
+@given(st.integers(3, 7), st.integers(0, 10_000), st.floats(0.1, 4.0), st.floats(0.3, 4.0))
+def test_growth_in_continuous_time_is_negative_iff_46_holds(
+    n: int, seed: int, p: float, q: float
+) -> None:
+    robots = [f"r{k}" for k in range(n)]
+    graph = Graph.of(robots, random_ring(robots, max_in_degree=2, seed=seed), ["r1"])
+    growth = continuous_growth_1_s(graph, p, q)
+    if abs(growth) > 1e-9:
+        assert (growth < 0.0) == (p * p / q > right_side(graph))
+    size = np.eye(n)
+    whole = np.block([[-p * size, -q * graph.laplacian()], [size, 0.0 * size]])
+    values = np.linalg.eigvals(whole)
+    others = np.delete(values, np.argmin(np.abs(values)))  # all s together stay as they are
+    assert growth == pytest.approx(others.real.max(), abs=5e-3)  # of equal ones rounding is seen

@@ -103,6 +103,12 @@ def test_a_random_graph_is_shown_as_the_edges_that_the_scenario_gets(seed: int) 
     assert heard == set(robots)
 
 
+def test_random_rings_are_another_kind_of_graphs() -> None:
+    robots = ("r1", "r2", "r3", "r4")
+    rings = Graphs(0, 1000, 1, robots, "ring")
+    assert {str(rings.shown(seed)).count(">") for seed in range(50)} == {4}
+
+
 def test_uniform_samples_make_uniform_levels() -> None:
     draw = Integers(1, 6)
     u = np.random.default_rng(1).random(6000)

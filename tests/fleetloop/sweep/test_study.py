@@ -133,6 +133,34 @@ def test_an_unknown_quantity_is_refused(quantity: str, said: str) -> None:
     assert said in str(found.value)
 
 
+THEORY = RANDOM + P + "[theory]\n[keep]\nquantities = []\n"
+
+
+@pytest.mark.parametrize(
+    ("override", "said"),
+    [
+        ("coordination.v_hat_0=0.5", "must be leader.speed_m_s = 0.6"),
+        ("robot.r2.s_0=0.0", "there is no disagreement that could grow"),
+        ("robot.r2.leaves_at_s=0.05", "robots that are always there"),
+        ('network.default.delay={ kind = "constant", delay_s = 0.1 }', "values that come at once"),
+        ("graph.switch=[{ at_s = 0.04, generator = 'ring' }]", "doesn't switch"),
+    ],
+)
+def test_a_base_that_theory_is_not_of_is_refused(override: str, said: str) -> None:
+    head = THEORY.replace('"until_s=0.1"', '"until_s=0.1", "robot.r2.s_0=0.1"')
+    cases_of(head)
+    with pytest.raises(ScenarioError) as found:
+        cases_of(head.replace('"robot.r2.s_0=0.1"', f'"robot.r2.s_0=0.1", {override!r}'))
+    assert said in str(found.value)
+
+
+def test_the_columns_of_theory_are_no_others() -> None:
+    factor = '[[factor]]\nname = "growth_46_1_s"\nkey = "control.k1"\nvalues = [1.0, 2.0]\n'
+    loads("s.toml", RANDOM + factor)
+    with pytest.raises(ScenarioError, match="is a column of every dataset"):
+        loads("s.toml", RANDOM + factor + "[theory]\n")
+
+
 def test_a_base_that_needs_the_wall_clock_or_processes_is_refused() -> None:
     with pytest.raises(ScenarioError, match=r"clock\.mode"):
         cases_of(RANDOM.replace("until_s=0.1", "clock.mode=realtime") + MASS)

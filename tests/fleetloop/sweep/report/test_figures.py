@@ -53,11 +53,25 @@ def wild(case) -> Came:
     return Came("held", math.sinh(20.0 * (case["k1"] - 15.0) / 15.0))
 
 
+def stable_above_1(case) -> Came:
+    growth = 0.1 * (1.0 - case["p"]) + 1e-3
+    found = {"growth_1_s": growth, "growth_sampled_1_s": growth, "growth_46_1_s": growth - 2e-3}
+    return Came("held", abs(growth), "", found)
+
+
 STUDIES: dict[str, tuple[str, Outcome]] = {
     "grid": (GRID + P + PERIOD + TORQUE, by_p),
     "texts": (GRID + P + LAW + FEW, by_p),
     "samples": (SAMPLES + MASS + K1 + FEW, by_mass),
     "graphs": ((SAMPLES + P + Q + GRAPH + FEW).replace("two_robots", "paper"), by_p),
+    "theory": (
+        SAMPLES.replace('"until_s=0.1"', '"until_s=0.1", "robot.r2.s_0=0.1"')
+        + P
+        + Q
+        + "[theory]\n"
+        + FEW,
+        stable_above_1,
+    ),
     "outliers": (SAMPLES + MASS + K1 + FEW, wild),
     "one factor": (GRID + P + FEW, by_p),
     "all alike": (GRID + P + LAW + FEW, held),
@@ -79,6 +93,7 @@ NAMES = {
     "texts": ["map", "main_effects", "inequality_46", "parallel_coordinates"],
     "samples": ["map", "main_effects", "parallel_coordinates"],
     "graphs": ["map", "main_effects", "inequality_46", "parallel_coordinates"],
+    "theory": ["map", "main_effects", "inequality_46", "growth", "parallel_coordinates"],
     "outliers": ["map", "main_effects", "parallel_coordinates"],
     "one factor": ["main_effects", "inequality_46", "parallel_coordinates"],
     "all alike": ["map", "main_effects", "inequality_46", "parallel_coordinates"],
@@ -168,6 +183,25 @@ def test_in_parallel_coordinates_a_case_that_stopped_is_there_too(views) -> None
     assert len(held_ones.get_segments()) == 18
     assert all(segment[-1][1] < 0.0 for segment in failed.get_segments())
     assert "no value" in [text.get_text() for text in axes.texts]
+
+
+def test_of_a_study_against_theory_the_share_of_unstable_cases_is_mapped(views) -> None:
+    view = views["theory"]
+    assert view.result.name == "unstable_rate"
+    (one,) = [figure for figure in figures_of(view) if figure.name == "map"]
+    assert one.caption.startswith("Share of unstable cases over p and q;")
+    grows = view.results.rates[0].values
+    assert set(grows[view.results.factors[0].values == 0.5]) == {1.0}
+    assert set(grows[view.results.factors[0].values == 2.0]) == {0.0}
+
+
+def test_what_contradicts_theory_is_told(views) -> None:
+    view = views["theory"]
+    at_1 = int((view.results.factors[0].values == 1.0).sum())
+    assert [one.disagree for one in view.against] == [0, at_1]
+    captions = {one.name: one.caption for one in figures_of(view)}
+    assert f"{at_1} disagree, of at most 0.001 1/s" in captions["inequality_46"]
+    assert "The least growth of any case is 0.001 1/s" in captions["growth"]
 
 
 def test_verdicts_and_46_are_counted_against_each_other(views) -> None:

@@ -51,6 +51,18 @@ def test_it_has_every_figure_and_every_worst_case_with_its_command(made) -> None
         assert reason in unescape(shown)
 
 
+def test_it_says_how_often_simulation_contradicts_theory(tmp_path: Path) -> None:
+    text = SHORT.replace('"until_s=0.1"', '"until_s=0.1", "robot.r2.s_0=0.1"')
+    text += 'design = "grid"\n' + P + "[theory]\n" + FEW
+    values = {"growth_1_s": 0.2, "growth_sampled_1_s": 0.2, "growth_46_1_s": -0.1}
+    folder = made_study(tmp_path / "study", text, lambda _: Came("held", 0.2, "", values))
+    shown = page(view_of(with_derived(results_of(folder)), Choice()), [])
+    cells = re.findall(r"<td[^>]*>(.*?)</td>", shown)
+    first = cells.index("the law as sampled, the verdict")
+    assert cells[first : first + 4] == ["the law as sampled, the verdict", "3", "0", "-"]
+    assert cells[first + 6 : first + 9] == ["0", "3", "0.2"]
+
+
 def test_what_a_user_named_is_text(made) -> None:
     _, shown = made
     assert "<i>p</i>" not in shown
