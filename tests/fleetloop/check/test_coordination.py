@@ -4,12 +4,22 @@ from math import inf, isclose
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 from support.coordinated_fleet import coordinated_fleet
 
+from agents.coordination import matrix_exponential
 from configs.graph import Graph, generated, random_ring
 from configs.loading import load
 from configs.scenario import Scenario
-from fleetloop.check.coordination import delay_margin_s, forecast, radii, sampled_growth_1_s
+from fleetloop.check.coordination import (
+    _exponential,
+    delay_margin_s,
+    forecast,
+    radii,
+    sampled_growth_1_s,
+)
 from fleetloop.check.graph import continuous_growth_1_s
 
 
@@ -115,3 +125,18 @@ def test_the_sampled_growth_tends_to_the_continuous_one_with_the_share_period(p:
     assert abs(off[0]) < 0.01
     assert off[0] == pytest.approx(2.0 * off[1], rel=0.05)
     assert off[1] == pytest.approx(2.0 * off[2], rel=0.05)
+
+
+@given(
+    degree=st.floats(0.0, 5.0),
+    p=st.floats(0.1, 10.0),
+    q=st.floats(0.1, 50.0),
+    step_s=st.floats(1e-4, 1.0),
+)
+def test_its_exponential_is_the_controllers(
+    degree: float, p: float, q: float, step_s: float
+) -> None:
+    a = np.zeros((5, 5))
+    a[1, :3], a[1, 4], a[2, 1] = (0.5, -p, -q * degree), q, 1.0
+    mine, controllers = _exponential(a * step_s), matrix_exponential((a * step_s).tolist())
+    assert_allclose(mine, np.array(controllers), rtol=1e-10, atol=1e-12)
