@@ -1,7 +1,8 @@
 """Relations between the sections of a scenario; all problems at once, none raised."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import Protocol
 
 from pydantic import ValidationError
 
@@ -20,26 +21,47 @@ from configs.wording import MISSING, remedy_of
 
 _OTHERS = {LEADER: "the virtual leader", LOCALISATION: "the localisation system"}
 """Ends of edges that are no robots."""
+Check = Callable[..., Iterable[Problem]]
+"""Of a scenario: its problems."""
 
 
-def cross_problems(scenario: Scenario) -> list[Problem]:
-    """All problems that no section can see alone."""
+class Ask(Protocol):
+    """Makes a check of a scenario."""
+
+    def __call__(self, check: Check, scenario: Scenario, **how: bool) -> list[Problem]:
+        """What it finds."""
+
+
+def _found(check: Check, scenario: Scenario, **how: bool) -> list[Problem]:
+    return list(check(scenario, **how))
+
+
+def cross_problems(scenario: Scenario, ask: Ask = _found) -> list[Problem]:
+    """All problems that no section can see alone.
+
+    Args:
+        scenario: whose sections are right, each by itself.
+        ask: makes one check after the other; each depends on the scenario alone, and on whether
+            those before found nothing.
+    """
     problems = [
-        *_names(scenario),
-        *_leader(scenario),
-        *_members(scenario),
-        *_laws(scenario),
-        *_periods(scenario),
-        *drive_problems(scenario),
+        problem
+        for check in (_names, _leader, _members, _laws, _periods, drive_problems)
+        for problem in ask(check, scenario)
     ]
-    edges = edge_problems(scenario)
-    problems += [*_host(scenario), *expect_problems(scenario, sound_edges=not edges)]
-    problems += fault_problems(scenario, sound_edges=not edges)
+    edges = ask(edge_problems, scenario)
+    problems += ask(_host, scenario)
+    problems += ask(expect_problems, scenario, sound_edges=not edges)
+    problems += ask(fault_problems, scenario, sound_edges=not edges)
     if not edges:
-        problems += emulation_problems(scenario.network, scenario.topology)
+        problems += ask(_emulation, scenario)
     if not problems and not edges:
-        edges = list(graph_problems(scenario))
+        edges = ask(graph_problems, scenario)
     return problems + edges
+
+
+def _emulation(scenario: Scenario) -> Iterable[Problem]:
+    return emulation_problems(scenario.network, scenario.topology)
 
 
 def _names(scenario: Scenario) -> Iterator[Problem]:

@@ -12,6 +12,7 @@ validation: {"folder": ...}; {"recorded": True} takes classes that aren't here a
 import contextlib
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from configs.parameters import Parameters, as_tuples
@@ -203,7 +204,8 @@ def parameters_of(plugin: Plugin) -> type[Parameters]:
         adapter_of(parameters)
     except Exception as error:  # pydantic's, of annotations that it doesn't know
         raise PluginError(f"{parameters.__qualname__}: {str(error).splitlines()[0]}") from error
-    _refuse_bad_defaults(parameters)
+    hashable: Any = parameters
+    _refuse_bad_defaults(hashable)
     return parameters
 
 
@@ -227,7 +229,8 @@ def _described(parameters: type[Parameters]) -> dict[str, Any]:
     return properties
 
 
-def _refuse_bad_defaults(parameters: type[Parameters]) -> None:
+@lru_cache(maxsize=64)
+def _refuse_bad_defaults(parameters: type[Any]) -> None:
     """Hold the defaults of a class to its own types and bounds.
 
     Raises:

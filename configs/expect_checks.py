@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 _Table = tuple[str, set[str] | None]
 """A robot and its controller's signals; None: its law isn't here, of a record."""
+_OF_ALL = {signal.name for signal in (*PLANT_SIGNALS, *DERIVED_SIGNALS)} - {"t_s"}
+"""Signals that every robot has."""
 _OF_SIGNALS = (*BOUNDS, "for_s", "quantile", "settle_within_s")
 
 
@@ -71,21 +73,20 @@ def _tables(scenario: "Scenario", *, sound_edges: bool) -> Iterator[_Table]:
         yield robot.name, {signal.name for signal in signals}
 
 
-def _expectable(tables: Iterable[_Table], robots: Sequence[str]) -> list[str]:
+def _expectable(tables: Iterable[_Table], robots: Sequence[str]) -> set[str]:
     """Signals that all of these robots have, or some robot if none is named.
 
     Nothing if a law isn't here.
     """
-    every = {signal.name for signal in (*PLANT_SIGNALS, *DERIVED_SIGNALS)}
     named = []
     for robot, table in tables:
         if robots and robot not in robots:
             continue
         if table is None:
-            return []
+            return set()
         named.append(table)
     of_all = set.intersection if robots else set.union
-    return sorted((every | of_all(*named)) - {"t_s"}) if named else []
+    return (_OF_ALL | of_all(*named)) - {"t_s"} if named else set()
 
 
 # --- what is expected -----------------------------------------------------------------------------
@@ -116,8 +117,9 @@ def _of_event(where: str, expect: Expect, event: str) -> Iterator[Problem]:
 def _of_signal(
     where: str, expect: Expect, signal: str, tables: Sequence[_Table], scenario: "Scenario"
 ) -> Iterator[Problem]:
-    known = _expectable(tables, expect.robots or ())
-    if known and signal not in known:
+    expectable = _expectable(tables, expect.robots or ())
+    if expectable and signal not in expectable:
+        known = sorted(expectable)
         hint = guess(signal, known, cutoff=0.5)
         remedy = f"no such signal{hint} (known: {', '.join(known)})"
         yield Problem(f"{where}.signal", signal, remedy)

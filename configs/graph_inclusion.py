@@ -1,5 +1,6 @@
 """The graph of a file in its scenario: `graph.file` is replaced by the edges that the file has."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,14 +10,20 @@ from configs.errors import Problem, ScenarioError
 _OTHERS = ("edges", "generator", "adjacency")
 
 
+def includes_graph(data: Mapping[str, Any]) -> bool:
+    """Whether parsed TOML has a `graph.file`; what isn't a text is refused with the other keys."""
+    graph = data.get("graph")
+    return isinstance(graph, dict) and isinstance(graph.get("file"), str)
+
+
 def included_graph(data: dict[str, Any], folder: Path) -> Problem | None:
-    """Put edges, weights and leader links of `graph.file` into parsed TOML, in place of that key.
+    """Put edges, weights and leader links of `graph.file` into [graph], in place of that key.
 
     So a scenario that is written again needs no file beside it. Returns what is wrong with it.
     """
-    graph = data.get("graph")
-    if not isinstance(graph, dict) or not isinstance(graph.get("file"), str):
-        return None  # what isn't a text is refused with the other keys
+    if not includes_graph(data):
+        return None
+    graph = data["graph"] = dict(data["graph"])
     file = graph.pop("file")
     robots = data.get("robot")
     names = [

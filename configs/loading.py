@@ -100,7 +100,7 @@ def of_data(
     *,
     recorded: bool = False,
 ) -> Scenario:
-    """Load a scenario from parsed TOML, which becomes its own: overrides change it.
+    """Load a scenario from parsed TOML, which becomes its own; tables in it may be others' as well.
 
     Raises:
         ScenarioError: all that is wrong with it, a line each.
@@ -116,9 +116,13 @@ def of_data(
             applied.append(done)
     if (wrong := included_graph(data, Path(folder))) is not None:
         found.append(blamed(name, wrong, applied))
-    context = {"folder": str(Path(folder).resolve()), "recorded": recorded}
-    scenario = _check(name, data, applied, found, context)
+    scenario = _check(name, data, applied, found, context_of(folder, recorded=recorded))
     return scenario.originating(Origin(name, folder, data))
+
+
+def context_of(folder: str, *, recorded: bool = False) -> dict[str, Any]:
+    """The context in which a scenario is validated (`configs.choices`)."""
+    return {"folder": str(Path(folder).resolve()), "recorded": recorded}
 
 
 def to_toml(scenario: Scenario) -> str:

@@ -3,6 +3,7 @@
 A complaint about such a value names the option, not the file.
 """
 
+import copy
 import re
 import tomllib
 from collections.abc import Sequence
@@ -38,23 +39,27 @@ class Override(NamedTuple):
     def apply(self, data: dict[str, Any]) -> "Override | Complaint":
         """Set the key in parsed TOML; return this with its members of lists by name.
 
-        The error, if there is no such place.
+        Tables on the way to it are copied: those of `data` may be others' as well. The error, if
+        there is no such place.
         """
         *path, last = self.key.split(".")
         holder: Any = data
         names = []
         for part in path:
+            place: int | str | None = part
             if isinstance(holder, dict):
-                holder = holder.setdefault(part, {})
+                inner = holder.get(part, {})
                 names.append(part)
             elif isinstance(holder, list):
-                at = find(holder, part)
-                if at is None:
+                place = find(holder, part)
+                if place is None:
                     return self._complain(f"no {part!r} there; known: {', '.join(_names(holder))}")
-                names.append(_names(holder)[at])
-                holder = holder[at]
+                inner = holder[place]
+                names.append(_names(holder)[place])
             else:
                 return self._complain(f"{part} is in no table")
+            holder[place] = copy.copy(inner)
+            holder = holder[place]
         if isinstance(holder, dict):
             holder[last] = self.value
             if self.value is None:

@@ -1,10 +1,9 @@
 """The cases of a study: their values, their scenarios, and the command that runs one again.
 
-Loading a scenario is a case's largest fixed cost, so the base is parsed once; the overrides of a
-case are applied to a copy of the parsed table, and this is checked as any scenario is.
+Loading a scenario would be a case's largest cost, so the base is loaded once and cases are its
+variants (`configs.variants`).
 """
 
-import pickle
 import re
 import shlex
 import tomllib
@@ -15,9 +14,10 @@ from typing import Any, NamedTuple
 from configs.complaints import refusal
 from configs.errors import Complaint, ScenarioError
 from configs.faults.plan import process_fault_problem
-from configs.loading import loads, of_data
+from configs.loading import loads
 from configs.overrides import Override, inline
 from configs.scenario import Scenario
+from configs.variants import Variants
 from fleetloop.sweep.design import Design
 from fleetloop.sweep.draws import Draw, Value
 from fleetloop.sweep.factors import GRAPH
@@ -64,9 +64,9 @@ class Cases:
         self.base: Scenario = loads(base.name, base.text, self.study.set_, folder=base.folder)
         _refuse(base.source, self.base)
         table: dict[str, Any] = tomllib.loads(base.text)
-        self._table = pickle.dumps(table)
-        self._set = tuple(_override(text) for text in self.study.set_)
-        for one in self._set:
+        overrides = [_override(text) for text in self.study.set_]
+        self._variants = Variants(self.base, table, overrides, base.folder)
+        for one in overrides:
             one.apply(table)
         graph = table.get(GRAPH)
         self._graph: dict[str, Any] = graph if isinstance(graph, dict) else {}
@@ -91,15 +91,12 @@ class Cases:
         Raises:
             ScenarioError: its values make no valid one; the text names the case and the value.
         """
-        overrides = [*self._set]
+        overrides: list[Override] = []
         for factor, value in zip(self.factors, case.values, strict=True):
             option = f"case {case.number}: {factor.name} = {factor.draw.shown(value)}"
             set_to = factor.draw.overrides(value, self._graph)
             overrides += [Override(option, key, set_to) for key in factor.keys]
-        base = self.plan.base
-        # An own copy; unpickling is ten times quicker than copying deeply.
-        data = pickle.loads(self._table)
-        scenario = of_data(f"case {case.number}", data, overrides, base.folder)
+        scenario = self._variants.scenario(f"case {case.number}", overrides)
         _refuse(f"case {case.number}", scenario)
         return scenario
 
@@ -122,7 +119,6 @@ class Cases:
     def _refuse_unknown_keys(self, name: str) -> None:
         """Refuse a factor whose key no value of it makes a known one."""
         found: list[Complaint] = []
-        base = self.plan.base
         for n, (factor, section) in enumerate(zip(self.factors, self.study.factor, strict=True)):
             where = f"factor.{section.name or n}.key"
             complaints: list[Complaint] = []
@@ -131,7 +127,7 @@ class Cases:
                 set_to = factor.draw.overrides(value, self._graph)
                 overrides = [Override(factor.name, key, set_to) for key in factor.keys]
                 try:
-                    of_data(name, pickle.loads(self._table), [*self._set, *overrides], base.folder)
+                    self._variants.scenario(name, overrides)
                 except ScenarioError as error:
                     complaints = complaints or [
                         Complaint(name, where, ", ".join(factor.keys), one.remedy)

@@ -33,6 +33,13 @@ def _fields(kind: str, names: str) -> list[tuple[str, str]]:
     return [(name, kind) for name in names.split()]
 
 
+_MAP = [
+    *_fields(_FLOAT, "degree h"),
+    *_fields(_FLOAT, "v_1 v_2 v_3 mu_1 mu_2 mu_3 mu_4 mu_5 mu_6 s_1 s_2 s_3 s_4 s_5 s_6"),
+]
+MAP = np.dtype([("computed", _WHOLE), *_MAP])
+"""The map of a period of the coordination, for a degree and h."""
+
 CASE = np.dtype(
     [
         *_fields(_WHOLE, "ticks period_ns share_every localise_every pose_delay_ticks substeps"),
@@ -81,8 +88,8 @@ STATE = np.dtype(
         *_fields(_FLOAT, "seen_right_rad seen_left_rad v_used omega_used o_x o_y o_theta"),
         *_fields(_FLOAT, "f_x f_y f_theta a_x a_y a_theta a_cos a_sin"),
         # coordination, and its map for a degree
-        *_fields(_FLOAT, "v_hat mu s degree h v_1 v_2 v_3 mu_1 mu_2 mu_3 mu_4 mu_5 mu_6"),
-        *_fields(_FLOAT, "s_1 s_2 s_3 s_4 s_5 s_6"),
+        *_fields(_FLOAT, "v_hat mu s"),
+        *_MAP,
         # the law, and the limits of the host
         *_fields(_FLOAT, "alpha_theta alpha_v alpha_omega"),
         *_fields(_FLOAT, "theta_1 theta_2 theta_3 theta_4 theta_5 theta_6 theta_7 theta_8 kappa"),

@@ -86,6 +86,7 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
     changes: Any,
     leader_m_s: Any,
     curves: Any,
+    maps: Any,
     rows: tuple[Any, Any],
     kept: tuple[Any, Any],
     room: tuple[Any, Any],
@@ -101,6 +102,7 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
         changes: of edges that change: from this tick on, this share counts.
         leader_m_s: v_r by tick, 0 where there is none to be heard.
         curves: knots of all splines; and their coefficients, twice: x and y, or ahead and left.
+        maps: of `layout.MAP`, those of the coordination that were computed already; more are added.
         rows: records of `layout.TRUTH` and of `layout.TOLD`, one each, to write in.
         kept: numbers of the columns of these that are kept.
         room: for these columns of the plant and of the controllers: robot, tick, column; the first
@@ -204,7 +206,7 @@ def simulate(  # noqa: C901 - one tick, in its order; arrays that functions are 
             elif robot.leader == OWN_ESTIMATE:
                 v_r = state.v_hat
             if degree != state.degree or h != state.h:
-                _take_map(case, states, i, degree, h)
+                _take_map(case, state, maps, degree, h)
             state.v_hat, state.mu, state.s = advanced(
                 _kept_map(state), state.v_hat, state.mu, s, sum_s, sum_v, v_r
             )
@@ -291,19 +293,22 @@ def _fix(
 # --- the controller -------------------------------------------------------------------------------
 
 
-def _take_map(case: Any, states: Any, i: int, degree: float, h: float) -> None:
-    """Take the coordination's map of another d and h, from a robot that has it, or a new one."""
-    state = states[i]
+def _take_map(case: Any, state: Any, maps: Any, degree: float, h: float) -> None:
+    """Take the coordination's map of another d and h, one that is there or a new one."""
     state.degree, state.h = degree, h
-    for other in range(len(states)):
-        if other != i and states[other].degree == degree and states[other].h == h:
-            _keep_map(state, _kept_map(states[other]))
+    for n in range(len(maps)):
+        known = maps[n]
+        if not known.computed:
+            known.computed, known.degree, known.h = 1, degree, h
+            _keep_map(known, period_map(case.p, case.q, degree, h, case.period_s))
+        if known.degree == degree and known.h == h:
+            _keep_map(state, _kept_map(known))
             return
     _keep_map(state, period_map(case.p, case.q, degree, h, case.period_s))
 
 
 def _keep_map(state: Any, rows: Map) -> None:
-    """Keep the coordination's map until the degree changes."""
+    """Keep the coordination's map, of a robot until its degree changes."""
     v, mu, s = rows
     state.v_1, state.v_2, state.v_3 = v
     state.mu_1, state.mu_2, state.mu_3, state.mu_4, state.mu_5, state.mu_6 = mu

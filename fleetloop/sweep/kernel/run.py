@@ -3,11 +3,14 @@
 from collections.abc import Collection, Sequence
 from typing import Final
 
+import numpy as np
+
 from bridge.process.lifecycle import Stop
 from configs.brief import Schedule
 from configs.events import Event
 from configs.resolve import schedule
 from configs.scenario import Scenario
+from configs.sections import Coordination
 from configs.signals import AGE_PREFIX, age_signals
 from fleetloop.sweep.kernel import layout, loop
 from fleetloop.sweep.kernel.compilation import Simulate, compiled_loop
@@ -18,6 +21,8 @@ from fleetloop.sweep.kernel.outcome import KernelOutcome, columns, record_of, wi
 from fleetloop.sweep.kernel.reference import arming, referred
 from fleetloop.sweep.kernel.stops import divergences, stop_events
 
+_MOST_MAPS: Final = 64
+"""Degrees of which maps are remembered."""
 _LEFT: Final = {
     loop.PATH_VARIABLE: "a path variable diverged",
     loop.POSE: "a robot left the world",
@@ -41,22 +46,31 @@ def run(scenarios: Sequence[Scenario], signals: Collection[str], stop: Stop) -> 
         ValueError: a scenario isn't covered.
         InfrastructureError: the drives were not armed when control had to start.
     """
-    simulate, asked = compiled_loop(), frozenset(signals)
-    rows = layout.one(layout.TRUTH), layout.one(layout.TOLD)
+    asked, shared = frozenset(signals), _Shared(compiled_loop())
     outcomes = []
     for scenario in scenarios:
         if stop.requested:
             break
-        outcomes.append(_run_one(simulate, scenario, asked, rows, stop))
+        outcomes.append(_run_one(scenario, asked, shared, stop))
     return outcomes
 
 
+class _Shared:
+    """What the cases of a call have in common: the loop, and its memory."""
+
+    def __init__(self, simulate: Simulate) -> None:
+        self.simulate = simulate
+        self.rows = layout.one(layout.TRUTH), layout.one(layout.TOLD)
+        self._maps: dict[tuple[float, float, int], Records] = {}
+
+    def maps(self, coordination: Coordination, period_ns: int) -> Records:
+        """The coordination's maps that were computed, for all cases that have these gains."""
+        key = coordination.p, coordination.q, period_ns
+        return self._maps.setdefault(key, np.zeros(_MOST_MAPS, layout.MAP))
+
+
 def _run_one(
-    simulate: Simulate,
-    scenario: Scenario,
-    asked: frozenset[str],
-    rows: tuple[Records, Records],
-    stop: Stop,
+    scenario: Scenario, asked: frozenset[str], shared: _Shared, stop: Stop
 ) -> KernelOutcome:
     if lacking := lacks(scenario):
         raise ValueError(f"{scenario.name}: the kernel has no {lacking}")
@@ -64,10 +78,11 @@ def _run_one(
     made = lowered(scenario, ticks)
     kept = columns(asked)
     room = [one.rows(len(made.robots), ticks.ticks, ticks.period_ns) for one in kept]
-    why, tick, number = simulate(
+    why, tick, number = shared.simulate(
         *(made.cases, made.robots, made.states, made.edges, made.changes),
         *(made.leader_m_s, made.curves),
-        rows,
+        shared.maps(scenario.coordination, ticks.period_ns),
+        shared.rows,
         (kept[0].numbers, kept[1].numbers),
         (room[0][0], room[1][0]),
     )

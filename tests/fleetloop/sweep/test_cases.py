@@ -12,6 +12,7 @@ from configs.loading import load
 from configs.scenario import Scenario
 from fleetloop.sweep.cases import Cases
 from fleetloop.sweep.plan import Plan
+from fleetloop.sweep.study import shipped
 
 EVERY = """
 [[factor]]
@@ -45,6 +46,13 @@ def of_command(command: str) -> Scenario:
 def test_the_command_of_a_case_runs_exactly_its_scenario(number: int) -> None:
     case = CASES.case(number)
     assert of_command(CASES.command(case)) == CASES.scenario(case)
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_the_cases_of_shipped_studies_are_what_their_commands_run(name: str) -> None:
+    cases = Cases(Plan.of(name))
+    for number in range(0, cases.study.total, cases.study.total // 5):
+        assert of_command(cases.command(cases.case(number))) == cases.scenario(cases.case(number))
 
 
 def test_a_key_of_every_robot_gives_all_the_same_value() -> None:

@@ -58,6 +58,7 @@ def test_the_compiled_loop_does_what_the_same_text_does_uncompiled() -> None:
         result = loop.simulate(
             *(it.view(np.recarray) for it in made[:4]),
             *(made.changes, made.leader_m_s, made.curves),
+            np.zeros(8, layout.MAP).view(np.recarray),
             tuple(layout.one(it).view(np.recarray) for it in (layout.TRUTH, layout.TOLD)),
             (kept[0].numbers, kept[1].numbers),
             (room[0][0], room[1][0]),

@@ -224,7 +224,7 @@ def test_a_torque_that_is_no_number_stops_its_robot_alone() -> None:
     room = [one.rows(4, ticks.ticks, ticks.period_ns) for one in kept]
     why, *_ = compiled_loop()(
         *(made.cases, robots, made.states, made.edges, made.changes, made.leader_m_s),
-        made.curves,
+        *(made.curves, np.zeros(8, layout.MAP)),
         (layout.one(layout.TRUTH), layout.one(layout.TOLD)),
         (kept[0].numbers, kept[1].numbers),
         (room[0][0], room[1][0]),

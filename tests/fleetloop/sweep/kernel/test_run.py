@@ -7,6 +7,7 @@ from bridge.process.lifecycle import Stop
 from configs.loading import load
 from fleetloop.results.expectations import judge
 from fleetloop.sweep.kernel import lacks, run
+from fleetloop.sweep.kernel.reference import referred
 
 
 def test_a_record_has_the_signals_that_were_asked_for_and_no_others() -> None:
@@ -26,6 +27,32 @@ def test_cases_come_in_their_order() -> None:
         assert np.array_equal(outcome.record.plant["r1"]["x_m"], alone.record.plant["r1"]["x_m"])
     ends = {float(outcome.record.plant["r1"]["x_m"][-1]) for outcome in together}
     assert len(ends) == len(gains)
+
+
+def test_a_case_is_the_same_whatever_was_run_before_it() -> None:
+    overrides = ("until_s=0.1", "coordination.p=3.0"), ("until_s=0.1", "graph.weights=normalised")
+    graph = 'graph={ edges = ["r1 -> r2", "r1 -> r3", "r2 -> r3", "r3 -> r4"], leader = ["r1"] }'
+    some = [load("paper", each) for each in (*overrides, ("until_s=0.1", graph), overrides[0])]
+    for scenario, outcome in zip(some, run(some, {"s", "x_m"}, Stop()), strict=True):
+        (alone,) = run([scenario], {"s", "x_m"}, Stop())
+        for robot in scenario.names:
+            assert np.array_equal(outcome.record.controller[robot], alone.record.controller[robot])
+
+
+def test_more_degrees_than_are_remembered_are_as_in_process() -> None:
+    adjacency = [[0.0] * 70 for _ in range(70)]
+    for n in range(1, 70):
+        adjacency[n][n - 1] = 1.0 + n / 100
+    robots = [{"name": f"r{n}", "pose": {"x_m": -4.0, "y_m": n}} for n in range(1, 71)]
+    scenario = load("paper", ["until_s=0.02"]).with_(
+        {"robot": robots, "graph": {"adjacency": adjacency, "leader": ["r1"]}, "graph.edges": None}
+    )
+    (outcome,) = run([scenario], {"s", "mu"}, Stop())
+    reference = referred(scenario, Stop(), "")
+    for robot in scenario.names:
+        for name in ("s", "mu"):
+            found = outcome.record.controller[robot][name]
+            assert np.array_equal(found, reference.record.controller[robot][name])
 
 
 def test_expectations_are_judged_on_a_record_of_the_kernel() -> None:
