@@ -40,6 +40,7 @@ from bridge.process.awake import STALL_S, Lateness
 from bridge.process.clock import SYSTEM_CLOCK, Clock, implausible_start, monotonic_of
 from bridge.process.lifecycle import Stop
 from configs.roles import LAUNCHER
+from configs.ticks import Ticks
 
 ARRIVALS_PER_TICK: Final = 64
 """Most messages per tick, besides two for every in-neighbour: the rest waits."""
@@ -174,7 +175,7 @@ class RealtimeLoop:
             tick = min(max(tick, gone), agent.last_tick)
         faults = self.faults
         faults.skip_to(tick)
-        lateness, subscriptions = self._lateness, self._subscriptions
+        lateness, subscriptions, ticks = self._lateness, self._subscriptions, Ticks(schedule)
         distances_m = agent.network.distances_m if agent.network is not None else {}
         self._drop_backlog()
         while agent.phase is not Phase.DONE:
@@ -210,7 +211,7 @@ class RealtimeLoop:
                 self._progress.put(self._narrator.progress(tick).encode())
             subscriptions.follow(tick, distances_m)
             tick += 1
-            if schedule.shares(tick) and agent.speaks(tick):
+            if ticks.shares(tick) and agent.speaks(tick):
                 self._path.put(agent.share(tick).encode())
         with suppress(can.CanError, OSError):
             self._bus.receive_frames(0.0)  # sends what is batched

@@ -9,7 +9,6 @@ from typing import Protocol
 
 import can
 
-from bridge.can_bus.client import BusClient
 from bridge.can_bus.interface import FleetloopBus
 from bridge.can_bus.pythoncan import can_id_of, to_message
 from bridge.frame import Frame
@@ -53,7 +52,7 @@ class MessageBus:
         self._bus.send(to_message(*frame))
 
 
-def in_frames(bus: can.BusABC) -> FrameBus | BusClient:
+def in_frames(bus: can.BusABC) -> FrameBus:
     """An open bus in frames, by the shortest way that keeps its filters."""
     if isinstance(bus, FleetloopBus) and not bus.filters:
         return bus.client
