@@ -3,17 +3,21 @@
     C            the same closed loop written in C (`sweep_kernel.c`), four signals kept
     kernel       `fleetloop.sweep.kernel`, the same scenario and signals, one call
     in process   the reference, all signals
-    1,000 cases  of 4 robots and 250 steps that differ in gains and starts: robot-steps per second
-                 of one call of the kernel with all of them, from scenarios to records
+
+A study of 1,000 cases of 4 robots and 250 steps that differ in a gain and a start:
+
+    loop alone   the compiled loop, one case after the other, each as numbers already
+    records      one call of the kernel, from scenarios to records
+    rows         all that a worker does, from the study's draws to the rows of its dataset
 
 Processor time of one thread. C and kernel are held against each other within each round, and their
-results are compared. Compiling is not measured: the kernel's first call is made before.
+results are compared; records and rows are held against the loop alone. Compiling is not measured:
+the kernel's first call is made before, and a worker has its plan.
 
-Not measured: worker processes, the making of scenarios, what is done with the records.
+Not measured: worker processes, and how cases and rows travel.
 """
 
 import ctypes
-import random
 import shutil
 import subprocess
 import sys
@@ -30,9 +34,18 @@ from numpy.typing import NDArray
 from agents.coordination import period_map
 from bridge.process.lifecycle import Stop
 from configs.loading import load
+from configs.resolve import schedule
 from configs.scenario import Scenario
+from fleetloop.sweep.cases import cases_of
 from fleetloop.sweep.kernel import run
+from fleetloop.sweep.kernel.lowering import lowered
+from fleetloop.sweep.kernel.outcome import columns
 from fleetloop.sweep.kernel.reference import referred
+from fleetloop.sweep.kernel.run import Loop
+from fleetloop.sweep.plan import Base, Plan
+from fleetloop.sweep.study import loads as study_of
+from fleetloop.sweep.versions import versions_here
+from fleetloop.sweep.work import work
 
 SIGNALS = ("s", "x_e_m", "y_e_m", "tau_right_wheel_N_m")
 ROBOTS = 4
@@ -75,18 +88,67 @@ def rate(robot_steps: int, work: Callable[[], object]) -> float:
     return robot_steps / (time.process_time() - begun)
 
 
+STUDY = """
+schema = 1
+title = "gains and starts"
+base = "paper"
+design = "random"
+cases = {count}
+set = ["until_s=0.25", "expect.0.from_s=0.1", "expect.1.from_s=0.1", "expect.2.from_s=0.1",
+       "expect.3.from_s=0.1"]
+
+[[factor]]
+key = "control.k4"
+uniform = [1.0, 3.0]
+
+[[factor]]
+key = "robot.r1.pose.x_m"
+uniform = [-9.0, -7.0]
+
+[keep]
+quantities = ["peak_x_e_m", "rms_torque_wheel_N_m"]
+"""
+
+
+class ManyCases:
+    """A study of short cases."""
+
+    def __init__(self, count: int) -> None:
+        study = study_of("study.toml", STUDY.format(count=count))
+        self._plan = Plan(study.to_toml(), Base.beside("study.toml", study.base))
+        cases = cases_of(self._plan)
+        self._numbers = tuple(range(count))
+        self._scenarios = [cases.scenario(cases.case(n)) for n in self._numbers]
+        self._asked = cases.quantities.signals
+        self._robot_steps = ROBOTS * 250 * count
+
+    def loop_alone(self) -> float:
+        """Robot-steps per second of the compiled loop."""
+        compiled, kept, prepared = Loop(), columns(self._asked), []
+        for scenario in self._scenarios:
+            ticks = schedule(scenario)
+            room = [one.rows(ROBOTS, ticks.ticks, ticks.period_ns)[0] for one in kept]
+            prepared.append((lowered(scenario, ticks), (room[0], room[1])))
+
+        def work() -> None:
+            for case, room in prepared:
+                compiled.run(case, kept, room)
+
+        return rate(self._robot_steps, work)
+
+    def records(self) -> float:
+        """Robot-steps per second from scenarios to records."""
+        return rate(self._robot_steps, lambda: run(self._scenarios, self._asked, Stop()))
+
+    def rows(self) -> float:
+        """Robot-steps per second from draws to rows."""
+        here = versions_here()
+        return rate(self._robot_steps, lambda: work(self._plan, self._numbers, here, kernel=True))
+
+
 def by_kernel(scenarios: list[Scenario]) -> object:
     """One call of the kernel."""
     return run(scenarios, SIGNALS, Stop())
-
-
-def cases(count: int) -> list[Scenario]:
-    """Of four robots and 250 steps, with gains and starts of their own."""
-    base, draw = load("paper", ["until_s=0.25"]), random.Random(1).uniform
-    return [
-        base.with_({"control.k4": draw(1.0, 3.0), "robot.r1.pose.x_m": draw(-9.0, -7.0)})
-        for _ in range(count)
-    ]
 
 
 def difference(c: NDArray[np.float64], scenario: Scenario) -> str:
@@ -105,26 +167,39 @@ def main() -> None:
     rounds, seconds, count = (1, 5.0, 100) if options.quick else (5, 30.0, 1000)
     scenario = load("paper", [f"until_s={seconds}"])
     ticks = round(seconds * 1000)
-    short, many = load("paper", ["until_s=0.5"]), cases(count)
+    short, many = load("paper", ["until_s=0.5"]), ManyCases(count)
     print(machine())
     with tempfile.TemporaryDirectory() as folder:
         in_c = LoopInC(Path(folder), scenario)
         print(
             f"largest differences from C over {seconds:g} s:", difference(in_c.run(ticks), scenario)
         )
-        by_kernel(many[:1])
+        many.rows()
         measures = {
             "C": partial(rate, ROBOTS * ticks, partial(in_c.run, ticks)),
             "kernel": partial(rate, ROBOTS * ticks, partial(by_kernel, [scenario])),
-            f"{count:,} cases": partial(rate, ROBOTS * 250 * count, partial(by_kernel, many)),
             "in process": partial(rate, ROBOTS * 500, partial(referred, short, Stop(), "")),
+            "loop alone": many.loop_alone,
+            "records": many.records,
+            "rows": many.rows,
         }
         results = interleaved(rounds, measures)
+    names = list(results)
+    _print(names[:3], results, "C", "x those of C")
+    print(f"\n{count:,} cases of {ROBOTS} robots and 250 steps:")
+    _print(names[3:], results, "loop alone", "x those of the loop alone")
+
+
+def _print(names: list[str], results: dict[str, list[float]], beside: str, title: str) -> None:
     rows = [
-        (name, median_and_range(values), median_and_range(ratios(values, results["C"]), ".3f"))
-        for name, values in results.items()
+        (
+            name,
+            median_and_range(results[name]),
+            median_and_range(ratios(results[name], results[beside]), ".3f"),
+        )
+        for name in names
     ]
-    table(("", "robot-steps per s", "x those of C"), rows)
+    table(("", "robot-steps per s", title), rows)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ relative to a fault                               after, after_end, during, befo
 """
 
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from math import ceil, floor
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
@@ -138,6 +139,7 @@ def window_of(expect: Expect, scenario: "Scenario", end_s: float) -> Window | No
     return Window(first, last)
 
 
+@lru_cache(maxsize=256)
 def claim(expect: Expect) -> str:
     """An expectation as a sentence."""
     robots = f" of {', '.join(expect.robots)}" if expect.robots else ""

@@ -18,6 +18,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from enum import Enum
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -134,6 +135,16 @@ def load(plugin: Plugin) -> Any:
     Raises:
         PluginError: there is no such module or class, it fails, or it has the wrong type.
     """
+    return _found(plugin) if plugin.folder else _installed(plugin)
+
+
+@lru_cache(maxsize=64)
+def _installed(plugin: Plugin) -> Any:
+    """What is shipped or installed, looked at once: it isn't edited while a process runs."""
+    return _found(plugin)
+
+
+def _found(plugin: Plugin) -> Any:
     module_name, _, path = plugin.target.partition(":")
     if not module_name or not path:
         raise PluginError(f'must be "{plugin.kind.form}", not "{plugin.target}"')

@@ -26,7 +26,9 @@ def mask(member: Membership, ticks: int) -> np.ndarray:
 
 def counted(rows: np.ndarray, member: Membership) -> np.ndarray:
     """Rows of a controller at which its robot is a member; not those until it has re-joined."""
-    there: np.ndarray = mask(member, len(rows)) & ~np.isnan(rows["s"])
+    there: np.ndarray = ~np.isnan(rows["s"])
+    there[: member.joins_tick] = False
+    there[member.leaves_tick :] = False
     return there
 
 

@@ -120,8 +120,9 @@ def _find(expect: Expect, series: Series, first: int, behind: int, period_s: flo
     )
     g[~series.known[first:behind]] = np.nan
     ticks = behind - first
-    if np.isneginf(g).any():  # no number, whatever was expected of it
-        return Finding(False, -inf, int(np.argmax(np.isneginf(g))))
+    broken = g == -inf
+    if broken.any():  # no number, whatever was expected of it
+        return Finding(False, -inf, int(np.argmax(broken)))
     piece = 1 if expect.for_s is None else ceil(expect.for_s / period_s - 1e-6) + 1
     match expect.holds:
         case "never":
@@ -188,8 +189,8 @@ def _unit(expect: Expect, record: Record) -> str:
     if expect.settle_within_s is not None:
         return "s"
     tables = (PLANT_SIGNALS, DERIVED_SIGNALS, *record.signals.values())
-    units = {signal.name: signal.unit for table in tables for signal in table}
-    return units.get(expect.signal or "", "")
+    named = (it.unit for table in tables for it in table if it.name == expect.signal)
+    return next(named, "")
 
 
 def series_of(

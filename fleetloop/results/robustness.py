@@ -48,9 +48,10 @@ def slack(
 
 def always(g: np.ndarray, ticks: int) -> Finding:
     """At every tick; `ticks` are those of the whole window, of which `g` may be the first part."""
-    if np.isnan(g).all():
+    unknown = np.isnan(g)
+    if unknown.all():
         return NOTHING
-    at = int(np.nanargmin(g))
+    at = int(np.argmin(np.where(unknown, inf, g)))  # np.nanargmin takes twice as long
     margin = float(g[at])
     return Finding(False if margin < 0.0 else _if_whole(g, ticks), margin, at)
 

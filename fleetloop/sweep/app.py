@@ -7,6 +7,15 @@ import typer
 
 from configs.errors import ScenarioError
 from fleetloop.numbers import OurWords
+from fleetloop.sweep.options import (
+    ReferenceOption,
+    SchedulerOption,
+    TlsCaOption,
+    TlsCertOption,
+    TlsKeyOption,
+    Ways,
+    place_of,
+)
 from fleetloop.sweep.report.app import report
 
 _RUN = "run"
@@ -91,44 +100,21 @@ def run(
             " cases are computed again. Default: an equal share of the machine's.",
         ),
     ] = "auto",
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="A Dask scheduler of your own, as tcp://host:8786, instead of processes here.",
-        ),
-    ] = None,
-    tls_ca: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Of that scheduler: certificate of its authority."),
-    ] = None,
-    tls_cert: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Certificate to show to it.")
-    ] = None,
-    tls_key: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Private key of that certificate.")
-    ] = None,
-    in_process: Annotated[
-        bool,
-        typer.Option(
-            "--in-process", help="No batch kernel: every case as fleetloop run --in-process."
-        ),
-    ] = False,
+    scheduler: SchedulerOption = None,
+    tls_ca: TlsCaOption = None,
+    tls_cert: TlsCertOption = None,
+    tls_key: TlsKeyOption = None,
+    in_process: ReferenceOption = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print sweep.json on standard output.")
     ] = False,
 ) -> None:
     """Compute the cases of a study: a row of results each, in a dataset of Parquet files."""
     from fleetloop.sweep import command
-    from fleetloop.sweep.cluster import Place, Tls
 
-    tls = Tls(tls_ca, tls_cert, tls_key)
-    if scheduler is None and tls.given:
-        raise ScenarioError("--tls-ca, --tls-cert, --tls-key: of a --scheduler; none is given")
-    if scheduler is not None and (workers is not None or memory != "auto"):
-        raise ScenarioError(f"--scheduler {scheduler}: has its workers; leave out --workers")
-    place = Place(workers or command.processors(), memory, scheduler, tls)
-    ways = command.Ways(place, kernel=not in_process, as_json=as_json)
+    tls = (tls_ca, tls_cert, tls_key)
+    place = place_of(workers, scheduler, tls, option="--workers", memory=memory)
+    ways = Ways(place, kernel=not in_process, as_json=as_json)
     if resume is not None:
         if study is not None or out is not None:
             raise ScenarioError(f"--resume {resume} has its study and its folder: name neither")

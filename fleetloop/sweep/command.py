@@ -18,17 +18,17 @@ import numpy as np
 from bridge.process.clock import SYSTEM_CLOCK
 from bridge.process.lifecycle import Stop
 from configs.errors import ExitStatus, FleetloopError, InfrastructureError, ScenarioError
-from fleetloop.jobs import pool
 from fleetloop.results import run_folder
 from fleetloop.results.summary import finite, to_json
 from fleetloop.signals import stop_on_signals
 from fleetloop.sweep import study as studies
 from fleetloop.sweep import theory
 from fleetloop.sweep.cases import Cases
-from fleetloop.sweep.cluster import Place, client_of
+from fleetloop.sweep.cluster import client_of
 from fleetloop.sweep.dataset import PARTS, Dataset, read
 from fleetloop.sweep.engine import Engine, Pace
 from fleetloop.sweep.extra import PACKAGES, require
+from fleetloop.sweep.options import Ways
 from fleetloop.sweep.plan import STUDY, Plan
 from fleetloop.sweep.progress import Meter
 from fleetloop.sweep.stopping import Tally, decided
@@ -36,20 +36,6 @@ from fleetloop.sweep.worst import FOLDER, keep_worst, missing_of, worst_of
 from fleetloop.terminal import note, say, say_json
 
 NUMBERS = "sweep.json"
-
-
-@dataclass(frozen=True, slots=True)
-class Ways:
-    """How a study is carried out and told; none changes a row."""
-
-    place: Place
-    kernel: bool = True
-    as_json: bool = False
-
-
-def processors() -> int:
-    """Workers of this machine if no number is given."""
-    return pool.processors()
 
 
 def begin(source: str, cases: int | None, seed: int | None, out: Path | None, ways: Ways) -> int:

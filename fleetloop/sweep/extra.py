@@ -1,4 +1,4 @@
-"""The packages that only sweeps need: extra `sweep`."""
+"""The packages that only sweeps and tunings need: extra `sweep`."""
 
 from functools import lru_cache
 from importlib.util import find_spec
@@ -9,8 +9,12 @@ PACKAGES = ("distributed", "pyarrow", "scipy")
 
 
 @lru_cache(maxsize=16)
-def require(*packages: str) -> None:
+def require(*packages: str, verb: str = "sweep") -> None:
     """Refuse to go on without these.
+
+    Args:
+        packages: by their modules' names.
+        verb: that needs them.
 
     Raises:
         ScenarioError: one isn't installed; the text says what to do.
@@ -18,5 +22,5 @@ def require(*packages: str) -> None:
     missing = [package for package in packages if find_spec(package) is None]
     if missing:
         raise ScenarioError(
-            f"fleetloop sweep needs {' and '.join(missing)}: pip install 'fleetloop[sweep]'"
+            f"fleetloop {verb} needs {' and '.join(missing)}: pip install 'fleetloop[sweep]'"
         )

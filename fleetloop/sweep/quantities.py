@@ -10,6 +10,7 @@ verdict          as that of a run (`fleetloop.results.expectations`): held, fail
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import inf
 from typing import NamedTuple, get_args
 
@@ -186,9 +187,16 @@ def _courses(
 ) -> Iterator[Course]:
     period_s = scenario.clock.control_period_s
     for series in series_of(signal, robots, record, scenario):
-        t_s = np.arange(len(series.values))[series.member.ticks] * period_s
+        t_s = _times_s(len(series.values), period_s)[series.member.ticks]
         values, known = series.values[series.member.ticks], series.known[series.member.ticks]
         yield Course(t_s, values) if known.all() else Course(t_s[known], values[known])
+
+
+@lru_cache(maxsize=8)
+def _times_s(ticks: int, period_s: float) -> np.ndarray:
+    times_s = np.arange(ticks) * period_s
+    times_s.flags.writeable = False
+    return times_s
 
 
 # --- of a study -----------------------------------------------------------------------------------

@@ -6,6 +6,15 @@ from typing import Annotated
 import typer
 
 from configs.errors import ScenarioError
+from fleetloop.sweep.options import (
+    ReferenceOption,
+    SchedulerOption,
+    TlsCaOption,
+    TlsCertOption,
+    TlsKeyOption,
+    Ways,
+    place_of,
+)
 
 
 def _shipped(incomplete: str) -> list[str]:
@@ -55,23 +64,20 @@ def tune(
             " Default: as many as processors.",
         ),
     ] = None,
-    in_process: Annotated[
-        bool,
-        typer.Option(
-            "--in-process", help="No batch kernel: every case as fleetloop run --in-process."
-        ),
-    ] = False,
+    scheduler: SchedulerOption = None,
+    tls_ca: TlsCaOption = None,
+    tls_cert: TlsCertOption = None,
+    tls_key: TlsKeyOption = None,
+    in_process: ReferenceOption = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print tune.json on standard output, no table.")
     ] = False,
 ) -> None:
     """Search for gains that suit many cases, by Optuna: objective, constraints, a baseline."""
-    from fleetloop.jobs import pool
-    from fleetloop.sweep.cluster import Place
     from fleetloop.tune import command
 
-    place = Place(jobs or pool.processors())
-    ways = command.Ways(place, kernel=not in_process, as_json=as_json)
+    place = place_of(jobs, scheduler, (tls_ca, tls_cert, tls_key), option="--jobs")
+    ways = Ways(place, kernel=not in_process, as_json=as_json)
     if resume is not None:
         if out is not None:
             raise ScenarioError(f"--resume {resume} has its folder: leave out --out")

@@ -19,11 +19,11 @@ from fleetloop.results.publication import write_figures
 from fleetloop.results.summary import finite, to_json
 from fleetloop.signals import stop_on_signals
 from fleetloop.sweep.cases import Cases
-from fleetloop.sweep.cluster import Place
 from fleetloop.sweep.extra import require
+from fleetloop.sweep.options import Ways
 from fleetloop.terminal import note, say, say_json
 from fleetloop.tune import results, scores
-from fleetloop.tune.evaluation import Evaluation, evaluation_of
+from fleetloop.tune.evaluation import Evaluation, evaluation_of, is_here
 from fleetloop.tune.figures import all_figures
 from fleetloop.tune.page import page
 from fleetloop.tune.plan import TUNING, TuningPlan
@@ -36,15 +36,6 @@ from fleetloop.tune.tables import Judged, print_table
 from fleetloop.tune.tuning import Tuning, differences
 
 TRIALS, CHECK, PAGE = "trials", "check", "tune.html"
-
-
-@dataclass(frozen=True, slots=True)
-class Ways:
-    """How a tuning is carried out and told; none changes a result."""
-
-    place: Place
-    kernel: bool = True
-    as_json: bool = False
 
 
 def begin(source: str, trials: int | None, seed: int | None, out: Path | None, ways: Ways) -> int:
@@ -107,7 +98,8 @@ def _require(ways: Ways) -> None:
         ScenarioError: one isn't installed.
     """
     optuna_here()
-    require("pyarrow", *(("distributed",) if ways.place.workers > 1 else ()))
+    dask = () if is_here(ways.place) else ("distributed",)
+    require("pyarrow", "scipy", *dask, verb="tune")
 
 
 # --- the work -------------------------------------------------------------------------------------
@@ -124,6 +116,7 @@ class Search:
     """That are done."""
     meter: Meter | None = None
     ended: str = "all trials are done"
+    workers: int = 1
 
     @property
     def tuning(self) -> Tuning:
@@ -213,6 +206,7 @@ def _go(folder: Path, plan: TuningPlan, cases: Cases, ways: Ways) -> int:
             if tuning.check_cases is not None and not stop.requested:
                 meter.check()
                 judged = search.checked(evaluate, stop)
+            search.workers = evaluate.workers
         if stop.requested:
             search.ended = "interrupted"
             note(f"{stop.reason}: go on with fleetloop tune --resume {folder}")
@@ -246,7 +240,7 @@ def _finish(
         importances=importances,
         command=command,
         wall_s=round(wall_s, 3),
-        workers=ways.place.workers,
+        workers=search.workers,
     )
     told = finite(numbers)
     run_folder.write(folder / results.NUMBERS, to_json(numbers))

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 class Evaluation(Protocol):
     """Computes cases."""
 
+    @property
+    def workers(self) -> int:
+        """Processes that shared them, at most at one time."""
+
     def __call__(self, cases: Cases, stop: Stop) -> "pa.Table | None":
         """The rows of all these cases, by number; None if told to stop."""
 
@@ -34,6 +38,11 @@ class Here:
     def __init__(self, on_look: Callable[[], None] = lambda: None, *, kernel: bool = True) -> None:
         self._on_look = on_look
         self._kernel = kernel_here() if kernel else None
+
+    @property
+    def workers(self) -> int:
+        """This process."""
+        return 1
 
     def __call__(self, cases: Cases, stop: Stop) -> "pa.Table | None":
         """The rows of all these cases."""
@@ -62,6 +71,11 @@ class Workers:
         self._kernel = kernel
         self._engine: Engine | None = None
 
+    @property
+    def workers(self) -> int:
+        """Those of the client."""
+        return 1 if self._engine is None else self._engine.most_threads
+
     def __call__(self, cases: Cases, stop: Stop) -> "pa.Table | None":
         """The rows of all these cases."""
         batches: list[Any] = []
@@ -79,6 +93,11 @@ class Workers:
         return None if stop.requested else _table(batches)
 
 
+def is_here(place: Place) -> bool:
+    """Whether this process alone computes all cases of a place."""
+    return place.scheduler is None and place.workers == 1
+
+
 @contextmanager
 def evaluation_of(
     place: Place,
@@ -94,7 +113,7 @@ def evaluation_of(
         ScenarioError: Dask isn't there, or the address is none.
         InfrastructureError: the workers don't come.
     """
-    if place.scheduler is None and place.workers == 1:
+    if is_here(place):
         yield Here(on_look, kernel=kernel)
         return
     with client_of(place, folder) as client:

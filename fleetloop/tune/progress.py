@@ -1,14 +1,12 @@
 """How far a tuning is: trials done, the best of them, time left."""
 
-from rich.progress import TextColumn
-
 from bridge.process.clock import SYSTEM_CLOCK, Clock
-from fleetloop.terminal import Bars
+from fleetloop.sweep.progress import Count
 from fleetloop.tune.scores import Trial
 from fleetloop.tune.tables import told
 
 
-class Meter(Bars):
+class Meter(Count):
     """One bar for all trials.
 
     Args:
@@ -21,18 +19,9 @@ class Meter(Bars):
     def __init__(
         self, name: str, total: int, before: int, *, quiet: bool, clock: Clock = SYSTEM_CLOCK
     ) -> None:
-        amount = "{task.completed:.0f} / {task.total:.0f} trials{task.fields[state]}"
-        super().__init__(TextColumn(amount), quiet=quiet)
-        self._name, self._total, self._before, self._done = name, total, before, before
-        self._clock = clock
-        self._began_s = clock.monotonic_s()
+        super().__init__(name, total, before, unit="trials", quiet=quiet, clock=clock)
         self._best: Trial | None = None
         self._checking = False
-        self._task = self._bars.add_task(name, total=total, state="")
-
-    def begin(self) -> None:
-        """The first trial begins now."""
-        self._began_s = self._clock.monotonic_s()
 
     def advance(self, done: int, best: Trial | None) -> None:
         """So many trials are done, and this is the best of them."""
@@ -42,20 +31,11 @@ class Meter(Bars):
         """All trials are done; other cases come now."""
         self._checking = True
 
-    def show(self) -> None:
-        """Show how far it is."""
-        state = self.state()
-        self._bars.update(self._task, completed=self._done, state=state)
-        self._refresh(lambda: f"{self._name}: {self._done} of {self._total} trials{state}")
-
     def state(self) -> str:
         """The best so far, and the time left once there is a rate."""
-        best, made = self._best, self._done - self._before
-        parts = [] if best is None else [f"best {told(best)}"]
-        passed_s = self._clock.monotonic_s() - self._began_s
+        parts = [] if self._best is None else [f"best {told(self._best)}"]
         if self._checking:
             parts.append("judged on other cases now")
-        elif made and passed_s > 0:
-            left_s = round((self._total - self._done) * passed_s / made)
-            parts.append(f"{left_s // 60}:{left_s % 60:02d} left")
+        elif (rate_1_s := self._rate_1_s()) is not None:
+            parts.append(self._left(rate_1_s))
         return "".join(f", {part}" for part in parts)

@@ -6,7 +6,7 @@ at all: what is added to scenarios goes to the in-process reference until the ke
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, fields
-from functools import cache, lru_cache
+from functools import cache
 from importlib.util import find_spec
 from typing import Any, Final
 
@@ -170,7 +170,7 @@ def _reasons(scenario: Scenario) -> Iterator[str]:
     ):
         yield from _of_section(section)
     if scenario.drive_choice.name == DEFAULT:
-        yield from filter(None, (_section_reason(scenario.drive_choice.parameters),))
+        yield from filter(None, (_reason_of(scenario.drive_choice.parameters),))
     else:
         yield f"the drive protocol {scenario.drive_choice.name}"
     for robot in scenario.robot:
@@ -196,17 +196,11 @@ def _of_law(choice: Choice) -> Iterator[str]:
 def _of_section(section: object) -> Iterator[str]:
     if isinstance(section, Choice):
         yield f"the shape {section.name}"
-    elif reason := _section_reason(section):
+    elif reason := _reason_of(section):
         yield reason
 
 
-@lru_cache(maxsize=4096)
-def _section_reason(section: Parameters) -> str:
-    """As `_reason_of`, looked up by the value: cases of a sweep have most sections in common."""
-    return _reason_of(section)
-
-
-def _reason_of(section: Parameters) -> str:
+def _reason_of(section: object) -> str:
     kind: Any = type(section)
     looks = _looks_of(kind)
     if looks is None:

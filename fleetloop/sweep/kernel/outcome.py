@@ -65,8 +65,9 @@ class Columns(NamedTuple):
 
     def rows(self, robots: int, ticks: int, period_ns: int) -> tuple[Rows, NDArray[np.void]]:
         """Room for the rows of all robots: as numbers, for the loop, and as rows of a record."""
-        rows = np.empty((robots, ticks), row_type(self.signals))
-        rows[:] = _blank(self.signals, ticks, period_ns)
+        blank = _blank(self.signals, ticks, period_ns)
+        rows = np.empty((robots, ticks), blank.dtype)
+        rows[:] = blank
         return rows.view(np.float64).reshape(robots, ticks, len(self.signals) + 1), rows
 
 

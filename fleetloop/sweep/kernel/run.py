@@ -10,14 +10,20 @@ from configs.brief import Schedule
 from configs.events import Event
 from configs.resolve import schedule
 from configs.scenario import Scenario
-from configs.sections import Coordination
 from configs.signals import AGE_PREFIX, age_signals
 from fleetloop.sweep.kernel import layout, loop
-from fleetloop.sweep.kernel.compilation import Simulate, compiled_loop
+from fleetloop.sweep.kernel.compilation import compiled_loop
 from fleetloop.sweep.kernel.coverage import lacks
 from fleetloop.sweep.kernel.hearing import ages_s
-from fleetloop.sweep.kernel.lowering import Records, lowered
-from fleetloop.sweep.kernel.outcome import KernelOutcome, columns, record_of, with_ages
+from fleetloop.sweep.kernel.lowering import Case, Records, lowered
+from fleetloop.sweep.kernel.outcome import (
+    Columns,
+    KernelOutcome,
+    Rows,
+    columns,
+    record_of,
+    with_ages,
+)
 from fleetloop.sweep.kernel.reference import arming, referred
 from fleetloop.sweep.kernel.stops import divergences, stop_events
 
@@ -46,31 +52,51 @@ def run(scenarios: Sequence[Scenario], signals: Collection[str], stop: Stop) -> 
         ValueError: a scenario isn't covered.
         InfrastructureError: the drives were not armed when control had to start.
     """
-    asked, shared = frozenset(signals), _Shared(compiled_loop())
+    asked, compiled = frozenset(signals), Loop()
     outcomes = []
     for scenario in scenarios:
         if stop.requested:
             break
-        outcomes.append(_run_one(scenario, asked, shared, stop))
+        outcomes.append(_run_one(scenario, asked, compiled, stop))
     return outcomes
 
 
-class _Shared:
-    """What the cases of a call have in common: the loop, and its memory."""
+class Loop:
+    """The compiled loop, with the memory that the cases of a call have in common."""
 
-    def __init__(self, simulate: Simulate) -> None:
-        self.simulate = simulate
-        self.rows = layout.one(layout.TRUTH), layout.one(layout.TOLD)
-        self._maps: dict[tuple[float, float, int], Records] = {}
+    def __init__(self) -> None:
+        self._simulate = compiled_loop()
+        self._rows = layout.one(layout.TRUTH), layout.one(layout.TOLD)
+        self._maps: dict[tuple[float, float, float], Records] = {}
 
-    def maps(self, coordination: Coordination, period_ns: int) -> Records:
-        """The coordination's maps that were computed, for all cases that have these gains."""
-        key = coordination.p, coordination.q, period_ns
+    def run(
+        self, case: Case, kept: tuple[Columns, Columns], room: tuple[Rows, Rows]
+    ) -> tuple[int, int, int]:
+        """Run a case; its states become those of the end.
+
+        Args:
+            case: at tick 0.
+            kept: columns of the plant's rows and of the controllers'.
+            room: for these.
+
+        Returns:
+            as `loop.simulate`.
+        """
+        return self._simulate(
+            *(case.cases, case.robots, case.states, case.edges, case.changes),
+            *(case.leader_m_s, case.curves, self._maps_of(case.cases[0]), self._rows),
+            (kept[0].numbers, kept[1].numbers),
+            room,
+        )
+
+    def _maps_of(self, case: np.void) -> Records:
+        """The coordination's maps that were computed, of all cases that have these gains."""
+        key = float(case["p"]), float(case["q"]), float(case["period_s"])
         return self._maps.setdefault(key, np.zeros(_MOST_MAPS, layout.MAP))
 
 
 def _run_one(
-    scenario: Scenario, asked: frozenset[str], shared: _Shared, stop: Stop
+    scenario: Scenario, asked: frozenset[str], compiled: Loop, stop: Stop
 ) -> KernelOutcome:
     if lacking := lacks(scenario):
         raise ValueError(f"{scenario.name}: the kernel has no {lacking}")
@@ -78,14 +104,7 @@ def _run_one(
     made = lowered(scenario, ticks)
     kept = columns(asked)
     room = [one.rows(len(made.robots), ticks.ticks, ticks.period_ns) for one in kept]
-    why, tick, number = shared.simulate(
-        *(made.cases, made.robots, made.states, made.edges, made.changes),
-        *(made.leader_m_s, made.curves),
-        shared.maps(scenario.coordination, ticks.period_ns),
-        shared.rows,
-        (kept[0].numbers, kept[1].numbers),
-        (room[0][0], room[1][0]),
-    )
+    why, tick, number = compiled.run(made, kept, (room[0][0], room[1][0]))
     if why != loop.NOTHING:
         where = f"{_LEFT[why]} ({scenario.names[number]}, {ticks.when(tick)})"
         return referred(scenario, stop, where)

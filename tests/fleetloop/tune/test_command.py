@@ -13,14 +13,15 @@ import psutil
 import pyarrow.parquet as pq
 import pytest
 from support.command_line import fleetloop
+from support.sweeping import cluster
 from support.tunings import HEAD, PEAK, SEEDS, P, written
 
 from configs.errors import ScenarioError
 from configs.loading import load as load_scenario
 from fleetloop.sweep.cluster import Place
+from fleetloop.sweep.options import Ways
 from fleetloop.sweep.plan import Plan
 from fleetloop.tune import command, storage
-from fleetloop.tune.command import Ways
 
 WAYS = Ways(Place(1), kernel=False, as_json=True)
 START = '[[parameter]]\nkey = "robot.*.v_m_s"\nuniform = [0.1, 1.1]\nbaseline = 0.3\n'
@@ -204,3 +205,27 @@ def test_ctrl_c_keeps_what_is_done_and_workers_change_nothing(tuned: Path, tmp_p
     done = fleetloop(tmp_path, "tune", "--resume", "out", "--jobs", "1", "--in-process")
     assert done.returncode == 0, done.stderr
     assert numbers(tmp_path / "out")["all"] == numbers(tuned)["all"]
+
+
+@pytest.mark.system
+@pytest.mark.timeout(400)
+def test_the_workers_of_a_cluster_bring_the_same_trials(tuned: Path, tmp_path: Path) -> None:
+    path = written(tmp_path, SPEED)
+    with cluster(tmp_path, workers=2) as dask:
+        words = ("--scheduler", dask.address, "--in-process", "--out", "out")
+        done = fleetloop(tmp_path, "tune", str(path), *words)
+        assert all(process.poll() is None for process in dask.processes)  # they are the user's
+    assert done.returncode == 0, done.stderr
+    assert numbers(tmp_path / "out")["all"] == numbers(tuned)["all"]
+    assert 1 <= numbers(tmp_path / "out")["workers"] <= 2
+
+
+def test_options_of_a_cluster_that_do_not_go_together_are_refused(tmp_path: Path) -> None:
+    path = str(written(tmp_path, SPEED))
+    done = fleetloop(tmp_path, "tune", path, "--scheduler", "tcp://127.0.0.1:1", "--jobs", "2")
+    assert done.returncode == 2
+    assert "--scheduler tcp://127.0.0.1:1: has its workers; leave out --jobs" in done.stderr
+    done = fleetloop(tmp_path, "tune", path, "--tls-ca", "ca.pem")
+    assert done.returncode == 2
+    assert "--tls-ca, --tls-cert, --tls-key: of a --scheduler; none is given" in done.stderr
+    assert not (tmp_path / "runs").exists()

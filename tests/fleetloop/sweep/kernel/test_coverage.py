@@ -54,13 +54,11 @@ def test_a_key_that_the_kernel_does_not_know_must_have_its_default(
     known: Mapping[type, Mapping[str, Any]] = coverage._KEYS
     older = {key: reason for key, reason in known[kind].items() if key != "q"}
     monkeypatch.setattr(coverage, "_KEYS", {**known, kind: older})
-    coverage._section_reason.cache_clear()
     coverage._looks_of.cache_clear()
     try:
         assert lacks(load("paper", ["coordination.q=1.0"])) == ""
         assert lacks(load("paper", ["coordination.q=1.5"])) == "the key q of Coordination"
     finally:
-        coverage._section_reason.cache_clear()
         coverage._looks_of.cache_clear()
 
 

@@ -14,12 +14,12 @@ from configs.loading import load
 from configs.resolve import schedule
 from configs.scenario import Scenario
 from configs.signals import PLANT_SIGNALS, age_signals
-from fleetloop.sweep.kernel import KernelOutcome, lacks, layout, loop, run
-from fleetloop.sweep.kernel.compilation import compiled_loop
+from fleetloop.sweep.kernel import KernelOutcome, lacks, loop, run
 from fleetloop.sweep.kernel.layout import CONTROLLER_SIGNALS
 from fleetloop.sweep.kernel.lowering import lowered
 from fleetloop.sweep.kernel.outcome import columns
 from fleetloop.sweep.kernel.reference import referred
+from fleetloop.sweep.kernel.run import Loop
 from fleetloop.sweep.kernel.stops import NOT_FINITE, stop_events
 
 AGES = age_signals(("r1", "r2", "r3", "r4", "r5"))
@@ -222,13 +222,7 @@ def test_a_torque_that_is_no_number_stops_its_robot_alone() -> None:
     robots["k1"][1] = np.inf
     kept = columns(frozenset({"tau_right_wheel_N_m", "x_e_m"}))
     room = [one.rows(4, ticks.ticks, ticks.period_ns) for one in kept]
-    why, *_ = compiled_loop()(
-        *(made.cases, robots, made.states, made.edges, made.changes, made.leader_m_s),
-        *(made.curves, np.zeros(8, layout.MAP)),
-        (layout.one(layout.TRUTH), layout.one(layout.TOLD)),
-        (kept[0].numbers, kept[1].numbers),
-        (room[0][0], room[1][0]),
-    )
+    why, *_ = Loop().run(made._replace(robots=robots), kept, (room[0][0], room[1][0]))
     assert why == loop.NOTHING
     assert made.states["stopped"].tolist() == [loop.GOING, loop.TORQUE, loop.GOING, loop.GOING]
     assert not room[1][1]["tau_right_wheel_N_m"][1].any()
