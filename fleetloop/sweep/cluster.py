@@ -8,25 +8,22 @@ Dask's own messages go to a file in the study's folder, never to the terminal.
 """
 
 import logging
-import os
-import re
 import signal
-import socket
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from configs.errors import InfrastructureError, ScenarioError
 from fleetloop.sweep import worker_start
+from fleetloop.sweep.scheduler import ANSWER_S, Tls, ask, client_of_scheduler, why
 from fleetloop.sweep.versions import mismatch, versions_here
 
 LOG = "dask.log"
-_LOGGERS = ("distributed", "tornado")
-START_S, ANSWER_S, CLOSE_S = 60.0, 10.0, 15.0
-_ADDRESS = re.compile(r"(tcp|tls)://(?P<host>\[[^]]+\]|[^:/]+):(?P<port>\d{1,5})")
+_LOGGERS = ("distributed", "tornado", "asyncio")
+START_S, CLOSE_S = 60.0, 15.0
 _SETTINGS: dict[str, Any] = {
     # What a worker is killed for is said, and its cases are computed again; a worker that only
     # pauses would stand still for ever.
@@ -44,20 +41,6 @@ _SETTINGS: dict[str, Any] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Tls:
-    """Files of a cluster's certificates; without any Dask's own settings hold."""
-
-    ca: Path | None = None
-    certificate: Path | None = None
-    key: Path | None = None
-
-    @property
-    def given(self) -> bool:
-        """Whether any is named."""
-        return any((self.ca, self.certificate, self.key))
-
-
-@dataclass(frozen=True, slots=True)
 class Place:
     """Where a study's cases are computed."""
 
@@ -67,7 +50,7 @@ class Place:
     """Of each of them at most, as Dask takes it."""
     scheduler: str | None = None
     """Address of a scheduler elsewhere."""
-    tls: Tls = Tls()
+    tls: Tls = field(default_factory=Tls)
 
 
 @contextmanager
@@ -89,7 +72,8 @@ def client_of(place: Place, folder: Path) -> Iterator[Any]:
         if place.scheduler is None:
             client = _here(distributed, place, folder, stack)
         else:
-            client = _elsewhere(distributed, place, place.scheduler, stack)
+            client = client_of_scheduler(distributed, place.scheduler, place.tls)
+            stack.callback(_close, client)
         _check_versions(client)
         yield client
 
@@ -136,65 +120,26 @@ def _without_ctrl_c() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _elsewhere(distributed: Any, place: Place, address: str, stack: ExitStack) -> Any:
-    _check_address(address)
-    security = None
-    if place.tls.given:
-        for path in (place.tls.ca, place.tls.certificate, place.tls.key):
-            if path is not None and not path.is_file():
-                raise ScenarioError(f"{path}: no such file")
-        security = distributed.Security(
-            tls_ca_file=_text(place.tls.ca),
-            tls_client_cert=_text(place.tls.certificate),
-            tls_client_key=_text(place.tls.key),
-            require_encryption=True,
-        )
-    try:
-        client = distributed.Client(
-            address, timeout=ANSWER_S, security=security, set_as_default=False
-        )
-    except (OSError, TimeoutError) as error:
-        raise InfrastructureError(
-            f"--scheduler {address}: answers, but not as a Dask scheduler: {error}"
-        ) from error
-    except (ValueError, TypeError, RuntimeError) as error:
-        raise ScenarioError(f"--scheduler {address}: {error}") from error
-    stack.callback(_close, client)
-    return client
-
-
-def _check_address(address: str) -> None:
-    """Refuse what is no address, or where nobody listens.
-
-    Raises:
-        ScenarioError: it is none.
-        InfrastructureError: nobody answers.
-    """
-    found = _ADDRESS.fullmatch(address)
-    if found is None:
-        remedy = "must be tcp://HOST:PORT or tls://HOST:PORT, for example tcp://192.168.1.2:8786"
-        raise ScenarioError(f"--scheduler {address}: {remedy}")
-    try:
-        place = (found["host"].strip("[]"), int(found["port"]))
-        socket.create_connection(place, timeout=ANSWER_S).close()
-    except (OSError, OverflowError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise InfrastructureError(f"--scheduler {address}: no scheduler there: {why}") from error
-
-
 def _check_versions(client: Any) -> None:
     """Refuse workers of another program.
 
     Raises:
-        InfrastructureError: it names the first that differs, and how.
+        InfrastructureError: it names the first that differs, and how; or who doesn't answer.
     """
     ours = versions_here()
     try:
-        theirs = client.run(versions_here, on_error="return")
-        scheduler = client.get_versions()["scheduler"]["packages"]
+        scheduler = ask(client, client.scheduler.versions, packages=[])["packages"]
+        workers = ask(client, client.scheduler.ncores)
     except (OSError, TimeoutError) as error:
-        raise InfrastructureError(f"the workers don't answer: {error}") from error
-    for worker, found in theirs.items():
+        raise InfrastructureError(f"the scheduler doesn't answer: {why(error)}") from error
+    for worker in workers:
+        try:
+            answers = client.run(
+                versions_here, workers=[worker], on_error="return", callback_timeout=ANSWER_S
+            )
+        except (OSError, TimeoutError) as error:
+            raise InfrastructureError(f"worker {worker} doesn't answer: {why(error)}") from error
+        found = answers.get(worker)
         if isinstance(found, BaseException):
             raise InfrastructureError(
                 f"worker {worker} can't run this program: {type(found).__name__}: {found};"
@@ -243,7 +188,3 @@ def _remove(folder: Path) -> None:
     import shutil
 
     shutil.rmtree(folder, ignore_errors=True)
-
-
-def _text(path: Path | None) -> str | None:
-    return None if path is None else os.fspath(path)

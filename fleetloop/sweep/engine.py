@@ -23,6 +23,7 @@ from configs.errors import InfrastructureError
 from fleetloop.sweep.batch import row_without_result
 from fleetloop.sweep.cases import Cases
 from fleetloop.sweep.dataset import Columns
+from fleetloop.sweep.scheduler import ask, why
 from fleetloop.sweep.versions import versions_here
 from fleetloop.sweep.work import Done, VersionMismatchError, work
 
@@ -31,7 +32,7 @@ FEW_CASES, MOST_CASES, FASTEST_GROWTH = 16, 2000, 4
 MOST_DEATHS = 2
 LOOK_EVERY_S, COUNT_EVERY_S = 0.2, 2.0
 NO_WORKER_S = 60.0
-ANSWER_S = 30.0
+FETCH_S = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +195,7 @@ class Engine:
             return False
         if future.status == "finished":
             try:
-                done: Done = future.result(timeout=ANSWER_S)
+                done: Done = future.result(timeout=FETCH_S)
             except (OSError, TimeoutError):  # its worker ended meanwhile
                 self._again.append(chunk)
                 return False
@@ -203,7 +204,7 @@ class Engine:
         if future.status != "error":  # done, and lost with its worker before it was fetched
             self._again.append(chunk)
             return False
-        error = future.exception(timeout=ANSWER_S)
+        error = future.exception(timeout=FETCH_S)
         if isinstance(error, VersionMismatchError):
             raise InfrastructureError(f"a worker has other versions: {error}")
         if not isinstance(error, KilledWorker) and len(chunk.numbers) == 1:
@@ -244,9 +245,9 @@ class Engine:
         if self.client.status not in ("running", "newly-created"):
             raise InfrastructureError(f"the scheduler has gone (client {self.client.status})")
         try:
-            threads = sum(self.client.nthreads().values())
+            threads = sum(ask(self.client, self.client.scheduler.ncores).values())
         except (OSError, TimeoutError) as error:
-            raise InfrastructureError(f"the scheduler has gone: {error}") from error
+            raise InfrastructureError(f"the scheduler has gone: {why(error)}") from error
         if threads:
             self.threads, self._seen_s = threads, now_s
             self.most_threads = max(self.most_threads, threads)

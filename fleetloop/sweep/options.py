@@ -66,11 +66,12 @@ def place_of(
         ScenarioError: options that don't go together.
     """
     from fleetloop.jobs import pool
-    from fleetloop.sweep.cluster import Place, Tls
+    from fleetloop.sweep.cluster import Place
+    from fleetloop.sweep.scheduler import Tls
 
     files = Tls(*tls)
-    if scheduler is None and files.given:
-        raise ScenarioError("--tls-ca, --tls-cert, --tls-key: of a --scheduler; none is given")
+    if scheduler is None and files.files:
+        raise ScenarioError(f"{', '.join(files.files)}: of a --scheduler; none is given")
     if scheduler is not None and (workers is not None or memory != "auto"):
         raise ScenarioError(f"--scheduler {scheduler}: has its workers; leave out {option}")
     return Place(workers or pool.processors(), memory, scheduler, files)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import distributed
 import psutil
 import pyarrow.parquet
 
@@ -99,9 +100,14 @@ def cases_in(out: Path) -> list[int]:
 
 
 @contextmanager
-def cluster(folder: Path, workers: int, **environment: str) -> Iterator["Cluster"]:
-    """A Dask scheduler with workers on loopback, each a process of its own."""
-    made = Cluster(folder)
+def cluster(
+    folder: Path, workers: int, *, tls: tuple[str, ...] = (), **environment: str
+) -> Iterator["Cluster"]:
+    """A Dask scheduler with workers on loopback, each a process of its own.
+
+    `tls`: files of an authority, a certificate and its key, in the folder.
+    """
+    made = Cluster(folder, tls)
     try:
         made.start(workers, environment)
         yield made
@@ -115,7 +121,12 @@ def cluster(folder: Path, workers: int, **environment: str) -> Iterator["Cluster
 class Cluster:
     """A scheduler and its workers."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, tls: tuple[str, ...] = ()) -> None:
+        self._tls = [
+            word
+            for option, file in zip(("--tls-ca-file", "--tls-cert", "--tls-key"), tls, strict=False)
+            for word in (option, file)
+        ]
         self._file = folder / "scheduler.json"
         self._log = folder / "cluster.log"
         self.processes: list[subprocess.Popen[bytes]] = []
@@ -126,10 +137,17 @@ class Cluster:
         address: str = json.loads(self._file.read_text())["address"]
         return address
 
+    def await_workers(self, count: int) -> None:
+        """Return when the scheduler has so many."""
+        with distributed.Client(self.address, set_as_default=False) as client:
+            client.wait_for_workers(count, timeout=WAIT_S)
+
     def start(self, workers: int, environment: dict[str, str]) -> None:
         """Start it; its workers come as soon as they can."""
         file = ("--scheduler-file", str(self._file), "--no-dashboard", "--host", "127.0.0.1")
-        self._begin("scheduler", *file, "--port", "0", "--dashboard-address", "127.0.0.1:0")
+        port = ("--port", "0", "--dashboard-address", "127.0.0.1:0")
+        protocol = ("--protocol", "tls") if self._tls else ()
+        self._begin("scheduler", *file, *port, *protocol)
         for _ in range(int(WAIT_S / _LOOK_S)):
             if self._file.exists() and self._file.read_text().endswith("}"):
                 break
@@ -142,7 +160,7 @@ class Cluster:
         with self._log.open("ab") as log:
             self.processes.append(
                 subprocess.Popen(
-                    [sys.executable, "-m", "dask", what, *words],
+                    [sys.executable, "-m", "dask", what, *words, *self._tls],
                     cwd=self._file.parent,
                     stdout=log,
                     stderr=log,

@@ -4,12 +4,14 @@ import json
 import os
 import re
 import shutil
+import signal
 from collections.abc import Sequence
 from pathlib import Path
 
 import psutil
 import pyarrow.parquet
 import pytest
+from support.certificates import certificates
 from support.sweeping import cases_in, cluster, sweeping
 
 from fleetloop.packages import HOME, NAMES
@@ -119,6 +121,61 @@ def test_a_worker_of_a_cluster_that_is_killed_loses_no_case(folder: Path) -> Non
         assert dask.processes[0].poll() is None  # what the user has goes on
     assert status == 0
     assert_every_case_once(sweep.out)
+
+
+def test_a_cluster_with_certificates_serves_who_has_one_of_its_authority(folder: Path) -> None:
+    certificates(folder, ("head", "me"))
+    (folder / "other").mkdir()
+    certificates(folder / "other", ("me",), authority="other")
+    ours = ("--tls-ca", "ca.pem", "--tls-cert", "me.pem", "--tls-key", "me.key")
+    foreign = ("--tls-ca", "ca.pem", "--tls-cert", "other/me.pem", "--tls-key", "other/me.key")
+    with cluster(folder, workers=1, tls=("ca.pem", "head.pem", "head.key")) as dask:
+        assert dask.address.startswith("tls://127.0.0.1:")
+        where = ("study.toml", "--scheduler", dask.address)
+        with sweeping(folder, *where, *foreign, out="refused") as sweep:
+            assert sweep.end()[0] == 3
+        assert not sweep.out.exists()
+        refusal = f"{dask.address}: answers, but not as a Dask scheduler with TLS"
+        assert refusal in sweep.errors.read_text().splitlines()[-1]
+        with sweeping(folder, *where, *ours) as sweep:
+            status, out = sweep.end()
+    assert (status, out.splitlines()[0]) == (0, f"short: {CASES} of {CASES} cases: {CASES} held")
+    assert_every_case_once(sweep.out)
+
+
+def test_a_worker_that_says_nothing_is_named_within_a_bound(folder: Path) -> None:
+    with cluster(folder, workers=1) as dask:
+        dask.await_workers(1)
+        dask.processes[1].send_signal(signal.SIGSTOP)
+        with sweeping(folder, "study.toml", "--scheduler", dask.address) as sweep:
+            status, _ = sweep.end()
+    said = sweep.errors.read_text().splitlines()[-1]
+    assert status == 3
+    assert re.fullmatch(r"fleetloop: worker tcp://\S+ doesn't answer: no answer in 20 s", said)
+    assert not sweep.out.exists()
+
+
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
+def test_a_scheduler_that_goes_leaves_a_study_that_goes_on_here(
+    folder: Path, end: signal.Signals
+) -> None:
+    many = STUDY.replace(f"cases = {CASES}", "cases = 2000")
+    (folder / "many.toml").write_text(many, "utf-8")
+    with (
+        cluster(folder, workers=1) as dask,
+        sweeping(folder, "many.toml", "--scheduler", dask.address) as sweep,
+    ):
+        sweep.await_rows(3)
+        dask.processes[0].send_signal(end)
+        status, _ = sweep.end()
+    assert status == 3
+    assert "the scheduler has gone" in sweep.errors.read_text().splitlines()[-1]
+    some = cases_in(sweep.out)
+    assert sorted(set(some)) == sorted(some)
+    with sweeping(folder, "--resume", "out", "--workers", "1", "--cases", "2000") as again:
+        again.await_rows(len(some) + 1)
+        again.interrupt()
+        assert again.end()[0] == 130
 
 
 def test_a_command_that_is_killed_leaves_no_process_and_its_study_goes_on(folder: Path) -> None:
