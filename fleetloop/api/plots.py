@@ -13,7 +13,7 @@ from configs.scenario import Scenario
 from fleetloop.record.reader import Record
 from fleetloop.results import figures
 from fleetloop.results.drawing import STYLE
-from fleetloop.results.publication import png
+from fleetloop.results.pictures import png
 from fleetloop.results.summary import Summary
 
 _FIGURES: Mapping[str, figures.Draw] = {

@@ -3,27 +3,21 @@
 Text in SVG and PDF is text, its font embedded in PDF.
 """
 
-from collections.abc import Iterable
-from io import BytesIO
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
 from configs.errors import InfrastructureError
 from fleetloop.results import run_folder
 from fleetloop.results.drawing import STYLE
 from fleetloop.results.figures import Captioned
+from fleetloop.results.pictures import lay_out, png
+from fleetloop.results.printer import Printer
 
 FIGURES, CAPTIONS = "figures", "captions.md"
-FORMATS = ("png", "svg", "pdf")
-_NAMELESS: dict[str, dict[str, None]] = {
-    "png": {"Software": None},
-    "svg": {"Date": None, "Creator": None},
-    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-}
-"""No software name or date in a file."""
 Drawn = tuple[Captioned, bytes]
 """A figure and its PNG file."""
 
@@ -34,39 +28,31 @@ def write_figures(run: Path, figures: Iterable[Captioned]) -> list[Drawn]:
     Raises:
         InfrastructureError: one can't be written.
     """
+    with figures_written(run, figures) as drawn:
+        return drawn
+
+
+@contextmanager
+def figures_written(run: Path, figures: Iterable[Captioned]) -> Iterator[list[Drawn]]:
+    """The same, the PNG files at once: the others are there when this context ends.
+
+    Raises:
+        InfrastructureError: one can't be written.
+    """
     folder = run / FIGURES
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise InfrastructureError(f"can't make {folder}: {error.strerror or error}") from error
     drawn = []
-    with mpl.rc_context(STYLE), np.errstate(all="ignore"):
-        for item in figures:
-            lay_out(item.figure)
-            for form in FORMATS:
-                data = picture(item.figure, form)
-                run_folder.write(folder / f"{item.name}.{form}", data)
-                if form == "png":
-                    drawn.append((item, data))
-    captions = [f"* `{item.name}`: {item.caption}" for item, _ in drawn]
-    run_folder.write(folder / CAPTIONS, "\n".join(["# Figures", "", *captions, ""]))
-    return drawn
-
-
-def lay_out(figure: Figure) -> None:
-    """Compute the layout, once for all formats."""
-    if figure.get_layout_engine() is not None:
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")
-
-
-def picture(figure: Figure, form: str) -> bytes:
-    """A figure as a file of one of `FORMATS`; equal figures make equal files."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format=form, metadata=_NAMELESS[form])
-    return buffer.getvalue()
-
-
-def png(figure: Figure) -> bytes:
-    """A figure as a PNG file."""
-    return picture(figure, "png")
+    with Printer(folder) as printer:
+        with mpl.rc_context(STYLE), np.errstate(all="ignore"):
+            for item in figures:
+                lay_out(item.figure)
+                printer.print(item.name, item.figure)
+                data = png(item.figure)
+                run_folder.write(folder / f"{item.name}.png", data)
+                drawn.append((item, data))
+        captions = [f"* `{item.name}`: {item.caption}" for item, _ in drawn]
+        run_folder.write(folder / CAPTIONS, "\n".join(["# Figures", "", *captions, ""]))
+        yield drawn

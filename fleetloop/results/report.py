@@ -16,7 +16,7 @@ from fleetloop.results.known import Known, known_of
 from fleetloop.results.marks import state_of
 from fleetloop.results.pages import figure_tag, list_tag, page, resource, table_tag
 from fleetloop.results.palette import MARKS
-from fleetloop.results.publication import Drawn, write_figures
+from fleetloop.results.publication import Drawn, figures_written
 from fleetloop.results.summary import Summary
 from fleetloop.results.tables import (
     final_line,
@@ -57,9 +57,9 @@ def write_report(run: Path, record: Record | None = None) -> Path:
         record = Record.open(run_folder.record_of(run))
     known = known_of(record)
     folder = record.path.parent
-    figures = write_figures(folder, all_figures(*known))
     target = folder / PAGE
-    run_folder.write(target, page_of(known, figures))
+    with figures_written(folder, all_figures(*known)) as figures:
+        run_folder.write(target, page_of(known, figures))
     return target
 
 

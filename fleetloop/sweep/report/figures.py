@@ -16,7 +16,6 @@ from matplotlib.colors import AsinhNorm, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import (
     FixedLocator,
-    FuncFormatter,
     NullFormatter,
     NullLocator,
     PercentFormatter,
@@ -168,7 +167,7 @@ def _scale(axes: Axes, side: Literal["x", "y"], axis: Axis) -> None:
             if one - marks[-1] >= least:
                 marks.append(one)
         ticks.set_major_locator(FixedLocator(marks))
-        ticks.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
+        ticks.set_major_formatter("{x:.4g}")
 
 
 def _norm(values: Series, result: Column) -> Normalize:
@@ -248,7 +247,7 @@ def _decades(ticks: Ticks, values: Series) -> None:
     """Plain numbers on a logarithmic axis, some of them if it has less than two decades."""
     inside = nice_marks(float(values.min()), float(values.max()), log=True)
     ticks.set_major_locator(FixedLocator(inside))
-    ticks.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
+    ticks.set_major_formatter("{x:.3g}")
     ticks.set_minor_formatter(NullFormatter())
 
 
@@ -320,7 +319,7 @@ def growth(results: Results) -> Captioned | None:
         for ticks in (axes.xaxis, axes.yaxis):
             ticks.set_major_locator(FixedLocator([-1.0, -0.01, -0.0001, 0.0, 0.0001, 0.01, 1.0]))
             ticks.set_minor_locator(NullLocator())
-            ticks.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            ticks.set_major_formatter("{x:g}")
         axes.set_xlabel("growth by theory [1/s]")
         axes.set_ylabel("growth as simulated [1/s]")
         legend_above(figure, axes, 2)

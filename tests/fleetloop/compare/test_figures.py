@@ -10,7 +10,7 @@ from fleetloop.compare.figures import all_figures
 from fleetloop.compare.jobs import Outcome
 from fleetloop.compare.measures import Course
 from fleetloop.compare.results import Row
-from fleetloop.results.publication import png
+from fleetloop.results.pictures import png
 
 SOUND = {"stopped_robots": {}, "verdict": "held", "expectations": []}
 STOPPED = SOUND | {"stopped_robots": {"r1": "diverged"}}

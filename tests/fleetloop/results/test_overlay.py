@@ -15,7 +15,7 @@ from fleetloop.results.drawing import COLOURS
 from fleetloop.results.known import known_of
 from fleetloop.results.overlay import labels, write_overlay
 from fleetloop.results.overlay_figures import SIGNALS, _signal, overlay_figures
-from fleetloop.results.publication import png
+from fleetloop.results.pictures import png
 from fleetloop.results.run_folder import read_record
 
 

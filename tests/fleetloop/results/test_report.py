@@ -16,7 +16,7 @@ from configs.signals import law_table
 from fleetloop.record.reader import Record
 from fleetloop.results.figures import law_signals
 from fleetloop.results.known import Known
-from fleetloop.results.publication import png
+from fleetloop.results.pictures import png
 from fleetloop.results.report import page_of
 from fleetloop.results.sections import sections
 from fleetloop.results.summary import RunStats, summarise

@@ -14,7 +14,7 @@ from support.studies import FEW, MASS, SHORT, P
 from support.study_results import Came, Outcome, made_results
 
 from fleetloop.results.palette import STATE_LINES
-from fleetloop.results.publication import png
+from fleetloop.results.pictures import png
 from fleetloop.sweep.report.command import figures_of
 from fleetloop.sweep.report.figures import agreement
 from fleetloop.sweep.report.view import Choice, View, view_of

@@ -1,0 +1,129 @@
+"""SVG and PDF files of figures, made by a process beside the one that makes all else of a report.
+
+They take almost half of a report's processor time. The process gets figures on its standard input
+and ends with it, also when whoever feeds it is killed.
+
+    python -m fleetloop.results.printer FOLDER      that process: pickled pairs (name, figure)
+"""
+
+import contextlib
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from configs.errors import FleetloopError, InfrastructureError
+from fleetloop import packages
+from fleetloop.results import run_folder
+from fleetloop.results.drawing import STYLE
+from fleetloop.results.pictures import picture
+
+FORMATS = ("svg", "pdf")
+LONGEST_S = 600.0
+"""From the last figure to the end."""
+_BUFFER_BYTES = 1 << 20
+_FAILED = 3
+
+
+class Printer:
+    """Writes figures into a folder as `FORMATS`; a context manager: at its end all are there.
+
+    Args:
+        folder: it is there.
+
+    Raises:
+        InfrastructureError: the process can't be started, ended early, or a file can't be written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        # -P: a folder here that is named like one of our packages must not shadow it. Its own
+        # session: Ctrl-C reaches the caller, whose end is this one's.
+        command = [sys.executable, "-P", "-m", __name__, str(folder)]
+        try:
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                pipesize=_BUFFER_BYTES,
+                start_new_session=True,
+                env=packages.environment(),
+            )
+        except OSError as error:
+            raise InfrastructureError(f"can't start a process for figures: {error}") from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if kind is not None:
+            self._process.kill()
+        said = self._end()
+        if kind is None and self._process.returncode != 0:
+            raise InfrastructureError(said)
+
+    def print(self, name: str, figure: Figure) -> None:
+        """Write a figure that is laid out, some time before the end; it may be changed then."""
+        if self._process.stdin is not None:
+            with contextlib.suppress(BrokenPipeError):  # it has ended: told at the end
+                pickle.dump((name, figure), self._process.stdin)
+
+    def _end(self) -> str:
+        """Wait for the end; what it said, or that it took too long."""
+        try:
+            _, errors = self._process.communicate(timeout=LONGEST_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.communicate()
+            return f"SVG and PDF files took longer than {LONGEST_S:g} s"
+        except BaseException:  # Ctrl-C
+            self._process.kill()
+            self._process.communicate()
+            raise
+        lines = errors.decode(errors="replace").splitlines()
+        if self._process.returncode == _FAILED and lines:
+            return lines[-1]
+        last = f": {lines[-1]}" if lines else ""
+        return f"the process for SVG and PDF files ended with {self._process.returncode}{last}"
+
+
+def serve(folder: Path, figures: IO[bytes]) -> None:
+    """Write all figures of a stream, to its end.
+
+    Raises:
+        InfrastructureError: a file can't be written.
+    """
+    with mpl.rc_context(STYLE), np.errstate(all="ignore"):
+        while True:
+            try:
+                name, figure = pickle.load(figures)
+            except EOFError:
+                return
+            for form in FORMATS:
+                run_folder.write(folder / f"{name}.{form}", picture(figure, form))
+
+
+def main() -> int:
+    """The process; its exit status."""
+    try:
+        serve(Path(sys.argv[1]), sys.stdin.buffer)
+    except FleetloopError as error:
+        sys.stderr.write(f"{error}\n")
+        return _FAILED
+    except pickle.UnpicklingError:  # the caller was killed in the middle of a figure
+        return _FAILED
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
