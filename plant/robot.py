@@ -90,10 +90,10 @@ class EmulatedRobot:
 
     def update_encoders(self) -> None:
         """Hand both drives the position and speed of their encoders."""
-        state = self.state
-        right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
-        of_right = shaft_motion(state.right_wheel_rad, right_speed, self._gear_right)
-        of_left = shaft_motion(state.left_wheel_rad, left_speed, self._gear_left)
+        _, _, _, v, omega, right_rad, left_rad = self.state
+        right_speed, left_speed = self._body.wheel_speeds(v, omega)
+        of_right = shaft_motion(right_rad, right_speed, self._gear_right)
+        of_left = shaft_motion(left_rad, left_speed, self._gear_left)
         if self._faulty is not None:
             right_encoder, left_encoder = self._faulty.encoders
             of_right, of_left = right_encoder.read(*of_right), left_encoder.read(*of_left)

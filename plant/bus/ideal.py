@@ -176,8 +176,7 @@ class IdealBus:
             return self._interference.from_drives(heard, bus_ns)
         replies: list[Frame] = []
         for robot in self.robots:
-            on_frame = robot.on_frame
             for frame in frames:
-                if replied := on_frame(frame, bus_ns):
+                if replied := robot.on_frame(frame, bus_ns):
                     replies += replied
         return replies

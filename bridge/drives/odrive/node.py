@@ -40,8 +40,6 @@ from bridge.frame import EFF, ERR, RTR, Frame
 ANSWER_WITHIN_NS: Final = 20_000_000
 """Longest delay of an unaddressed drive's answer to Address."""
 _NONE: Final[Sequence[Frame]] = ()
-_UNPACK_FLOAT: Final = f.ONE_FLOAT.unpack
-_PACK_TWO: Final = f.TWO_FLOATS.pack
 _new: Final = tuple.__new__  # of a frame, past its constructor: this is the hot path
 
 
@@ -91,7 +89,7 @@ class OdriveNode(LocalAxis):
         if can_id == self.setpoint_id and len(data) == 4:
             if now_ns - self.fed_ns > self._silence_ns:
                 self.supervise(now_ns)
-            (torque,) = _UNPACK_FLOAT(data)
+            torque = f.float_at(data, 0)
             if -FLOAT32_MAX <= torque <= FLOAT32_MAX:
                 self.fed_ns = now_ns
                 self.input_torque_shaft = torque
@@ -138,7 +136,7 @@ class OdriveNode(LocalAxis):
 
     def _encoder_estimates(self) -> Frame:
         try:
-            data = _PACK_TWO(self.position, self.velocity)
+            data = f.floats_data(self.position, self.velocity)
         except OverflowError:  # a robot that diverges
             data = floats(self.position, self.velocity)
         return _new(Frame, (self._encoder_id, data))
