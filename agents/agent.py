@@ -55,6 +55,7 @@ from bridge.network.run_orders import LeaderOrder, order_tick
 from bridge.network.telemetry import RowBuffer
 from configs.brief import AgentBrief
 from configs.netem import LOCALISATION, MOST_DELAY_NS
+from configs.reach import beyond
 from configs.signals import AGE_PREFIX
 
 _new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
@@ -316,7 +317,8 @@ class Agent:
         sums = self._neighbours.sums(t_ns, s)
         v_r = self._reception.leader_speed(tick, v_hat)
         after = self._coordinator.advance(coordination, sums, self._edges.h, v_r)
-        along = _new(PathVariable, (s, s_dot, (after[0] + after[1] - s_dot) / self._h))
+        v_hat_after, mu_after, _ = after
+        along = _new(PathVariable, (s, s_dot, (v_hat_after + mu_after - s_dot) / self._h))
         guard = self._guard
         signals: Sequence[float]
         try:
@@ -345,10 +347,11 @@ class Agent:
         rows.put(s_dot)
         rows.put(mu)
         rows.put(v_hat)
-        rows.put(sums.neighbours)
-        rows.put(reference[0])
-        rows.put(reference[1])
-        rows.put(reference[2])
+        rows.put(sums[0])
+        x_d, y_d, theta_d, _, _ = reference
+        rows.put(x_d)
+        rows.put(y_d)
+        rows.put(theta_d)
         self._end_row(t_ns, signals)
         return frames
 
@@ -407,7 +410,7 @@ class Agent:
     def _accept_path_variable(self, t_s: float, after: CoordinationState) -> None:
         """Accept the next path variable; one beyond reach is rejected, and the robot stops."""
         v_hat, mu, s = after
-        far = self.admission.reach.beyond(t_s, s, v_hat if isfinite(mu) else mu)
+        far = beyond(self.admission.reach, t_s, s, v_hat if isfinite(mu) else mu)
         if far is None:
             self._coordination = after
         if (far is None) is self._diverged:

@@ -20,7 +20,6 @@ don't depend on the order of arrival.
 
 from collections import deque
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
 from math import nan
 from typing import Final, NamedTuple
 
@@ -44,14 +43,15 @@ class Sums(NamedTuple):
     v: float
 
 
-@dataclass(slots=True)
 class _Neighbour:
-    weight: float
-    exists: bool = True  # the edge
-    t_ns: int = 0
-    s: float = 0.0
-    v_hat: float = 0.0
-    heard: bool = False
+    __slots__ = ("exists", "heard", "s", "t_ns", "v_hat", "weight")
+
+    def __init__(self, weight: float) -> None:
+        self.weight = weight
+        self.exists = True  # the edge
+        self.t_ns = 0
+        self.s = self.v_hat = 0.0
+        self.heard = False
 
 
 class Neighbours:

@@ -222,14 +222,36 @@ class AdaptiveDsc(Law):
         tau_right, tau_left, moved, f_1, f_2, e_1, e_2 = surface(  # (19)-(34)
             constants, v, omega, bar_theta, bar_v, turn, filters, theta_1, theta_2, kappa
         )
+        alpha_theta_after, alpha_v_after, alpha_omega_after = moved
         after = (
-            *moved,
+            alpha_theta_after,
+            alpha_v_after,
+            alpha_omega_after,
             self._learn(theta_1, f_1, e_1, self._rates_1, k4),  # (35)
             self._learn(theta_2, f_2, e_2, self._rates_2, k4),
             bound_estimate(kappa, e_1, e_2, keep, gain),  # (36)
         )
-        signals = (x_e, y_e, theta_e, alpha_theta, alpha_v, alpha_omega, e_1, e_2)
-        said = (*signals, *theta_1, *theta_2, kappa)
+        t1, t2, t3, t4 = theta_1
+        t5, t6, t7, t8 = theta_2
+        said = (
+            x_e,
+            y_e,
+            theta_e,
+            alpha_theta,
+            alpha_v,
+            alpha_omega,
+            e_1,
+            e_2,
+            t1,
+            t2,
+            t3,
+            t4,
+            t5,
+            t6,
+            t7,
+            t8,
+            kappa,
+        )
         return _new(LawOutput, (tau_right, tau_left, _new(DscState, after), said))
 
     def _approach(self, x_e: float, y_e: float, k1: float, k2: float) -> tuple[float, float]:

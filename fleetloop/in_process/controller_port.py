@@ -6,6 +6,7 @@ from agents.agent import Agent
 from agents.bus_clock import BusClock
 from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.frame import Frame
+from plant.bus.port import Port
 
 
 class Controller:
@@ -49,7 +50,7 @@ class Controller:
         return said
 
 
-class ControllerPort:
+class ControllerPort(Port):
     """The port of a bus whose clients are its robots' controllers, called when they are asked."""
 
     __slots__ = ("_asked", "_controllers", "_frames", "_pending", "_stamp_ns")

@@ -21,7 +21,7 @@ from enum import Enum, auto
 from functools import partial
 from typing import Final
 
-from bridge.drives.interface import Motion
+from bridge.drives.interface import DriveClient, Motion
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisState, Command, ControlMode, InputMode
 from bridge.drives.odrive.model import section_of
@@ -52,7 +52,7 @@ class _Step(Enum):
     CLOSE = auto()
 
 
-class OdriveClient:
+class OdriveClient(DriveClient):
     """Drives the right and the left wheel of one robot."""
 
     def __init__(self, link: DriveLink) -> None:
