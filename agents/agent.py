@@ -265,7 +265,8 @@ class Agent:
         wheel_motion = self._drives.motion()
         if wheel_motion is None:
             return self._guard.arm(tick)
-        motion = self._localiser.wheels(*wheel_motion)
+        right_rad, left_rad, right_rad_s, left_rad_s = wheel_motion
+        motion = self._localiser.wheels(right_rad, left_rad, right_rad_s, left_rad_s)
         if self._encoder_check.active:
             self._guard.note_fault("encoders", self._encoder_check(wheel_motion))
         if tick <= 0:
@@ -347,7 +348,7 @@ class Agent:
         rows.put(s_dot)
         rows.put(mu)
         rows.put(v_hat)
-        rows.put(sums[0])
+        rows.put(sums.neighbours)
         x_d, y_d, theta_d, _, _ = reference
         rows.put(x_d)
         rows.put(y_d)

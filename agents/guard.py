@@ -184,10 +184,10 @@ class Guard:
             return self._stop(tick, fault)
         self.outcome = UNCHANGED
         if self._limiter.active:
-            limited = self._limiter(right_wheel_N_m, left_wheel_N_m)
-            if limited != (right_wheel_N_m, left_wheel_N_m):
+            right, left = self._limiter(right_wheel_N_m, left_wheel_N_m)
+            if right != right_wheel_N_m or left != left_wheel_N_m:
                 self.outcome = TorqueOutcome.LIMITED
-            return drives.torque(*limited)
+            return drives.torque(right, left)
         return drives.torque(right_wheel_N_m, left_wheel_N_m)
 
     def leave(self, tick: int) -> Sequence[Frame]:

@@ -21,7 +21,7 @@ don't depend on the order of arrival.
 from collections import deque
 from collections.abc import Collection, Iterable
 from math import nan
-from typing import Final, NamedTuple
+from typing import Final
 
 from configs.edges import InEdge
 from configs.sections import Coordination
@@ -34,13 +34,16 @@ def extrapolated(s: float, v_hat: float, age_s: float, half_s: float) -> float:
     return s + v_hat * (age_s + half_s)
 
 
-class Sums(NamedTuple):
+class Sums:
     """d = Σ a_ij, Σ a_ij s_j, Σ a_ij v̂_j over the neighbours that are not silent."""
 
-    neighbours: int  # these
-    degree: float
-    s: float
-    v: float
+    __slots__ = ("degree", "neighbours", "s", "v")
+
+    def __init__(self, neighbours: int, degree: float, s: float, v: float) -> None:
+        self.neighbours = neighbours  # these
+        self.degree = degree
+        self.s = s
+        self.v = v
 
 
 class _Neighbour:
@@ -129,7 +132,7 @@ class Neighbours:
                 ago = min(round(age / self._period_s), len(past) - 1)
                 sum_s += weight * (neighbour.s + (own_s - past[-1 - ago]))
             sum_v += weight * neighbour.v_hat
-        return _new(Sums, (count, degree, sum_s, sum_v))
+        return Sums(count, degree, sum_s, sum_v)
 
     def carried_on(self, at_ns: int) -> tuple[float, float, float]:
         """Σ a_ij, Σ a_ij s_j, Σ a_ij v̂_j with s_j carried on to an instant, as to extrapolate."""

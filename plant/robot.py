@@ -105,8 +105,10 @@ class EmulatedRobot:
         if self._faulty is not None:
             right_encoder, left_encoder = self._faulty.encoders
             of_right, of_left = right_encoder.read(*of_right), left_encoder.read(*of_left)
-        self._right.update_encoder(*of_right)
-        self._left.update_encoder(*of_left)
+        right_rev, right_rev_s = of_right
+        left_rev, left_rev_s = of_left
+        self._right.update_encoder(right_rev, right_rev_s)
+        self._left.update_encoder(left_rev, left_rev_s)
 
     def feedback(self, now_ns: int) -> Sequence[Frame]:
         """Both encoder frames, once both drives have taken a set-point since the last ones."""
@@ -304,15 +306,20 @@ class RealisticRobot(EmulatedRobot):
             _, _, _, v, omega, _, _ = motion
             right_speed, left_speed = body.wheel_speeds(v, omega)
             shafts = train.step(demands, (right_speed * gear_r, left_speed * gear_l), step)
-            torques = shafts[0] * gear_r, shafts[1] * gear_l
+            right_wheel_N_m, left_wheel_N_m = shafts[0] * gear_r, shafts[1] * gear_l
+            torques = right_wheel_N_m, left_wheel_N_m
             if self.divergence is None:
                 try:
-                    motion = moved(body, motion, *torques, t_s + n * step, step)
+                    motion = moved(
+                        body, motion, right_wheel_N_m, left_wheel_N_m, t_s + n * step, step
+                    )
                 except ValueError:
-                    motion = self._stop(t_s, motion, *torques)
+                    motion = self._stop(t_s, motion, right_wheel_N_m, left_wheel_N_m)
             _, _, _, _, _, right_rad, left_rad = motion
-            right.update_encoder(*train.right_encoder.step(right_rad * gear_r, step))
-            left.update_encoder(*train.left_encoder.step(left_rad * gear_l, step))
+            rev, rev_s = train.right_encoder.step(right_rad * gear_r, step)
+            right.update_encoder(rev, rev_s)
+            rev, rev_s = train.left_encoder.step(left_rad * gear_l, step)
+            left.update_encoder(rev, rev_s)
         self._motion = motion
         self._demand_right_wheel_N_m, self._demand_left_wheel_N_m = (
             demands[0] * gear_r,

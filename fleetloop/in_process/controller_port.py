@@ -53,10 +53,11 @@ class Controller:
 class ControllerPort(Port):
     """The port of a bus whose clients are its robots' controllers, called when they are asked."""
 
-    __slots__ = ("_asked", "_controllers", "_frames", "_pending", "_stamp_ns")
+    __slots__ = ("_asked", "_controllers", "_frames", "_in_order", "_pending", "_stamp_ns")
 
     def __init__(self, controllers: Mapping[str, Controller]) -> None:
-        self._controllers = controllers
+        self._controllers = dict(controllers)
+        self._in_order = list(controllers.values())
         self._stamp_ns = 0
         self._frames: Sequence[Frame] = ()
         self._pending: dict[str, list[tuple[int, Frame]]] = {robot: [] for robot in controllers}
@@ -69,7 +70,7 @@ class ControllerPort(Port):
     def receive(self) -> list[Frame]:
         """The answers of all controllers to the frames that were delivered."""
         answers: list[Frame] = []
-        for controller in self._controllers.values():
+        for controller in self._in_order:
             answers += controller.hear(self._stamp_ns, self._frames)
         return answers
 

@@ -61,7 +61,7 @@ class OdriveClient(DriveClient):
         self._right = RemoteAxis("right", link.right_node, link.mounting.right_sign, link)
         self._left = RemoteAxis("left", link.left_node, link.mounting.left_sign, link)
         self._axes = (self._right, self._left)
-        self._encoders = self._by_id(Command.GET_ENCODER_ESTIMATES)
+        self._right_encoder_id, self._left_encoder_id = self._by_id(Command.GET_ENCODER_ESTIMATES)
         self._others = self._handlers_by_id()
         self._encoder_limit_ns = link.encoder_age_limit_ns
         self._heartbeat_limit_ns = link.heartbeat_age_limit_ns
@@ -80,7 +80,11 @@ class OdriveClient(DriveClient):
 
     def on_frame(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         """Process any frame from the bus."""
-        axis = self._encoders.get(can_id)
+        axis: RemoteAxis | None = None
+        if can_id == self._right_encoder_id:
+            axis = self._right
+        elif can_id == self._left_encoder_id:
+            axis = self._left
         if axis is None:
             handler = self._others.get(can_id)
             if handler is not None:

@@ -51,6 +51,7 @@ class OdriveNode(LocalAxis):
         "_boots_ns",
         "_cyclic_ns",
         "_encoder_id",
+        "_encoder_period_ns",
         "_next_encoder_ns",
         "_next_other_ns",
         "_random",
@@ -110,7 +111,7 @@ class OdriveNode(LocalAxis):
         if now_ns < self._next_other_ns:
             if not encoder:
                 return _NONE
-            period_ns = self.parameters.period_ns[Command.GET_ENCODER_ESTIMATES]
+            period_ns = self._encoder_period_ns
             self._next_encoder_ns = (now_ns // period_ns + 1) * period_ns
             return (self._encoder_estimates(),)
         return self._due(now_ns)
@@ -177,6 +178,7 @@ class OdriveNode(LocalAxis):
                 else:
                     next_ns = min(next_ns, self._cyclic_ns[command])
         self._encoder_id = f.identifier(node, Command.GET_ENCODER_ESTIMATES)
+        self._encoder_period_ns = self.parameters.period_ns[Command.GET_ENCODER_ESTIMATES]
         self.setpoint_id = f.identifier(node, Command.SET_INPUT_TORQUE) if self._speaks else -1
         self._next_encoder_ns = encoder_ns
         self._next_other_ns = min(
