@@ -84,7 +84,7 @@ class Agent:
         self.rows = rows
         """Of the record."""
         self._schedule = brief.schedule
-        self._h = brief.schedule.period_s
+        self._h, self._period_ns = brief.schedule.period_s, brief.schedule.period_ns
         self.guard = self._guard = Guard(brief)
         """Phases, faults and limits between the law and the drives."""
         self._drives = self._guard.drives
@@ -311,7 +311,7 @@ class Agent:
 
     def _control(self, tick: int, motion: RobotMotion) -> Sequence[Frame]:
         """The coordination and the law at one tick; where either diverges the robot stops."""
-        t_ns = tick * self._schedule.period_ns
+        t_ns = tick * self._period_ns
         self._tick = tick
         v_hat, mu, s = coordination = self._coordination
         s_dot = mu + v_hat
@@ -321,6 +321,7 @@ class Agent:
         v_hat_after, mu_after, _ = after
         along = _new(PathVariable, (s, s_dot, (v_hat_after + mu_after - s_dot) / self._h))
         guard = self._guard
+        law_state: Any = None
         signals: Sequence[float]
         try:
             reference = self._path(s)
@@ -330,13 +331,13 @@ class Agent:
             how, why = failure(error, self._law_name)
             frames = guard.command(tick, nan, nan, f"{how} at s = {s:.4g} m: {why}")
         else:
-            signals = out[3]
-            frames = guard.command(tick, out[0], out[1])
+            right_wheel_N_m, left_wheel_N_m, law_state, signals = out
+            frames = guard.command(tick, right_wheel_N_m, left_wheel_N_m)
         outcome = guard.outcome
         if outcome is UNCHANGED:
-            self._law_state = out.state
+            self._law_state = law_state
         elif outcome is TorqueOutcome.LIMITED:
-            self._law_state = self._law_hold(self._law_state, out.state)
+            self._law_state = self._law_hold(self._law_state, law_state)
         elif outcome is TorqueOutcome.RESTARTED:
             self._law_state = None
         self._accept_path_variable(t_ns * 1e-9 + self._h, after)

@@ -23,6 +23,7 @@ from bridge.drives.interface import DriveMeasurements, DriveNode
 from bridge.drives.wrapped import as_node
 from bridge.frame import Frame
 from bridge.network.messages import PoseFix
+from bridge.network.telemetry import PLANT_ROW, RowBuffer
 from configs.brief import RobotBrief
 from plant.body import RigidBody, State
 from plant.divergence import Divergence
@@ -121,7 +122,8 @@ class EmulatedRobot:
     def frames_due(self, now_ns: int) -> list[Frame]:
         """The frames that both drives send at this instant, in order of arbitration."""
         self.update_encoders()
-        frames = [*self._right.due(now_ns), *self._left.due(now_ns)]
+        frames = list(self._right.due(now_ns))
+        frames += self._left.due(now_ns)
         if len(frames) > 1:
             frames.sort()
         return frames
@@ -242,23 +244,29 @@ class EmulatedRobot:
         self._left.lose_estimate()
         return x, y, theta, 0.0, 0.0, right_rad, left_rad
 
-    def row(self, t_s: float) -> tuple[float, ...]:
-        """The signals of `configs.signals.PLANT_SIGNALS` at this instant."""
+    def record(self, rows: RowBuffer, tick: int, t_s: float) -> None:
+        """Add the signals of `configs.signals.PLANT_SIGNALS` at this instant to the record."""
         x, y, theta, v, omega, _, _ = self._motion
-        return (
-            t_s,
-            x,
-            y,
-            theta,
-            v,
-            omega,
-            self._right.input_torque_shaft * self._gear_right,
-            self._left.input_torque_shaft * self._gear_left,
-            self._demand_right_wheel_N_m,
-            self._demand_left_wheel_N_m,
-            self._torque_right_wheel_N_m,
-            self._torque_left_wheel_N_m,
-        )
+        rows.begin(tick)
+        rows.put(t_s)
+        rows.put(x)
+        rows.put(y)
+        rows.put(theta)
+        rows.put(v)
+        rows.put(omega)
+        rows.put(self._right.input_torque_shaft * self._gear_right)
+        rows.put(self._left.input_torque_shaft * self._gear_left)
+        rows.put(self._demand_right_wheel_N_m)
+        rows.put(self._demand_left_wheel_N_m)
+        rows.put(self._torque_right_wheel_N_m)
+        rows.put(self._torque_left_wheel_N_m)
+        rows.end()
+
+    def row(self, t_s: float) -> tuple[float, ...]:
+        """The same signals, for who wants to see them."""
+        rows = RowBuffer(PLANT_ROW, _nobody)
+        self.record(rows, 0, t_s)
+        return rows.newest
 
 
 class RealisticRobot(EmulatedRobot):
@@ -343,6 +351,10 @@ class RealisticRobot(EmulatedRobot):
             drive.update_measurements(
                 DriveMeasurements(torque, current, motor.fet_C, motor.motor_C, supply.bus_V, amps)
             )
+
+
+def _nobody(_first: int, _count: int, _rows: bytes, _final: bool) -> None:
+    """Takes no blocks."""
 
 
 def emulated_robot(brief: RobotBrief) -> EmulatedRobot:

@@ -32,8 +32,9 @@ class WrappedClient(DriveClient):
         self._copy()
 
     def _copy(self) -> None:
-        client = self._client
-        self.armed, self.sent_wheel_N_m = client.armed, client.sent_wheel_N_m
+        self.armed = bool(self._client.armed)
+        right, left = self._client.sent_wheel_N_m
+        self.sent_wheel_N_m = (float(right), float(left))
 
     @property
     def notices(self) -> tuple[str, ...]:
@@ -51,8 +52,11 @@ class WrappedClient(DriveClient):
 
     def motion(self) -> Motion | None:
         """As `DriveClient.motion`."""
-        motion: Motion | None = self._client.motion()
-        return motion
+        motion = self._client.motion()
+        if motion is None:
+            return None
+        right_rad, left_rad, right_rad_s, left_rad_s = motion
+        return float(right_rad), float(left_rad), float(right_rad_s), float(left_rad_s)
 
     def arm(self, now_ns: int) -> Sequence[Frame]:
         """As `DriveClient.arm`."""
