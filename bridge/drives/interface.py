@@ -264,8 +264,10 @@ class EndpointFile(Protocol):
 class DriveProtocol(NamedTuple):
     """A row of `configs.drives.DRIVES`: everything that belongs to one protocol."""
 
-    client: Callable[[DriveLink], DriveClient]
-    node: Callable[[DriveModel, int, int], DriveNode]  # model, node id, serial number
+    client: Callable[[DriveLink], object]
+    """Makes a `DriveClient`, or what has its methods: `bridge.drives.wrapped` calls either."""
+    node: Callable[[DriveModel, int, int], object]
+    """Makes a `DriveNode`, or what has its methods; of model, node id, serial number."""
     cyclic_messages: Callable[[DriveModel, int, int, float], Sequence[CyclicMessage]]
     """Of one drive and its set-points: model, node id, control period [ns], and gear: signed shaft
     revolutions per wheel revolution."""

@@ -13,12 +13,12 @@ from bridge.drives.interface import DriveClient, DriveMeasurements, DriveNode, M
 from bridge.frame import Frame
 
 
-def as_client(made: Any) -> DriveClient:
+def as_client(made: object) -> DriveClient:
     """A client as the class that is called."""
     return made if isinstance(made, DriveClient) else WrappedClient(made)
 
 
-def as_node(made: Any) -> DriveNode:
+def as_node(made: object) -> DriveNode:
     """A node as the class that is called."""
     return made if isinstance(made, DriveNode) else WrappedNode(made)
 
