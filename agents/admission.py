@@ -22,7 +22,7 @@ from typing import Final
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.network.refused_messages import Refusals
 from configs.brief import LEAD_TICKS, AgentBrief
-from configs.reach import within_world
+from configs.reach import beyond, within_world
 from configs.ticks import Ticks
 
 LOCALISATION: Final = "the localisation system"
@@ -63,7 +63,7 @@ class Admission:
         if state.tick < 0 <= self.tick:
             return self._late(robot)
         wrong = self._path_date(robot, state)
-        if wrong is None and (far := self.reach.beyond(state.t_ns * 1e-9, state.s, state.v_hat)):
+        if wrong is None and (far := beyond(self.reach, state.t_ns * 1e-9, state.s, state.v_hat)):
             wrong = "reach", far
         if wrong is not None:
             self.refusals.note("path state", robot, *wrong)

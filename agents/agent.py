@@ -50,11 +50,12 @@ from agents.reception import Reception
 from bridge.frame import Frame
 from bridge.netem.channel import Channel
 from bridge.network.fault_orders import FaultOrder
-from bridge.network.messages import PathState, PoseFix
+from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.network.run_orders import LeaderOrder, order_tick
 from bridge.network.telemetry import RowBuffer
 from configs.brief import AgentBrief
 from configs.netem import LOCALISATION, MOST_DELAY_NS
+from configs.reach import beyond
 from configs.signals import AGE_PREFIX
 
 _new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
@@ -82,10 +83,8 @@ class Agent:
         self.brief = brief
         self.rows = rows
         """Of the record."""
-        self.row: Sequence[float] = ()
-        """The values of `brief.signals` at the last tick; empty before there is one."""
         self._schedule = brief.schedule
-        self._h = brief.schedule.period_s
+        self._h, self._period_ns = brief.schedule.period_s, brief.schedule.period_ns
         self.guard = self._guard = Guard(brief)
         """Phases, faults and limits between the law and the drives."""
         self._drives = self._guard.drives
@@ -97,19 +96,8 @@ class Agent:
         self._no_signals = (nan,) * law.signals
         self._law_state: Any = None  # the law's own
         self._reception = reception = Reception(brief)
-        self._advance = reception.advance
         self.admission = reception.admission
         """Plausibility of received messages, and the count of refused ones."""
-        self.receive_pose = reception.receive_pose
-        """Store a pose from the localisation system."""
-        self.receive_place = reception.receive_place
-        """Store the pose of an in-neighbour, for the emulated network."""
-        self.receive_path_state = reception.receive_path_state
-        """Store the path state of an in-neighbour."""
-        self.receive_silence = reception.receive_silence
-        """Note that an in-neighbour has no path state at a tick."""
-        self.receive_leader_speed = reception.receive_leader_speed
-        """Store the virtual leader's speed profile."""
         self.missing_to_start = reception.missing_to_start
         """Senders whose first message is required for the start and has not arrived."""
         self.missing = reception.missing
@@ -129,8 +117,6 @@ class Agent:
         )
         self._leaves = brief.membership.leaves_tick
         self._located = self._diverged = False  # by a fix; the next path variable is beyond reach
-        self.feedback_since = self._drives.feedback_since
-        """Whether both encoder frames were received after a bus time [ns]."""
         self._records_ages = any(signal.name.startswith(AGE_PREFIX) for signal in brief.signals)
         self._encoder_check = EncoderCheck(brief.host.encoder_mismatch_limit_wheel_rad, self._h)
         fused = brief.localisation == "fused"
@@ -141,8 +127,6 @@ class Agent:
         """Whether the closing tick has come."""
         self.late_s = self.round_trip_s = 0.0
         """Lateness and feedback round trip at this tick [s], for the record."""
-        self.on_frame = self._drives.on_frame
-        """Process a frame from the bus: identifier, data, bus time of reception [ns]."""
 
     def _pose_history(self, brief: AgentBrief) -> int:
         """Longest age of a fix [ticks]: the odometry since then is kept for that long."""
@@ -165,6 +149,11 @@ class Agent:
         return self._reception.network
 
     @property
+    def row(self) -> Sequence[float]:
+        """The values of `brief.signals` at the last tick; empty before there is one."""
+        return self.rows.newest
+
+    @property
     def phase(self) -> Phase:
         """The phase of the controller."""
         return self._guard.phase
@@ -176,6 +165,36 @@ class Agent:
     def remarks(self) -> list[str]:
         """Remarks on the whole run for the report, in words."""
         return [*self._guard.remarks(), *self.refusals()]
+
+    # --- what is received --------------------------------------------------------------------
+
+    def on_frame(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
+        """Process a frame from the bus, received at a bus time [ns]."""
+        self._drives.on_frame(can_id, data, now_ns)
+
+    def feedback_since(self, bus_ns: int) -> bool:
+        """Whether both encoder frames were received after a bus time [ns]."""
+        return self._drives.feedback_since(bus_ns)
+
+    def receive_pose(self, fix: PoseFix) -> None:
+        """Store a pose from the localisation system."""
+        self._reception.receive_pose(fix)
+
+    def receive_place(self, robot: str, fix: PoseFix) -> None:
+        """Store the pose of an in-neighbour, for the emulated network."""
+        self._reception.receive_place(robot, fix)
+
+    def receive_path_state(self, robot: str, state: PathState) -> None:
+        """Store the path state of an in-neighbour."""
+        self._reception.receive_path_state(robot, state)
+
+    def receive_silence(self, robot: str, tick: int) -> None:
+        """Note that an in-neighbour has no path state at a tick."""
+        self._reception.receive_silence(robot, tick)
+
+    def receive_leader_speed(self, speed: LeaderSpeed) -> None:
+        """Store the virtual leader's speed profile."""
+        self._reception.receive_leader_speed(speed)
 
     # --- notes of the loop in real time ------------------------------------------------------
 
@@ -246,7 +265,8 @@ class Agent:
         wheel_motion = self._drives.motion()
         if wheel_motion is None:
             return self._guard.arm(tick)
-        motion = self._localiser.wheels(*wheel_motion)
+        right_rad, left_rad, right_rad_s, left_rad_s = wheel_motion
+        motion = self._localiser.wheels(right_rad, left_rad, right_rad_s, left_rad_s)
         if self._encoder_check.active:
             self._guard.note_fault("encoders", self._encoder_check(wheel_motion))
         if tick <= 0:
@@ -255,7 +275,7 @@ class Agent:
                 motion = self._localiser.fix(start.x_m, start.y_m, start.theta_rad)
             if tick < 0:
                 return self._guard.arm(tick)
-        fix = self._advance(tick)
+        fix = self._reception.advance(tick)
         if fix is not None:
             motion = self._apply_fix(tick, fix, motion)
         if tick >= self.last_tick:
@@ -291,15 +311,18 @@ class Agent:
 
     def _control(self, tick: int, motion: RobotMotion) -> Sequence[Frame]:
         """The coordination and the law at one tick; where either diverges the robot stops."""
-        t_ns = tick * self._schedule.period_ns
+        t_ns = tick * self._period_ns
         self._tick = tick
         v_hat, mu, s = coordination = self._coordination
         s_dot = mu + v_hat
         sums = self._neighbours.sums(t_ns, s)
         v_r = self._reception.leader_speed(tick, v_hat)
         after = self._coordinator.advance(coordination, sums, self._edges.h, v_r)
-        along = _new(PathVariable, (s, s_dot, (after[0] + after[1] - s_dot) / self._h))
+        v_hat_after, mu_after, _ = after
+        along = _new(PathVariable, (s, s_dot, (v_hat_after + mu_after - s_dot) / self._h))
         guard = self._guard
+        law_state: Any = None
+        signals: Sequence[float]
         try:
             reference = self._path(s)
             out = self._law_step(self._law_state, motion, reference, along)
@@ -308,23 +331,30 @@ class Agent:
             how, why = failure(error, self._law_name)
             frames = guard.command(tick, nan, nan, f"{how} at s = {s:.4g} m: {why}")
         else:
-            signals = tuple(out[3])
-            frames = guard.command(tick, out[0], out[1])
+            right_wheel_N_m, left_wheel_N_m, law_state, signals = out
+            frames = guard.command(tick, right_wheel_N_m, left_wheel_N_m)
         outcome = guard.outcome
         if outcome is UNCHANGED:
-            self._law_state = out.state
+            self._law_state = law_state
         elif outcome is TorqueOutcome.LIMITED:
-            self._law_state = self._law_hold(self._law_state, out.state)
+            self._law_state = self._law_hold(self._law_state, law_state)
         elif outcome is TorqueOutcome.RESTARTED:
             self._law_state = None
         self._accept_path_variable(t_ns * 1e-9 + self._h, after)
+        rows = self.rows
+        rows.begin(tick)
+        rows.put(t_ns * 1e-9)
+        self._put_motion(motion)
+        rows.put(s)
+        rows.put(s_dot)
+        rows.put(mu)
+        rows.put(v_hat)
+        rows.put(sums.neighbours)
         x_d, y_d, theta_d, _, _ = reference
-        used = (t_ns * 1e-9, *motion, s, s_dot, mu, v_hat, sums.neighbours, x_d, y_d, theta_d)
-        if self._records_ages:
-            signals = (*self._reception.ages_s(t_ns), *signals)
-        sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
-        self.row = row = (*used, *signals, *sent)
-        self.rows.add(tick, row)
+        rows.put(x_d)
+        rows.put(y_d)
+        rows.put(theta_d)
+        self._end_row(t_ns, signals)
         return frames
 
     def _stand_by(self, tick: int, motion: RobotMotion) -> Sequence[Frame]:
@@ -341,13 +371,39 @@ class Agent:
             self._accept_path_variable(t_ns * 1e-9 + self._h, after)
             if tick + 1 == self._joining.joins:
                 self._guard.note_joining(tick + 1, self._coordination.s)
-        ages = self._reception.ages_s(t_ns) if self._records_ages else ()
-        sent = (*self._drives.sent_wheel_N_m, self.late_s, self.round_trip_s)
-        known = self._located or not self.brief.rejoins
-        used = (t_ns * 1e-9, *(motion if known else _NOWHERE), nan, nan, nan, nan, 0, nan, nan, nan)
-        self.row = row = (*used, *ages, *self._no_signals, *sent)
-        self.rows.add(tick, row)
+        rows = self.rows
+        rows.begin(tick)
+        rows.put(t_ns * 1e-9)
+        self._put_motion(motion if self._located or not self.brief.rejoins else _NOWHERE)
+        for value in (nan, nan, nan, nan, 0.0, nan, nan, nan):
+            rows.put(value)
+        self._end_row(t_ns, self._no_signals)
         return frames
+
+    def _put_motion(self, motion: RobotMotion) -> None:
+        """Its numbers of a row."""
+        rows = self.rows
+        x, y, theta, v, omega = motion
+        rows.put(x)
+        rows.put(y)
+        rows.put(theta)
+        rows.put(v)
+        rows.put(omega)
+
+    def _end_row(self, t_ns: int, signals: Sequence[float]) -> None:
+        """The numbers of a row from the ages of what was heard on, the law's among them."""
+        rows = self.rows
+        if self._records_ages:
+            for age_s in self._reception.ages_s(t_ns):
+                rows.put(age_s)
+        for value in signals:
+            rows.put(value)
+        right_wheel_N_m, left_wheel_N_m = self._drives.sent_wheel_N_m
+        rows.put(right_wheel_N_m)
+        rows.put(left_wheel_N_m)
+        rows.put(self.late_s)
+        rows.put(self.round_trip_s)
+        rows.end()
 
     def speaks(self, tick: int) -> bool:
         """Whether the robot is part of the formation, so that its path state means something."""
@@ -356,7 +412,7 @@ class Agent:
     def _accept_path_variable(self, t_s: float, after: CoordinationState) -> None:
         """Accept the next path variable; one beyond reach is rejected, and the robot stops."""
         v_hat, mu, s = after
-        far = self.admission.reach.beyond(t_s, s, v_hat if isfinite(mu) else mu)
+        far = beyond(self.admission.reach, t_s, s, v_hat if isfinite(mu) else mu)
         if far is None:
             self._coordination = after
         if (far is None) is self._diverged:

@@ -67,11 +67,11 @@ class Coordinator:
         self, state: CoordinationState, sums: Sums, h: float, v_r: float
     ) -> CoordinationState:
         """State after one period, heard: the sums over neighbours, and v_r with weight h."""
-        _, degree, sum_s, sum_v = sums
+        degree = sums.degree
         if degree != self._degree or h != self._h:
             self._degree, self._h, self._map = degree, h, self._map_of(degree, h)
         v_hat, mu, s = state
-        return _new(CoordinationState, advanced(self._map, v_hat, mu, s, sum_s, sum_v, v_r))
+        return _new(CoordinationState, advanced(self._map, v_hat, mu, s, sums.s, sums.v, v_r))
 
     def _map_of(self, degree: float, h: float) -> Map:
         rows = self._maps.get((degree, h))

@@ -14,6 +14,7 @@ from agents.rearming import Rearming
 from bridge.drives import protocol
 from bridge.drives.dry_run import DryRun
 from bridge.drives.interface import DriveClient
+from bridge.drives.wrapped import as_client
 from bridge.frame import Frame
 from configs.brief import AgentBrief
 from configs.errors import InfrastructureError
@@ -51,7 +52,7 @@ class Guard:
 
     def __init__(self, brief: AgentBrief) -> None:
         host, schedule = brief.host, brief.schedule
-        client = protocol(brief.drives.choice.plugin).client(brief.drives)
+        client = as_client(protocol(brief.drives.choice.plugin).client(brief.drives))
         self.drives: DriveClient = DryRun(client) if host.dry_run else client
         self.phase = Phase.STOPPED if brief.rejoins else Phase.ARMING
         self.begun = brief.rejoins
@@ -183,10 +184,10 @@ class Guard:
             return self._stop(tick, fault)
         self.outcome = UNCHANGED
         if self._limiter.active:
-            limited = self._limiter(right_wheel_N_m, left_wheel_N_m)
-            if limited != (right_wheel_N_m, left_wheel_N_m):
+            right, left = self._limiter(right_wheel_N_m, left_wheel_N_m)
+            if right != right_wheel_N_m or left != left_wheel_N_m:
                 self.outcome = TorqueOutcome.LIMITED
-            return drives.torque(*limited)
+            return drives.torque(right, left)
         return drives.torque(right_wheel_N_m, left_wheel_N_m)
 
     def leave(self, tick: int) -> Sequence[Frame]:

@@ -30,23 +30,11 @@ class LoggedAgent(Agent):
         self._ticks = Ticks(brief.schedule)
         self._start_messages: dict[tuple[Kind, str], bytes] = {}
         log.begin(rejoins=brief.rejoins, resumes_tick=brief.resumes_tick)
-        on_frame, log_frame = self.on_frame, log.frame
 
-        def logged_frame(can_id: int, data: bytes | bytearray, now_ns: int) -> None:
-            log_frame(can_id, data, now_ns)
-            on_frame(can_id, data, now_ns)
-
-        self.on_frame = logged_frame
-        self._receive_path_state, self.receive_path_state = (
-            self.receive_path_state,
-            self._take_path_state,
-        )
-        self._receive_pose, self.receive_pose = self.receive_pose, self._take_pose
-        self._receive_place, self.receive_place = self.receive_place, self._take_place
-        self._receive_leader_speed, self.receive_leader_speed = (
-            self.receive_leader_speed,
-            self._take_leader_speed,
-        )
+    def on_frame(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
+        """As `Agent.on_frame`."""
+        self._log.frame(can_id, data, now_ns)
+        super().on_frame(can_id, data, now_ns)
 
     def step(self, tick: int) -> Sequence[Frame]:
         """As `Agent.step`."""
@@ -94,21 +82,25 @@ class LoggedAgent(Agent):
             self._log.named(Kind.LEADER_ORDER, "", order._replace(from_tick=at).encode())
         return at
 
-    def _take_path_state(self, robot: str, state: PathState) -> None:
+    def receive_path_state(self, robot: str, state: PathState) -> None:
+        """As `Agent.receive_path_state`."""
         self._log_message(Kind.PATH, robot, state.encode(), start=state.tick < 0)
-        self._receive_path_state(robot, state)
+        super().receive_path_state(robot, state)
 
-    def _take_pose(self, fix: PoseFix) -> None:
+    def receive_pose(self, fix: PoseFix) -> None:
+        """As `Agent.receive_pose`."""
         self._log_message(Kind.POSE, "", fix.encode(), start=fix.tick < 0)
-        self._receive_pose(fix)
+        super().receive_pose(fix)
 
-    def _take_place(self, robot: str, fix: PoseFix) -> None:
+    def receive_place(self, robot: str, fix: PoseFix) -> None:
+        """As `Agent.receive_place`."""
         self._log_message(Kind.PLACE, robot, fix.encode(), start=fix.tick < 0)
-        self._receive_place(robot, fix)
+        super().receive_place(robot, fix)
 
-    def _take_leader_speed(self, speed: LeaderSpeed) -> None:
+    def receive_leader_speed(self, speed: LeaderSpeed) -> None:
+        """As `Agent.receive_leader_speed`."""
         self._log_message(Kind.LEADER, "", speed.encode(), start=True)
-        self._receive_leader_speed(speed)
+        super().receive_leader_speed(speed)
 
     def _log_message(self, kind: Kind, source: str, content: bytes, *, start: bool) -> None:
         if start:

@@ -20,9 +20,8 @@ don't depend on the order of arrival.
 
 from collections import deque
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
 from math import nan
-from typing import Final, NamedTuple
+from typing import Final
 
 from configs.edges import InEdge
 from configs.sections import Coordination
@@ -35,23 +34,27 @@ def extrapolated(s: float, v_hat: float, age_s: float, half_s: float) -> float:
     return s + v_hat * (age_s + half_s)
 
 
-class Sums(NamedTuple):
+class Sums:
     """d = Σ a_ij, Σ a_ij s_j, Σ a_ij v̂_j over the neighbours that are not silent."""
 
-    neighbours: int  # these
-    degree: float
-    s: float
-    v: float
+    __slots__ = ("degree", "neighbours", "s", "v")
+
+    def __init__(self, neighbours: int, degree: float, s: float, v: float) -> None:
+        self.neighbours = neighbours  # these
+        self.degree = degree
+        self.s = s
+        self.v = v
 
 
-@dataclass(slots=True)
 class _Neighbour:
-    weight: float
-    exists: bool = True  # the edge
-    t_ns: int = 0
-    s: float = 0.0
-    v_hat: float = 0.0
-    heard: bool = False
+    __slots__ = ("exists", "heard", "s", "t_ns", "v_hat", "weight")
+
+    def __init__(self, weight: float) -> None:
+        self.weight = weight
+        self.exists = True  # the edge
+        self.t_ns = 0
+        self.s = self.v_hat = 0.0
+        self.heard = False
 
 
 class Neighbours:
@@ -129,7 +132,7 @@ class Neighbours:
                 ago = min(round(age / self._period_s), len(past) - 1)
                 sum_s += weight * (neighbour.s + (own_s - past[-1 - ago]))
             sum_v += weight * neighbour.v_hat
-        return _new(Sums, (count, degree, sum_s, sum_v))
+        return Sums(count, degree, sum_s, sum_v)
 
     def carried_on(self, at_ns: int) -> tuple[float, float, float]:
         """Σ a_ij, Σ a_ij s_j, Σ a_ij v̂_j with s_j carried on to an instant, as to extrapolate."""

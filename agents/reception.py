@@ -33,6 +33,7 @@ class Reception:
         self._schedule = brief.schedule
         self._ticks = Ticks(brief.schedule)
         self._realtime = brief.schedule.realtime
+        self._period_ns = brief.schedule.period_ns
         self._rejoins = brief.rejoins
         self._follows_leader = brief.leader_link is not None
         self.admission = Admission(brief)
@@ -183,7 +184,7 @@ class Reception:
             return self.network.leader_speed(tick, self.leader, without, exists=heard)
         if self.leader is None:
             return 0.0
-        return speed_at(self.leader.changes, tick * self._schedule.period_ns)
+        return speed_at(self.leader.changes, tick * self._period_ns)
 
     def ages_s(self, t_ns: int) -> list[float]:
         """Ages of the data of every source [s], in the order of the record; NaN: none yet."""

@@ -24,8 +24,8 @@ Edge = tuple[str, str]
 
 Windows = tuple[tuple[int, int], ...]
 """(from_tick, to_tick) in order of time, apart from each other."""
-FOREVER = 1 << 62
-"""The end of a window that no tick of a run ends."""
+FOREVER = 1 << 61
+"""The end of a window that no tick of a run ends; as large as compiled code compares at once."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,18 +60,29 @@ class Reach(NamedTuple):
 
     def beyond(self, t_s: float, s: float, v_hat: float) -> str | None:
         """Why no robot can say this of a time, None if one can. What isn't finite is beyond."""
-        ends = self.s_min_m, self.s_max_m
-        low, high = reached(t_s, *ends, self.v_min_m_s, self.v_max_m_s)
-        if not low <= s <= high:
-            return f"s = {s:.6g} m at {t_s:.6g} s, where this scenario has {low:.6g} to {high:.6g}"
-        return self.too_fast(v_hat, "v̂")
+        return beyond(self, t_s, s, v_hat)
 
     def too_fast(self, speed_m_s: float, what: str) -> str | None:
         """Why no speed of this scenario is this one, None if one can be."""
-        low, high = self.v_min_m_s - self.v_margin_m_s, self.v_max_m_s + self.v_margin_m_s
-        if low <= speed_m_s <= high:
-            return None
-        return f"{what} = {speed_m_s:.6g} m/s, where this scenario has {low:.6g} to {high:.6g}"
+        return too_fast(self, speed_m_s, what)
+
+
+def beyond(reach: Reach, t_s: float, s: float, v_hat: float) -> str | None:
+    """As `Reach.beyond`: loops ask it at every tick, compiled."""
+    s_min_m, s_max_m, v_min_m_s, v_max_m_s, _ = reach
+    low, high = reached(t_s, s_min_m, s_max_m, v_min_m_s, v_max_m_s)
+    if not low <= s <= high:
+        return f"s = {s:.6g} m at {t_s:.6g} s, where this scenario has {low:.6g} to {high:.6g}"
+    return too_fast(reach, v_hat, "v̂")
+
+
+def too_fast(reach: Reach, speed_m_s: float, what: str) -> str | None:
+    """As `Reach.too_fast`."""
+    _, _, v_min_m_s, v_max_m_s, margin_m_s = reach
+    low, high = v_min_m_s - margin_m_s, v_max_m_s + margin_m_s
+    if low <= speed_m_s <= high:
+        return None
+    return f"{what} = {speed_m_s:.6g} m/s, where this scenario has {low:.6g} to {high:.6g}"
 
 
 def reach_of(

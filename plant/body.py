@@ -32,7 +32,7 @@ x, y [m]   θ [rad]   v [m/s]   ω [rad/s]   ν wheel speeds [rad/s]   τ, Δ [N
 
 from collections.abc import Callable
 from math import cos, sin
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from configs.brief import WheelDisturbance
 from configs.sections import Body
@@ -119,14 +119,16 @@ class RigidBody:
             disturbance.phase_rad,
         )
 
-    def wheel_speeds(self, v: Any, omega: Any) -> tuple[Any, Any]:
+    def wheel_speeds(self, v: float, omega: float) -> tuple[float, float]:
         """(right, left) wheel speeds ν [rad/s], equation (3) or (3')."""
         return rolling_speeds(v, omega, self.b, self.inv_right, self.inv_left)
 
-    def wheel_torques(self, v: Any, omega: Any, v_rate: Any, omega_rate: Any) -> tuple[Any, Any]:
+    def wheel_torques(
+        self, v: float, omega: float, v_rate: float, omega_rate: float
+    ) -> tuple[float, float]:
         """(right, left) wheel torques τ − Δ [N·m] that give these accelerations: (4) inverted.
 
-        Of numbers, or of arrays of them; of a body that neither slips nor is pushed.
+        Of a body that neither slips nor is pushed.
         """
         nu_right, nu_left = self.wheel_speeds(v, omega)
         d_right, d_left = self.damping_wheel_N_m_s
@@ -184,9 +186,9 @@ class RigidBody:
 
 
 def rolling_speeds(
-    v: Any, omega: Any, half_track: float, inv_right: float, inv_left: float
-) -> tuple[Any, Any]:
-    """(right, left) wheel speeds ν [rad/s] by (3) or (3'), of numbers or of arrays of them."""
+    v: float, omega: float, half_track: float, inv_right: float, inv_left: float
+) -> tuple[float, float]:
+    """(right, left) wheel speeds ν [rad/s] by (3) or (3')."""
     turn = half_track * omega
     return (v + turn) * inv_right, (v - turn) * inv_left
 

@@ -6,13 +6,9 @@ batch kernel of sweeps compiles it as it stands.
 """
 
 from math import cos, sin
-from typing import Final
 
 from plant.body import Rates, RigidBody, State, Waves, disturbance_torques
 from plant.divergence import FARTHEST
-
-_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
-
 
 Motion = tuple[float, float, float, float, float, float, float]
 """The numbers of a `State`."""
@@ -27,17 +23,30 @@ def rk4(
 
     None if the motion diverged: it would leave the bounds of `plant.divergence`.
     """
+    try:
+        return State(*moved(body, state, tau_right, tau_left, t_s, step_s))
+    except ValueError:
+        return None
+
+
+def moved(
+    body: RigidBody, motion: Motion, tau_right: float, tau_left: float, t_s: float, step_s: float
+) -> Motion:
+    """As `rk4`, of the numbers of states.
+
+    Raises:
+        ValueError: the motion diverged; also the sine of infinity.
+    """
     if body.disturbed:
         net = net_torques(tau_right, tau_left, body.disturbs, t_s, step_s)
     else:
         net = (tau_right, tau_left, tau_right, tau_left, tau_right, tau_left)
-    try:
-        after = runge_kutta(
-            body.rates, body.constants, state, net, step_s, body.b, body.inv_right, body.inv_left
-        )
-    except ValueError:  # the sine of infinity
-        return None
-    return _new(State, after) if within_bounds(after, body.b, body.fastest_m_s) else None
+    after = runge_kutta(
+        body.rates, body.constants, motion, net, step_s, body.b, body.inv_right, body.inv_left
+    )
+    if not within_bounds(after, body.b, body.fastest_m_s):
+        raise ValueError("the motion diverged")
+    return after
 
 
 def net_torques(

@@ -201,7 +201,7 @@ class LockstepLoop:
         recorded, localised = 0 <= tick < self._last_tick, self._ticks.localises(tick)
         for robot, ends in robots:
             if recorded:
-                ends.rows.add(tick, robot.row(t_ns * 1e-9))
+                robot.record(ends.rows, tick, t_ns * 1e-9)
             if localised:
                 ends.pose.put(robot.pose_fix(tick, t_ns).encode())
 

@@ -140,7 +140,7 @@ class RealtimeLoop:
             bus.faults.begin(tick)
             for robot in bus.robots:
                 if recorded:
-                    self._rows[robot].add(tick, robot.row(t_ns * 1e-9))
+                    robot.record(self._rows[robot], tick, t_ns * 1e-9)
             bus.send_due(bus_ns)
             if localised:
                 for robot in bus.robots:

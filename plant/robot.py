@@ -20,15 +20,17 @@ from typing import Final
 
 from bridge.drives import protocol
 from bridge.drives.interface import DriveMeasurements, DriveNode
+from bridge.drives.wrapped import as_node
 from bridge.frame import Frame
 from bridge.network.messages import PoseFix
+from bridge.network.telemetry import PLANT_ROW, RowBuffer
 from configs.brief import RobotBrief
 from plant.body import RigidBody, State
 from plant.divergence import Divergence
 from plant.effects import RobotEffects
 from plant.encoder import PER_RADIAN, Encoder
 from plant.exact import ExactEncoder, ExactPowertrain, shaft_motion
-from plant.integrate import rk4
+from plant.integrate import Motion, moved
 from plant.localisation import FaultyLocalisation
 from plant.powertrain import powertrain
 
@@ -53,6 +55,7 @@ class EmulatedRobot:
         "_left",
         "_localisation",
         "_longest_step_s",
+        "_motion",
         "_right",
         "_torque_left_wheel_N_m",
         "_torque_right_wheel_N_m",
@@ -60,15 +63,14 @@ class EmulatedRobot:
         "divergence",
         "drives",
         "moved_ns",
-        "state",
     )
 
     def __init__(self, brief: RobotBrief) -> None:
         node = protocol(brief.drive.choice.plugin).node
         self.brief = brief
         self._body = RigidBody(brief.body, brief.disturbance)
-        self._right = node(brief.drive, brief.right_node, brief.drive.serial_number)
-        self._left = node(brief.drive, brief.left_node, brief.drive.serial_number + 1)
+        self._right = as_node(node(brief.drive, brief.right_node, brief.drive.serial_number))
+        self._left = as_node(node(brief.drive, brief.left_node, brief.drive.serial_number + 1))
         self.drives: tuple[DriveNode, DriveNode] = (self._right, self._left)
         self.divergence: Divergence | None = None
         """The reason why the body is held for good, None if it moves."""
@@ -83,22 +85,31 @@ class EmulatedRobot:
         self._faulty: ExactPowertrain | None = None
         self._localisation: FaultyLocalisation | None = None
         self._longest_step_s = inf
-        pose = brief.pose
-        self.state = State(
-            pose.x_m, pose.y_m, pose.theta_rad, brief.v_m_s, brief.omega_rad_s, 0.0, 0.0
-        )
+        pose, speeds = brief.pose, (brief.v_m_s, brief.omega_rad_s)
+        self._motion: Motion = (pose.x_m, pose.y_m, pose.theta_rad, *speeds, 0.0, 0.0)
+
+    @property
+    def state(self) -> State:
+        """The motion of the body."""
+        return State(*self._motion)
+
+    @state.setter
+    def state(self, state: State) -> None:
+        self._motion = state
 
     def update_encoders(self) -> None:
         """Hand both drives the position and speed of their encoders."""
-        state = self.state
-        right_speed, left_speed = self._body.wheel_speeds(state.v, state.omega)
-        of_right = shaft_motion(state.right_wheel_rad, right_speed, self._gear_right)
-        of_left = shaft_motion(state.left_wheel_rad, left_speed, self._gear_left)
+        _, _, _, v, omega, right_rad, left_rad = self._motion
+        right_speed, left_speed = self._body.wheel_speeds(v, omega)
+        of_right = shaft_motion(right_rad, right_speed, self._gear_right)
+        of_left = shaft_motion(left_rad, left_speed, self._gear_left)
         if self._faulty is not None:
             right_encoder, left_encoder = self._faulty.encoders
             of_right, of_left = right_encoder.read(*of_right), left_encoder.read(*of_left)
-        self._right.update_encoder(*of_right)
-        self._left.update_encoder(*of_left)
+        right_rev, right_rev_s = of_right
+        left_rev, left_rev_s = of_left
+        self._right.update_encoder(right_rev, right_rev_s)
+        self._left.update_encoder(left_rev, left_rev_s)
 
     def feedback(self, now_ns: int) -> Sequence[Frame]:
         """Both encoder frames, once both drives have taken a set-point since the last ones."""
@@ -111,7 +122,8 @@ class EmulatedRobot:
     def frames_due(self, now_ns: int) -> list[Frame]:
         """The frames that both drives send at this instant, in order of arbitration."""
         self.update_encoders()
-        frames = [*self._right.due(now_ns), *self._left.due(now_ns)]
+        frames = list(self._right.due(now_ns))
+        frames += self._left.due(now_ns)
         if len(frames) > 1:
             frames.sort()
         return frames
@@ -128,7 +140,6 @@ class EmulatedRobot:
 
     def advance(self, t_s: float, period_s: float, substeps: int) -> None:
         """Integrate one control period from scenario time `t_s`, torques held."""
-        state = self.state
         right = self._right.torque_demand_shaft(period_s) * self._gear_right
         left = self._left.torque_demand_shaft(period_s) * self._gear_left
         self._demand_right_wheel_N_m, self._demand_left_wheel_N_m = right, left
@@ -140,13 +151,13 @@ class EmulatedRobot:
         step = period_s / substeps
         if step > self._longest_step_s:
             substeps, step = self._stable_steps(period_s)
-        for n in range(substeps):
-            after = rk4(self._body, state, right, left, t_s + n * step, step)
-            if after is None:
-                state = self._stop(state, Divergence(t_s, state.v, state.omega, right, left))
-                break
-            state = after
-        self.state = state
+        body, motion = self._body, self._motion
+        try:
+            for n in range(substeps):
+                motion = moved(body, motion, right, left, t_s + n * step, step)
+        except ValueError:
+            motion = self._stop(t_s, motion, right, left)
+        self._motion = motion
 
     # --- faults ------------------------------------------------------------------------------
 
@@ -188,7 +199,8 @@ class EmulatedRobot:
     def _shafts_rev(self) -> tuple[float, float]:
         """Angle of the (right, left) shaft [rev]."""
         right, left = PER_RADIAN * self._gear_right, PER_RADIAN * self._gear_left
-        return self.state.right_wheel_rad * right, self.state.left_wheel_rad * left
+        _, _, _, _, _, right_rad, left_rad = self._motion
+        return right_rad * right, left_rad * left
 
     @property
     def encoders(self) -> tuple[Encoder | ExactEncoder, Encoder | ExactEncoder]:
@@ -205,8 +217,8 @@ class EmulatedRobot:
 
     def pose_fix(self, tick: int, t_ns: int) -> PoseFix:
         """The pose as the localisation system sees it now."""
-        state = self.state
-        fix = PoseFix(tick, t_ns, state.x, state.y, state.theta)
+        x, y, theta, _, _, _, _ = self._motion
+        fix = PoseFix(tick, t_ns, x, y, theta)
         return fix if self._localisation is None else self._localisation.seen(fix)
 
     def move(self, to_ns: int, zero_ns: int, step_ns: int) -> None:
@@ -222,30 +234,39 @@ class EmulatedRobot:
             self.moved_ns = to_ns
             self.update_encoders()
 
-    def _stop(self, sound: State, divergence: Divergence) -> State:
-        """The motion diverged: the state at rest where it was sound at last."""
-        self.divergence = divergence
+    def _stop(
+        self, t_s: float, sound: Motion, right_wheel_N_m: float, left_wheel_N_m: float
+    ) -> Motion:
+        """The motion diverged: at rest where it was sound at last, under these torques."""
+        x, y, theta, v, omega, right_rad, left_rad = sound
+        self.divergence = Divergence(t_s, v, omega, right_wheel_N_m, left_wheel_N_m)
         self._right.lose_estimate()
         self._left.lose_estimate()
-        return sound._replace(v=0.0, omega=0.0)
+        return x, y, theta, 0.0, 0.0, right_rad, left_rad
+
+    def record(self, rows: RowBuffer, tick: int, t_s: float) -> None:
+        """Add the signals of `configs.signals.PLANT_SIGNALS` at this instant to the record."""
+        x, y, theta, v, omega, _, _ = self._motion
+        rows.begin(tick)
+        rows.put(t_s)
+        rows.put(x)
+        rows.put(y)
+        rows.put(theta)
+        rows.put(v)
+        rows.put(omega)
+        rows.put(self._right.input_torque_shaft * self._gear_right)
+        rows.put(self._left.input_torque_shaft * self._gear_left)
+        rows.put(self._demand_right_wheel_N_m)
+        rows.put(self._demand_left_wheel_N_m)
+        rows.put(self._torque_right_wheel_N_m)
+        rows.put(self._torque_left_wheel_N_m)
+        rows.end()
 
     def row(self, t_s: float) -> tuple[float, ...]:
-        """The signals of `configs.signals.PLANT_SIGNALS` at this instant."""
-        x, y, theta, v, omega, _, _ = self.state
-        return (
-            t_s,
-            x,
-            y,
-            theta,
-            v,
-            omega,
-            self._right.input_torque_shaft * self._gear_right,
-            self._left.input_torque_shaft * self._gear_left,
-            self._demand_right_wheel_N_m,
-            self._demand_left_wheel_N_m,
-            self._torque_right_wheel_N_m,
-            self._torque_left_wheel_N_m,
-        )
+        """The same signals, for who wants to see them."""
+        rows = RowBuffer(PLANT_ROW, _nobody)
+        self.record(rows, 0, t_s)
+        return rows.newest
 
 
 class RealisticRobot(EmulatedRobot):
@@ -284,23 +305,30 @@ class RealisticRobot(EmulatedRobot):
         step = period_s / substeps
         if step > self._longest_step_s:
             substeps, step = self._stable_steps(period_s)
-        state, body, train = self.state, self._body, self._train
+        motion, body, train = self._motion, self._body, self._train
         right, left = self._right, self._left
         gear_r, gear_l = self._gear_right, self._gear_left
         demands = torques = (0.0, 0.0)
         for n in range(substeps):
             demands = right.torque_demand_shaft(step), left.torque_demand_shaft(step)
-            right_speed, left_speed = body.wheel_speeds(state.v, state.omega)
+            _, _, _, v, omega, _, _ = motion
+            right_speed, left_speed = body.wheel_speeds(v, omega)
             shafts = train.step(demands, (right_speed * gear_r, left_speed * gear_l), step)
-            torques = shafts[0] * gear_r, shafts[1] * gear_l
+            right_wheel_N_m, left_wheel_N_m = shafts[0] * gear_r, shafts[1] * gear_l
+            torques = right_wheel_N_m, left_wheel_N_m
             if self.divergence is None:
-                after = rk4(body, state, *torques, t_s + n * step, step)
-                if after is None:
-                    after = self._stop(state, Divergence(t_s, state.v, state.omega, *torques))
-                state = after
-            right.update_encoder(*train.right_encoder.step(state.right_wheel_rad * gear_r, step))
-            left.update_encoder(*train.left_encoder.step(state.left_wheel_rad * gear_l, step))
-        self.state = state
+                try:
+                    motion = moved(
+                        body, motion, right_wheel_N_m, left_wheel_N_m, t_s + n * step, step
+                    )
+                except ValueError:
+                    motion = self._stop(t_s, motion, right_wheel_N_m, left_wheel_N_m)
+            _, _, _, _, _, right_rad, left_rad = motion
+            rev, rev_s = train.right_encoder.step(right_rad * gear_r, step)
+            right.update_encoder(rev, rev_s)
+            rev, rev_s = train.left_encoder.step(left_rad * gear_l, step)
+            left.update_encoder(rev, rev_s)
+        self._motion = motion
         self._demand_right_wheel_N_m, self._demand_left_wheel_N_m = (
             demands[0] * gear_r,
             demands[1] * gear_l,
@@ -323,6 +351,10 @@ class RealisticRobot(EmulatedRobot):
             drive.update_measurements(
                 DriveMeasurements(torque, current, motor.fet_C, motor.motor_C, supply.bus_V, amps)
             )
+
+
+def _nobody(_first: int, _count: int, _rows: bytes, _final: bool) -> None:
+    """Takes no blocks."""
 
 
 def emulated_robot(brief: RobotBrief) -> EmulatedRobot:

@@ -25,7 +25,7 @@ the batch kernel of sweeps compiles as they stand. `proj` is in `agents.laws.dsc
 
 from collections.abc import Sequence
 from math import atan, cos, exp, inf, sqrt, tanh
-from typing import Any, ClassVar, Final, NamedTuple
+from typing import Any, ClassVar, Final
 
 from mypy_extensions import mypyc_attr
 
@@ -150,15 +150,21 @@ def bound_estimate(kappa: float, e_1: float, e_2: float, keep: float, gain: floa
     return keep * kappa + gain * sqrt(e_1 * e_1 + e_2 * e_2)
 
 
-class DscState(NamedTuple):
+class DscState:
     """Filters (19), (20), (27) and estimates (35), (36)."""
 
-    alpha_theta: float
-    alpha_v: float
-    alpha_omega: float
-    theta_1: Row  # (c b, d̄_11, d̄_12, m̄_1)
-    theta_2: Row  # (c/b, d̄_21, d̄_22, m̄_2)
-    kappa: float
+    __slots__ = ("alpha_omega", "alpha_theta", "alpha_v", "kappa", "theta_1", "theta_2")
+
+    def __init__(self, filters: Filters, theta_1: Row, theta_2: Row, kappa: float) -> None:
+        self.alpha_theta, self.alpha_v, self.alpha_omega = filters
+        self.theta_1 = theta_1  # (c b, d̄_11, d̄_12, m̄_1)
+        self.theta_2 = theta_2  # (c/b, d̄_21, d̄_22, m̄_2)
+        self.kappa = kappa
+
+    @property
+    def filters(self) -> Filters:
+        """α_θ, α_v, α_ω."""
+        return self.alpha_theta, self.alpha_v, self.alpha_omega
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -216,21 +222,43 @@ class AdaptiveDsc(Law):
             closing, bar_theta, theta_e, s_dot, v_bar_d, omega_bar_d, k3
         )
         if state is None:
-            state = DscState(bar_theta, bar_v, turn, *self.estimates)
-        alpha_theta, alpha_v, alpha_omega, theta_1, theta_2, kappa = state
-        filters = (alpha_theta, alpha_v, alpha_omega)
+            theta_1, theta_2, kappa = self.estimates
+            filters = (bar_theta, bar_v, turn)
+        else:
+            theta_1, theta_2, kappa = state.theta_1, state.theta_2, state.kappa
+            filters = (state.alpha_theta, state.alpha_v, state.alpha_omega)
+        alpha_theta, alpha_v, alpha_omega = filters
         tau_right, tau_left, moved, f_1, f_2, e_1, e_2 = surface(  # (19)-(34)
             constants, v, omega, bar_theta, bar_v, turn, filters, theta_1, theta_2, kappa
         )
-        after = (
-            *moved,
+        after = DscState(
+            moved,
             self._learn(theta_1, f_1, e_1, self._rates_1, k4),  # (35)
             self._learn(theta_2, f_2, e_2, self._rates_2, k4),
             bound_estimate(kappa, e_1, e_2, keep, gain),  # (36)
         )
-        signals = (x_e, y_e, theta_e, alpha_theta, alpha_v, alpha_omega, e_1, e_2)
-        said = (*signals, *theta_1, *theta_2, kappa)
-        return _new(LawOutput, (tau_right, tau_left, _new(DscState, after), said))
+        t1, t2, t3, t4 = theta_1
+        t5, t6, t7, t8 = theta_2
+        said = (
+            x_e,
+            y_e,
+            theta_e,
+            alpha_theta,
+            alpha_v,
+            alpha_omega,
+            e_1,
+            e_2,
+            t1,
+            t2,
+            t3,
+            t4,
+            t5,
+            t6,
+            t7,
+            t8,
+            kappa,
+        )
+        return _new(LawOutput, (tau_right, tau_left, after, said))
 
     def _approach(self, x_e: float, y_e: float, k1: float, k2: float) -> tuple[float, float]:
         """The part of (15) that closes x_e, and (17)."""
@@ -242,9 +270,9 @@ class AdaptiveDsc(Law):
 
     def hold(self, before: DscState | None, after: DscState) -> DscState:
         """Filters go on; Θ̂ and κ̂ hold still, or would learn the limit."""
-        theta_1, theta_2, kappa = self.estimates if before is None else before[3:]
-        alpha_theta, alpha_v, alpha_omega, _, _, _ = after
-        return DscState(alpha_theta, alpha_v, alpha_omega, theta_1, theta_2, kappa)
+        if before is None:
+            return DscState(after.filters, *self.estimates)
+        return DscState(after.filters, before.theta_1, before.theta_2, before.kappa)
 
     # --- what follows from the equations, for `fleetloop check` ---------------------------------
 
@@ -334,9 +362,9 @@ def loop_elements(
             filters: Fast, motion: RobotMotion, reference: Reference, along: PathVariable
         ) -> tuple[float, float, Fast]:
             alpha_theta, alpha_v, alpha_omega = filters
-            state = DscState(alpha_theta, alpha_v, alpha_omega, theta_1, theta_2, 0.0)
+            state = DscState((alpha_theta, alpha_v, alpha_omega), theta_1, theta_2, 0.0)
             right, left, after, _ = law.step(state, motion, reference, along)
-            return right, left, after[:3]
+            return right, left, after.filters
 
         return LoopElement(steady, step, "filters", lags_s)
 

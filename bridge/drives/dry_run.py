@@ -5,32 +5,25 @@ fault, and sends no frame, so another controller may drive the robot meanwhile. 
 the torque that the wrapped client would have sent.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from bridge.drives.interface import DriveClient, Motion
+from bridge.drives.interface import DriveClient
+from bridge.drives.wrapped import WrappedClient
 from bridge.frame import Frame
 
 _NOTHING: tuple[Frame, ...] = ()
 
 
-class DryRun:
+class DryRun(WrappedClient):
     """The controller's end of two drives, receive only."""
 
     def __init__(self, client: DriveClient) -> None:
-        self._client = client
+        super().__init__(client)
         self.armed = False
         self.sent_wheel_N_m = (0.0, 0.0)
-        self.on_frame: Callable[[int, bytes | bytearray, int], None] = client.on_frame
-        self.feedback_since: Callable[[int], bool] = client.feedback_since
-        self.motion: Callable[[], Motion | None] = client.motion
-        self.obstacle: Callable[[int], str | None] = client.obstacle
-        self.refusal: Callable[[], str | None] = client.refusal
-        self.fault: Callable[[int], str | None] = client.fault
 
-    @property
-    def notices(self) -> tuple[str, ...]:
-        """Commands of other hosts to the drives, in words."""
-        return self._client.notices
+    def _copy(self) -> None:
+        """Nothing: what it shows is its own."""
 
     def arm(self, now_ns: int) -> Sequence[Frame]:
         """No frames; armed once the drives have no fault."""

@@ -4,9 +4,12 @@ A client is at the wheels: it converts to and from the shaft by the mounting of 
 at the motor's shaft. Both are pure: frames in, frames out, told the time.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from math import pi
 from typing import NamedTuple, Protocol
+
+from mypy_extensions import mypyc_attr
 
 from bridge.frame import Frame
 from configs.brief import DriveLink, DriveModel
@@ -37,56 +40,77 @@ class DriveMeasurements(NamedTuple):
     bus_A: float
 
 
-class DriveClient(Protocol):
-    """The controller's end of the two drives of a robot."""
+@mypyc_attr(allow_interpreted_subclasses=True)
+class DriveClient(ABC):
+    """The controller's end of the two drives of a robot.
+
+    One of your own has these methods, whether it derives from this class or not.
+    """
 
     armed: bool
     sent_wheel_N_m: tuple[float, float]
     """(right, left) torque last sent, at the wheels [N·m], as the bus carries it."""
 
     @property
+    @abstractmethod
     def notices(self) -> tuple[str, ...]:
         """Commands of other hosts to the drives, in words."""
 
+    @abstractmethod
     def on_frame(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         """Process any frame from the bus."""
 
+    @abstractmethod
     def feedback_since(self, bus_ns: int) -> bool:
         """Whether both wheels' encoder frames were received after this bus time [ns]."""
 
+    @abstractmethod
     def motion(self) -> Motion | None:
         """The newest wheel angles and speeds, None before the first encoder frames of both."""
 
+    @abstractmethod
     def arm(self, now_ns: int) -> Sequence[Frame]:
         """The next frames of the arming sequence; call once per period."""
 
+    @abstractmethod
     def missing(self, now_ns: int) -> str:
         """The reasons why each drive is not armed, "" if there are none."""
 
+    @abstractmethod
     def obstacle(self, now_ns: int) -> str | None:
         """The reason not to begin arming now, None if there is none."""
 
+    @abstractmethod
     def refusal(self) -> str | None:
         """The fault that only a person may clear before the drives are armed again, or None."""
 
+    @abstractmethod
     def fault(self, now_ns: int) -> str | None:
         """The fault that keeps the wheels from being driven now, None if there is none."""
 
+    @abstractmethod
     def torque(self, right_wheel_N_m: float, left_wheel_N_m: float) -> Sequence[Frame]:
         """Set-points for both wheels; `sent_wheel_N_m` is then their value on the bus."""
 
+    @abstractmethod
     def rest(self, now_ns: int) -> Sequence[Frame]:
         """Torque 0 for both wheels, and frames that keep them disarmed; call once per period."""
 
+    @abstractmethod
     def disarm(self) -> Sequence[Frame]:
         """Torque 0 and idle for both wheels; the way to `armed` begins anew."""
 
+    @abstractmethod
     def estop(self) -> Sequence[Frame]:
         """Emergency stop for both wheels."""
 
 
-class DriveNode(Protocol):
-    """The emulated drive of one wheel."""
+@mypyc_attr(allow_interpreted_subclasses=True)
+class DriveNode(ABC):
+    """The emulated drive of one wheel.
+
+    One of your own has these methods, whether it derives from this class or not.
+    """
 
     fed_ns: int
     """Bus time of its last set-point: the last feed of the watchdog."""
@@ -94,37 +118,44 @@ class DriveNode(Protocol):
     """The identifier of its set-points at its present address; negative: it accepts none."""
     ignored: int
     """Frames to it without an effect: unknown commands, values and lengths that it doesn't take."""
+    input_torque_shaft: float
+    """Torque of the last set-point at the shaft [N·m], before limits."""
 
+    @abstractmethod
     def update_encoder(self, revolutions: float, rev_s: float) -> None:
         """Set the encoder's position [rev] and speed [rev/s] of the shaft."""
 
+    @abstractmethod
     def lose_estimate(self) -> None:
         """The encoder's estimate is gone for good: disarm with that error, which nothing clears."""
 
+    @abstractmethod
     def due(self, now_ns: int) -> Sequence[Frame]:
         """Frames due until this instant, the newest of each; the drive supervises itself first."""
 
+    @abstractmethod
     def feedback(self, now_ns: int) -> Frame:
         """The encoder frame out of its turn; the next cyclic one comes a period later."""
 
+    @abstractmethod
     def on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Process one frame from the bus; return the replies."""
 
     @property
-    def input_torque_shaft(self) -> float:
-        """Torque of the last set-point at the shaft [N·m], before limits."""
-
-    @property
+    @abstractmethod
     def state_in_words(self) -> str:
         """Its state, and after a colon the errors that disarmed it or are active, if any."""
 
     @property
+    @abstractmethod
     def next_due_ns(self) -> int:
         """The earliest bus time at which `due` has an effect; valid after its last call."""
 
+    @abstractmethod
     def update_measurements(self, measurements: DriveMeasurements) -> None:
         """Set the drive's measurements of its motor and supply."""
 
+    @abstractmethod
     def torque_demand_shaft(self, dt_s: float) -> float:
         """Torque asked of the motor for the next `dt_s`, at its shaft [N·m]; always finite."""
 
@@ -132,15 +163,19 @@ class DriveNode(Protocol):
 
     def estop(self) -> None:
         """Its emergency stop is pressed."""
+        raise NotImplementedError
 
     def expire_watchdog(self) -> None:
         """Its watchdog expires, whatever was fed."""
+        raise NotImplementedError
 
     def reboot(self, now_ns: int) -> None:
         """Its firmware boots anew, whatever it is doing."""
+        raise NotImplementedError
 
     def trip(self, error: str | None) -> None:
         """It disarms with one of its section's `Drive.errors`; None: with the first one."""
+        raise NotImplementedError
 
 
 class CyclicMessage(NamedTuple):
@@ -229,8 +264,10 @@ class EndpointFile(Protocol):
 class DriveProtocol(NamedTuple):
     """A row of `configs.drives.DRIVES`: everything that belongs to one protocol."""
 
-    client: Callable[[DriveLink], DriveClient]
-    node: Callable[[DriveModel, int, int], DriveNode]  # model, node id, serial number
+    client: Callable[[DriveLink], object]
+    """Makes a `DriveClient`, or what has its methods: `bridge.drives.wrapped` calls either."""
+    node: Callable[[DriveModel, int, int], object]
+    """Makes a `DriveNode`, or what has its methods; of model, node id, serial number."""
     cyclic_messages: Callable[[DriveModel, int, int, float], Sequence[CyclicMessage]]
     """Of one drive and its set-points: model, node id, control period [ns], and gear: signed shaft
     revolutions per wheel revolution."""

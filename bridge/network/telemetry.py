@@ -8,6 +8,8 @@ import struct
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from librt.strings import BytesWriter, write_f64_le
+
 from bridge.frame import Frame
 from bridge.network.link import Publisher
 from bridge.network.messages import Rows
@@ -44,6 +46,8 @@ class RowBuffer:
     or some have been there for a while, and a last, perhaps empty one from `finish`. Where rows
     begin and end in blocks changes nothing in a record.
 
+    A row is added as it is, or begun, put number by number, and ended.
+
     Args:
         row: of the table of signals.
         hand_on: called with each block.
@@ -54,8 +58,8 @@ class RowBuffer:
     """
 
     __slots__ = (
-        *("_age_ns", "_block", "_count", "_due_ns", "_first_tick", "_hand_on", "_late_ns"),
-        *("_look_ns", "_pack_into", "_seen", "_size", "_unwatched_age_ns", "_watched"),
+        *("_age_ns", "_block", "_count", "_due_ns", "_first_tick", "_hand_on", "_handed_on"),
+        *("_late_ns", "_look_ns", "_row", "_seen", "_unwatched_age_ns", "_watched"),
     )
 
     def __init__(
@@ -73,21 +77,39 @@ class RowBuffer:
         self._seen = False  # whether it is known since when there is a row, and so:
         self._due_ns = 0  # when the block goes on if somebody watches
         self._late_ns = 0  # and when in any case
-        self._pack_into = row.pack_into
-        self._size = row.size
-        self._block = bytearray(BLOCK_TICKS * row.size)
+        self._row = row
+        self._block = BytesWriter()
+        self._handed_on = b""  # the block before
         self._first_tick = 0
         self._count = 0
 
     def add(self, tick: int, row: Sequence[float]) -> None:
         """Add the row of one tick."""
-        count = self._count
-        if count == 0:
+        self.begin(tick)
+        for value in row:
+            write_f64_le(self._block, value)
+        self.end()
+
+    def begin(self, tick: int) -> None:
+        """Begin the row of one tick; its numbers follow, in the order of the signals."""
+        if self._count == 0:
             self._first_tick = tick
-        self._pack_into(self._block, count * self._size, *row)
-        self._count = count = count + 1
+
+    def put(self, value: float) -> None:
+        """Put one number of the row."""
+        write_f64_le(self._block, value)
+
+    def end(self) -> None:
+        """The row is complete."""
+        self._count = count = self._count + 1
         if count == BLOCK_TICKS:
             self._flush(final=False)
+
+    @property
+    def newest(self) -> tuple[float, ...]:
+        """The values of the newest row; empty before there is one."""
+        block = self._block.getvalue() if self._count else self._handed_on
+        return self._row.unpack(block[-self._row.size :]) if block else ()
 
     def look(self, now_ns: int) -> None:
         """Hand on what has been there for so long, by a clock [ns]."""
@@ -125,7 +147,10 @@ class RowBuffer:
         self._hand_on(self._first_tick, 0, b"", False)
 
     def _flush(self, *, final: bool) -> None:
-        rows = bytes(memoryview(self._block)[: self._count * self._size])
+        rows = self._block.getvalue()
+        if rows:
+            self._handed_on = rows
+        self._block.truncate(0)
         self._hand_on(self._first_tick, self._count, rows, final)
         self._first_tick += self._count
         self._count = 0

@@ -55,7 +55,7 @@ def torque_findings(scenario: Scenario, courses: list[Course]) -> Iterator[Findi
 def needed(scenario: Scenario, course: Course) -> Need:
     """(1) and (2) along a course."""
     body = robot_body(scenario.body_of(course.robot))
-    nu = np.column_stack(body.wheel_speeds(course.v, course.omega))
+    nu = _wheel_speeds(body, course)
     viscous = np.array(body.damping_wheel_N_m_s)
     rest = np.zeros_like(nu)
     if scenario.drive.preset == "realistic":
@@ -76,10 +76,16 @@ def _inertial(body: RigidBody, course: Course) -> Series:
     rate_v, rate_omega = (np.gradient(x, course.t_s) for x in (v, omega))
     starting = course.t_s - course.t_s[0] < START_S
     rate_v[starting] = rate_omega[starting] = 0.0
-    torques = np.column_stack(body.wheel_torques(v, omega, rate_v, rate_omega))
-    speeds: Series = np.column_stack(body.wheel_speeds(v, omega))
-    inertial: Series = torques - speeds * np.array(body.damping_wheel_N_m_s)
+    moments = zip(v, omega, rate_v, rate_omega, strict=True)
+    torques = np.array([body.wheel_torques(*moment) for moment in moments])
+    friction = _wheel_speeds(body, course) * np.array(body.damping_wheel_N_m_s)
+    inertial: Series = torques - friction
     return inertial
+
+
+def _wheel_speeds(body: RigidBody, course: Course) -> Series:
+    moments = zip(course.v, course.omega, strict=True)
+    return np.array([body.wheel_speeds(v, omega) for v, omega in moments])
 
 
 def _torque(scenario: Scenario, course: Course, need: Need, bounds: list[Limit]) -> Finding:

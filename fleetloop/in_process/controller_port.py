@@ -1,33 +1,47 @@
 """The port of a bus in one process: its clients are controllers, called when they are asked."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 from agents.agent import Agent
 from agents.bus_clock import BusClock
 from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.frame import Frame
+from plant.bus.port import Port
 
 
-class Controller(NamedTuple):
-    """A controller and its clock."""
+class Controller:
+    """A controller, and its clock before its first tick."""
 
-    agent: Agent
-    clock: BusClock
+    __slots__ = ("_agent", "_clock")
 
-    @classmethod
-    def of(cls, agent: Agent) -> "Controller":
-        """A controller before its first tick."""
-        return cls(agent, BusClock(agent.brief.schedule, agent.feedback_since))
+    def __init__(self, agent: Agent) -> None:
+        self._agent = agent
+        self._clock = BusClock(agent.brief.schedule, agent.feedback_since)
+
+    def hear(self, stamp_ns: int, frames: Sequence[Frame]) -> Sequence[Frame]:
+        """The answer to frames of one bus time."""
+        agent, clock = self._agent, self._clock
+        said: Sequence[Frame] = ()
+        tick = None
+        for can_id, data in frames:
+            agent.on_frame(can_id, data, stamp_ns)
+            if tick is None:
+                tick = clock.due(stamp_ns)
+                if tick is not None:
+                    said = agent.step(tick)
+        if tick is None:
+            tick = clock.due_at_end(stamp_ns)
+            if tick is not None:
+                said = agent.step(tick)
+        return said
 
     def react(self, received: Sequence[tuple[int, Frame]], asked_ns: int) -> list[Frame]:
         """The answer to a question of a bus time: frames with their bus times."""
-        agent, clock = self
+        agent, clock = self._agent, self._clock
         said: list[Frame] = []
-        on_frame, due = agent.on_frame, clock.due
         for at_ns, (can_id, data) in received:
-            on_frame(can_id, data, at_ns)
-            tick = due(at_ns)
+            agent.on_frame(can_id, data, at_ns)
+            tick = clock.due(at_ns)
             if tick is not None:
                 said += agent.step(tick)
         tick = clock.due_at_end(asked_ns)
@@ -36,13 +50,14 @@ class Controller(NamedTuple):
         return said
 
 
-class ControllerPort:
+class ControllerPort(Port):
     """The port of a bus whose clients are its robots' controllers, called when they are asked."""
 
-    __slots__ = ("_asked", "_controllers", "_frames", "_pending", "_stamp_ns")
+    __slots__ = ("_asked", "_controllers", "_frames", "_in_order", "_pending", "_stamp_ns")
 
     def __init__(self, controllers: Mapping[str, Controller]) -> None:
-        self._controllers = controllers
+        self._controllers = dict(controllers)
+        self._in_order = list(controllers.values())
         self._stamp_ns = 0
         self._frames: Sequence[Frame] = ()
         self._pending: dict[str, list[tuple[int, Frame]]] = {robot: [] for robot in controllers}
@@ -54,21 +69,9 @@ class ControllerPort:
 
     def receive(self) -> list[Frame]:
         """The answers of all controllers to the frames that were delivered."""
-        stamp_ns, frames = self._stamp_ns, self._frames
         answers: list[Frame] = []
-        for agent, clock in self._controllers.values():
-            on_frame = agent.on_frame
-            tick = None
-            for can_id, data in frames:
-                on_frame(can_id, data, stamp_ns)
-                if tick is None:
-                    tick = clock.due(stamp_ns)
-                    if tick is not None:
-                        answers += agent.step(tick)
-            if tick is None:
-                tick = clock.due_at_end(stamp_ns)
-                if tick is not None:
-                    answers += agent.step(tick)
+        for controller in self._in_order:
+            answers += controller.hear(self._stamp_ns, self._frames)
         return answers
 
     def forward(self, stamp_ns: int, ended: Sequence[Transmitted], asked: str | None) -> None:

@@ -72,7 +72,7 @@ class Exchange:
         t_ns = tick * self._period_ns
         for place in places:
             if 0 <= tick < self._last_tick:
-                place.truth.add(tick, place.robot.row(t_ns * 1e-9))
+                place.robot.record(place.truth, tick, t_ns * 1e-9)
             if self._ticks.localises(tick):
                 place.localise(tick, t_ns)
 

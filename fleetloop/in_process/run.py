@@ -99,7 +99,7 @@ class InProcessRun:
         def begin(group: Sequence[EmulatedRobot]) -> Callable[[int], None]:
             return partial(exchange.begin, exchange.places(robot.brief.robot for robot in group))
 
-        controllers = {agent.brief.robot: Controller.of(agent) for agent in self._agents}
+        controllers = {agent.brief.robot: Controller(agent) for agent in self._agents}
 
         def port(_: str, group: Sequence[EmulatedRobot]) -> ControllerPort:
             return ControllerPort({r.brief.robot: controllers[r.brief.robot] for r in group})

@@ -68,7 +68,7 @@ class IdealBus:
         """The ticks from the first of the countdown to the closing one."""
         schedule, begin, substeps = self._schedule, self._begin, self._substeps
         ticks = Ticks(schedule)
-        tap, deliver, receive = self._tap, self._port.deliver, self._port.receive
+        tap, port = self._tap, self._port
         period_s, period_ns, last = schedule.period_s, schedule.period_ns, schedule.ticks
         robots, begin_faults, interference = self.robots, self.faults.begin, self._interference
         (single,) = robots if len(robots) == 1 else (None,)
@@ -86,9 +86,9 @@ class IdealBus:
             tap(bus_ns, frames, FROM_DRIVE)
             if late:
                 frames, late = [*frames, *late], []
-            deliver(bus_ns, frames)
+            port.deliver(bus_ns, frames)
             yield ALL
-            answers = receive()
+            answers = port.receive()
             if interference.acts:
                 answers = interference.to_drives(answers, bus_ns)
             count = 0
@@ -103,9 +103,9 @@ class IdealBus:
                 if count >= MOST_A_TICK:
                     late = replies
                     break
-                deliver(bus_ns, replies)
+                port.deliver(bus_ns, replies)
                 yield ALL
-                answers = receive()
+                answers = port.receive()
                 if interference.acts:
                     answers = interference.to_drives(answers, bus_ns)
                 self.crossed += len(replies) + len(answers)
@@ -176,8 +176,7 @@ class IdealBus:
             return self._interference.from_drives(heard, bus_ns)
         replies: list[Frame] = []
         for robot in self.robots:
-            on_frame = robot.on_frame
             for frame in frames:
-                if replied := on_frame(frame, bus_ns):
+                if replied := robot.on_frame(frame, bus_ns):
                     replies += replied
         return replies

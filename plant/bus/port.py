@@ -6,8 +6,11 @@ the clients sent. It yields None when the tick is over. Sockets or calls behind 
 nothing of what happens on the bus.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Sequence
 from typing import Protocol
+
+from mypy_extensions import mypyc_attr
 
 from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.frame import Frame
@@ -21,24 +24,31 @@ Begin = Callable[[int], None]
 """Told each tick as it begins, bodies being where they are at that instant."""
 
 
-class Port(Protocol):
+@mypyc_attr(allow_interpreted_subclasses=True)
+class Port(ABC):
     """The clients of one bus. Ideal buses need the first two methods, timed buses the others."""
 
+    @abstractmethod
     def deliver(self, stamp_ns: int, frames: Sequence[Frame]) -> None:
         """Give frames of the drives, all of one bus time, to all clients."""
 
+    @abstractmethod
     def receive(self) -> Sequence[Frame]:
         """The frames that clients sent since the last call, in order."""
 
+    @abstractmethod
     def forward(self, stamp_ns: int, ended: Sequence[Transmitted], asked: str | None) -> None:
         """Give what ended on the wire until `stamp_ns` to all clients; `asked` has to answer."""
 
+    @abstractmethod
     def submitted(self) -> Sequence[Submitted]:
         """The frames added to the transmit queues of clients since the last call, in order."""
 
+    @abstractmethod
     def departed(self) -> Sequence[Key]:
         """Clients that left since the last call."""
 
+    @abstractmethod
     def return_credit(self, key: Key, count: int) -> None:
         """Frames of a client have left its transmit queue."""
 

@@ -6,9 +6,10 @@ from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
 from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.frame import Frame
+from plant.bus.port import Port
 
 
-class SocketPort:
+class SocketPort(Port):
     """One bus by name: frames over the drives' end of all buses, bit timing over the hub."""
 
     __slots__ = ("_end", "_hub", "_name")

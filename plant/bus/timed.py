@@ -38,7 +38,7 @@ from plant.disturbance import Disturbance
 from plant.faults import BusFaults
 from plant.robot import EmulatedRobot
 
-_NEVER = 1 << 62
+_NEVER = 1 << 61
 
 
 class TimedBus:

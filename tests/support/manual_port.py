@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.frame import Frame
-from plant.bus.port import Steps
+from plant.bus.port import Port, Steps
 
 
 class Question(NamedTuple):
@@ -18,7 +18,7 @@ class Question(NamedTuple):
     freed: Sequence[tuple[Key, int]]
 
 
-class ManualPort:
+class ManualPort(Port):
     """Keeps what the bus gives; gives what the test puts into `frames`, `said` and `gone`."""
 
     def __init__(self) -> None:

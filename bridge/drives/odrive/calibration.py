@@ -12,7 +12,7 @@ Each takes the same time. What it finds out is a parameter: saved by Reboot 1, e
 from bridge.drives.odrive.frames import AxisState
 from bridge.drives.odrive.parameters import Parameters
 
-NEVER = 1 << 62
+NEVER = 1 << 61
 _PROCEDURES = {
     AxisState.FULL_CALIBRATION_SEQUENCE: (
         AxisState.MOTOR_CALIBRATION,

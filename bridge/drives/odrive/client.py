@@ -21,7 +21,7 @@ from enum import Enum, auto
 from functools import partial
 from typing import Final
 
-from bridge.drives.interface import Motion
+from bridge.drives.interface import DriveClient, Motion
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisState, Command, ControlMode, InputMode
 from bridge.drives.odrive.model import section_of
@@ -41,9 +41,7 @@ _FOREIGN: Final = (
     Command.SET_INPUT_TORQUE,
     Command.SET_LIMITS,
 )
-_PACK_TWO: Final = f.TWO_FLOATS.pack
 _new: Final = tuple.__new__  # of a frame, past its constructor: this is the hot path
-_UNPACK_TWO: Final = f.TWO_FLOATS.unpack
 
 _Handler = Callable[[bytes | bytearray, int], None]
 
@@ -54,7 +52,7 @@ class _Step(Enum):
     CLOSE = auto()
 
 
-class OdriveClient:
+class OdriveClient(DriveClient):
     """Drives the right and the left wheel of one robot."""
 
     def __init__(self, link: DriveLink) -> None:
@@ -63,11 +61,11 @@ class OdriveClient:
         self._right = RemoteAxis("right", link.right_node, link.mounting.right_sign, link)
         self._left = RemoteAxis("left", link.left_node, link.mounting.left_sign, link)
         self._axes = (self._right, self._left)
-        self._encoders = self._by_id(Command.GET_ENCODER_ESTIMATES)
+        self._right_encoder_id, self._left_encoder_id = self._by_id(Command.GET_ENCODER_ESTIMATES)
         self._others = self._handlers_by_id()
         self._encoder_limit_ns = link.encoder_age_limit_ns
         self._heartbeat_limit_ns = link.heartbeat_age_limit_ns
-        self._torque_ids = tuple(self._by_id(Command.SET_INPUT_TORQUE))
+        self._right_id, self._left_id = self._by_id(Command.SET_INPUT_TORQUE)
         self._to_shaft = (self._right.to_shaft, self._left.to_shaft)
         self._to_wheel = (self._right.to_wheel, self._left.to_wheel)
         self._step = _Step.CLEAR
@@ -82,13 +80,18 @@ class OdriveClient:
 
     def on_frame(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         """Process any frame from the bus."""
-        axis = self._encoders.get(can_id)
+        axis: RemoteAxis | None = None
+        if can_id == self._right_encoder_id:
+            axis = self._right
+        elif can_id == self._left_encoder_id:
+            axis = self._left
         if axis is None:
             handler = self._others.get(can_id)
             if handler is not None:
                 handler(data, now_ns)
         elif len(data) == 8:
-            angle, speed = _UNPACK_TWO(data)
+            data = data if isinstance(data, bytes) else bytes(data)
+            angle, speed = f.float_at(data, 0), f.float_at(data, 4)
             total = angle + speed
             if total - total == 0.0:  # both are finite
                 axis.angle_wheel_rad = angle * axis.wheel_rad_per_shaft_rev
@@ -223,17 +226,17 @@ class OdriveClient:
     def torque(self, right_wheel_N_m: float, left_wheel_N_m: float) -> tuple[Frame, Frame]:
         """Set-points for both wheels [N·m]; beyond float32 they saturate."""
         to_right, to_left = self._to_shaft
+        right_shaft, left_shaft = right_wheel_N_m * to_right, left_wheel_N_m * to_left
         try:
-            both = _PACK_TWO(right_wheel_N_m * to_right, left_wheel_N_m * to_left)
+            right, left = f.float_data(right_shaft), f.float_data(left_shaft)
         except OverflowError:
-            both = _PACK_TWO(
-                _saturated(right_wheel_N_m * to_right), _saturated(left_wheel_N_m * to_left)
+            right, left = (
+                f.float_data(_saturated(right_shaft)),
+                f.float_data(_saturated(left_shaft)),
             )
-        right, left = _UNPACK_TWO(both)
         of_right, of_left = self._to_wheel
-        self.sent_wheel_N_m = (right * of_right, left * of_left)
-        right_id, left_id = self._torque_ids
-        return _new(Frame, (right_id, both[:4])), _new(Frame, (left_id, both[4:]))
+        self.sent_wheel_N_m = (f.float_at(right, 0) * of_right, f.float_at(left, 0) * of_left)
+        return _new(Frame, (self._right_id, right)), _new(Frame, (self._left_id, left))
 
     def disarm(self) -> Sequence[Frame]:
         """Torque 0 and idle for both wheels; the way to `armed` begins anew."""

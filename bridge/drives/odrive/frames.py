@@ -11,6 +11,8 @@ import struct
 from enum import IntEnum, IntFlag
 from typing import Final, NamedTuple
 
+from librt.strings import BytesWriter, read_f32_le, write_f32_le
+
 from bridge.frame import RTR, Frame
 
 UNADDRESSED: Final = 0x3F
@@ -193,6 +195,42 @@ def decode_heartbeat(data: bytes | bytearray) -> Heartbeat:
     """The content of a heartbeat."""
     errors, state, result, flags, _ = HEARTBEAT.unpack(padded(data, HEARTBEAT.size))
     return Heartbeat(AxisError(errors), state, result, bool(flags & 1))
+
+
+_SINGLE_BELOW: Final = 2.0**128 - 2.0**103
+"""The least number that rounds to one that a single can't hold."""
+
+
+def float_data(value: float) -> bytes:
+    """One float for the wire.
+
+    Raises:
+        OverflowError: a single can't hold it.
+    """
+    if not -_SINGLE_BELOW < value < _SINGLE_BELOW:
+        return ONE_FLOAT.pack(value)
+    data = BytesWriter()
+    write_f32_le(data, value)
+    return data.getvalue()
+
+
+def floats_data(first: float, second: float) -> bytes:
+    """Two floats for the wire.
+
+    Raises:
+        OverflowError: a single can't hold one of them.
+    """
+    if not (-_SINGLE_BELOW < first < _SINGLE_BELOW and -_SINGLE_BELOW < second < _SINGLE_BELOW):
+        return TWO_FLOATS.pack(first, second)
+    data = BytesWriter()
+    write_f32_le(data, first)
+    write_f32_le(data, second)
+    return data.getvalue()
+
+
+def float_at(data: bytes, place: int) -> float:
+    """The float at a place of a message that is long enough."""
+    return read_f32_le(data, place)
 
 
 def decode_floats(data: bytes | bytearray) -> tuple[float, float]:

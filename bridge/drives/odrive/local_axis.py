@@ -25,7 +25,7 @@ documentation is silent, 0.5.6's source.
 
 from math import isfinite
 
-from bridge.drives.interface import DriveMeasurements
+from bridge.drives.interface import DriveMeasurements, DriveNode
 from bridge.drives.odrive import calibration, control, health
 from bridge.drives.odrive.calibration import NEVER, Calibration
 from bridge.drives.odrive.control import Controller
@@ -35,7 +35,7 @@ from bridge.drives.odrive.model import AxisModel
 from bridge.drives.odrive.parameters import FLOAT32_MAX, Parameters
 
 
-class LocalAxis:
+class LocalAxis(DriveNode):
     """One axis. Pure: the time is an argument."""
 
     __slots__ = (

@@ -40,8 +40,6 @@ from bridge.frame import EFF, ERR, RTR, Frame
 ANSWER_WITHIN_NS: Final = 20_000_000
 """Longest delay of an unaddressed drive's answer to Address."""
 _NONE: Final[Sequence[Frame]] = ()
-_UNPACK_FLOAT: Final = f.ONE_FLOAT.unpack
-_PACK_TWO: Final = f.TWO_FLOATS.pack
 _new: Final = tuple.__new__  # of a frame, past its constructor: this is the hot path
 
 
@@ -53,6 +51,7 @@ class OdriveNode(LocalAxis):
         "_boots_ns",
         "_cyclic_ns",
         "_encoder_id",
+        "_encoder_period_ns",
         "_next_encoder_ns",
         "_next_other_ns",
         "_random",
@@ -91,7 +90,7 @@ class OdriveNode(LocalAxis):
         if can_id == self.setpoint_id and len(data) == 4:
             if now_ns - self.fed_ns > self._silence_ns:
                 self.supervise(now_ns)
-            (torque,) = _UNPACK_FLOAT(data)
+            torque = f.float_at(data, 0)
             if -FLOAT32_MAX <= torque <= FLOAT32_MAX:
                 self.fed_ns = now_ns
                 self.input_torque_shaft = torque
@@ -112,7 +111,7 @@ class OdriveNode(LocalAxis):
         if now_ns < self._next_other_ns:
             if not encoder:
                 return _NONE
-            period_ns = self.parameters.period_ns[Command.GET_ENCODER_ESTIMATES]
+            period_ns = self._encoder_period_ns
             self._next_encoder_ns = (now_ns // period_ns + 1) * period_ns
             return (self._encoder_estimates(),)
         return self._due(now_ns)
@@ -138,7 +137,7 @@ class OdriveNode(LocalAxis):
 
     def _encoder_estimates(self) -> Frame:
         try:
-            data = _PACK_TWO(self.position, self.velocity)
+            data = f.floats_data(self.position, self.velocity)
         except OverflowError:  # a robot that diverges
             data = floats(self.position, self.velocity)
         return _new(Frame, (self._encoder_id, data))
@@ -179,6 +178,7 @@ class OdriveNode(LocalAxis):
                 else:
                     next_ns = min(next_ns, self._cyclic_ns[command])
         self._encoder_id = f.identifier(node, Command.GET_ENCODER_ESTIMATES)
+        self._encoder_period_ns = self.parameters.period_ns[Command.GET_ENCODER_ESTIMATES]
         self.setpoint_id = f.identifier(node, Command.SET_INPUT_TORQUE) if self._speaks else -1
         self._next_encoder_ns = encoder_ns
         self._next_other_ns = min(

@@ -18,15 +18,14 @@ HARDWARE: tuple[int, int, int] = (4, 4, 58)
 """Product line, version, variant: an ODrive Pro."""
 AMBIENT_C: Final = 25.0
 NOMINAL_V: Final = 24.0
-_pack: Final = f.TWO_FLOATS.pack
 
 
 def floats(first: float, second: float) -> bytes:
     """Two floats for the wire."""
     try:
-        return _pack(first, second)
+        return f.floats_data(first, second)
     except OverflowError:
-        return _pack(_single(first), _single(second))
+        return f.floats_data(_single(first), _single(second))
 
 
 def version(axis: LocalAxis) -> bytes:

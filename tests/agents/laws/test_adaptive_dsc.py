@@ -91,8 +91,11 @@ def test_turning_the_whole_world_changes_no_torque() -> None:
 
 def test_a_limited_law_keeps_its_estimates_and_moves_its_filters() -> None:
     made = AdaptiveDsc(BRIEF.law.parameters, BRIEF.wheels, H, NO_PATH)
-    before = DscState(0.0, 0.0, 0.0, (1.0,) * 4, (2.0,) * 4, 3.0)
-    after = DscState(4.0, 5.0, 6.0, (7.0,) * 4, (8.0,) * 4, 9.0)
+    before = DscState((0.0, 0.0, 0.0), (1.0,) * 4, (2.0,) * 4, 3.0)
+    after = DscState((4.0, 5.0, 6.0), (7.0,) * 4, (8.0,) * 4, 9.0)
     held = made.hold(before, after)
-    assert held == DscState(4.0, 5.0, 6.0, (1.0,) * 4, (2.0,) * 4, 3.0)
-    assert made.hold(None, after) == DscState(4.0, 5.0, 6.0, (0.0,) * 4, (0.0,) * 4, 0.0)
+    assert held.filters == (4.0, 5.0, 6.0)
+    assert (held.theta_1, held.theta_2, held.kappa) == ((1.0,) * 4, (2.0,) * 4, 3.0)
+    first = made.hold(None, after)
+    assert first.filters == (4.0, 5.0, 6.0)
+    assert (first.theta_1, first.theta_2, first.kappa) == ((0.0,) * 4, (0.0,) * 4, 0.0)
