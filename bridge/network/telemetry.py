@@ -8,7 +8,9 @@ import struct
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from bridge.frame import Frame
+from librt.strings import BytesWriter, write_i64_le
+
+from bridge.frame import Frame, write_frame
 from bridge.network.link import Publisher
 from bridge.network.messages import Rows
 from configs.brief import ROWS_WITHIN_NS, UNWATCHED_ROWS_WITHIN_NS
@@ -161,7 +163,6 @@ class RowLooks:
 
 FRAME_ROW: Final = struct.Struct("<qIBB2x8s")
 """A frame that crossed a bus: end in bus time [ns], SocketCAN's identifier, length, flags, data."""
-_TWO_FRAMES: Final = struct.Struct("<qIBB2x8sqIBB2x8s")
 FROM_DRIVE: Final = 1
 """Flag of a frame that a drive sent."""
 BLOCK_FRAMES: Final = 1024
@@ -177,30 +178,20 @@ def no_tap(end_ns: int, frames: Sequence[Frame], flags: int) -> None:
 class FrameBuffer:
     """Gathers the frames of one bus and hands them on as blocks: (first, count, frames, final)."""
 
-    __slots__ = ("_block", "_count", "_first", "_hand_on", "_pack_two")
+    __slots__ = ("_block", "_count", "_first", "_hand_on")
 
     def __init__(self, hand_on: Callable[[int, int, bytes, bool], None]) -> None:
         self._hand_on = hand_on
-        self._pack_two = _TWO_FRAMES.pack_into
-        self._block = bytearray(BLOCK_FRAMES * FRAME_ROW.size)
+        self._block = BytesWriter()
         self._first = 0
         self._count = 0
 
     def add(self, end_ns: int, frames: Sequence[Frame], flags: int) -> None:
         """Add frames that ended at one bus time."""
-        count = self._count
-        if len(frames) == 2 and count < BLOCK_FRAMES - 2:
-            (id_1, data_1), (id_2, data_2) = frames
-            n_1, n_2 = len(data_1), len(data_2)
-            at = count * FRAME_ROW.size
-            self._pack_two(
-                self._block, at, end_ns, id_1, n_1, flags, data_1, end_ns, id_2, n_2, flags, data_2
-            )
-            self._count = count + 2
-            return
-        for can_id, data in frames:
-            at = self._count * FRAME_ROW.size
-            FRAME_ROW.pack_into(self._block, at, end_ns, can_id, len(data), flags, data)
+        block = self._block
+        for frame in frames:
+            write_i64_le(block, end_ns)
+            write_frame(block, frame, flags)
             self._count += 1
             if self._count == BLOCK_FRAMES:
                 self._flush(final=False)
@@ -210,7 +201,7 @@ class FrameBuffer:
         self._flush(final=True)
 
     def _flush(self, *, final: bool) -> None:
-        frames = bytes(memoryview(self._block)[: self._count * FRAME_ROW.size])
-        self._hand_on(self._first, self._count, frames, final)
+        self._hand_on(self._first, self._count, self._block.getvalue(), final)
+        self._block.truncate(0)
         self._first += self._count
         self._count = 0

@@ -25,8 +25,8 @@ class Controller(NamedTuple):
         agent, clock = self
         said: list[Frame] = []
         on_frame, due = agent.on_frame, clock.due
-        for at_ns, (can_id, data) in received:
-            on_frame(can_id, data, at_ns)
+        for at_ns, frame in received:
+            on_frame(frame.can_id, frame.data, at_ns)
             tick = due(at_ns)
             if tick is not None:
                 said += agent.step(tick)
@@ -59,8 +59,8 @@ class ControllerPort:
         for agent, clock in self._controllers.values():
             on_frame = agent.on_frame
             tick = None
-            for can_id, data in frames:
-                on_frame(can_id, data, stamp_ns)
+            for frame in frames:
+                on_frame(frame.can_id, frame.data, stamp_ns)
                 if tick is None:
                     tick = clock.due(stamp_ns)
                     if tick is not None:

@@ -42,7 +42,6 @@ _FOREIGN: Final = (
     Command.SET_LIMITS,
 )
 _PACK_TWO: Final = f.TWO_FLOATS.pack
-_new: Final = tuple.__new__  # of a frame, past its constructor: this is the hot path
 _UNPACK_TWO: Final = f.TWO_FLOATS.unpack
 
 _Handler = Callable[[bytes | bytearray, int], None]
@@ -233,7 +232,7 @@ class OdriveClient:
         of_right, of_left = self._to_wheel
         self.sent_wheel_N_m = (right * of_right, left * of_left)
         right_id, left_id = self._torque_ids
-        return _new(Frame, (right_id, both[:4])), _new(Frame, (left_id, both[4:]))
+        return Frame(right_id, both[:4]), Frame(left_id, both[4:])
 
     def disarm(self) -> Sequence[Frame]:
         """Torque 0 and idle for both wheels; the way to `armed` begins anew."""
