@@ -8,7 +8,7 @@ import struct
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from librt.strings import BytesWriter, write_i64_le
+from librt.strings import BytesWriter, write_f64_le, write_i64_le
 
 from bridge.frame import Frame, write_frame
 from bridge.network.link import Publisher
@@ -57,7 +57,7 @@ class RowBuffer:
 
     __slots__ = (
         *("_age_ns", "_block", "_count", "_due_ns", "_first_tick", "_hand_on", "_late_ns"),
-        *("_look_ns", "_pack_into", "_seen", "_size", "_unwatched_age_ns", "_watched"),
+        *("_look_ns", "_seen", "_size", "_unwatched_age_ns", "_watched"),
     )
 
     def __init__(
@@ -75,19 +75,27 @@ class RowBuffer:
         self._seen = False  # whether it is known since when there is a row, and so:
         self._due_ns = 0  # when the block goes on if somebody watches
         self._late_ns = 0  # and when in any case
-        self._pack_into = row.pack_into
         self._size = row.size
-        self._block = bytearray(BLOCK_TICKS * row.size)
+        self._block = BytesWriter()
         self._first_tick = 0
         self._count = 0
 
     def add(self, tick: int, row: Sequence[float]) -> None:
-        """Add the row of one tick."""
-        count = self._count
+        """Add the row of one tick.
+
+        Raises:
+            ValueError: it has more or fewer values than the table of signals.
+        """
+        block, count = self._block, self._count
         if count == 0:
             self._first_tick = tick
-        self._pack_into(self._block, count * self._size, *row)
+        for value in row:
+            write_f64_le(block, value)
         self._count = count = count + 1
+        if len(block) != count * self._size:
+            raise ValueError(
+                f"tick {tick}: a row of {len(row)} values instead of {self._size // 8}"
+            )
         if count == BLOCK_TICKS:
             self._flush(final=False)
 
@@ -127,8 +135,8 @@ class RowBuffer:
         self._hand_on(self._first_tick, 0, b"", False)
 
     def _flush(self, *, final: bool) -> None:
-        rows = bytes(memoryview(self._block)[: self._count * self._size])
-        self._hand_on(self._first_tick, self._count, rows, final)
+        self._hand_on(self._first_tick, self._count, self._block.getvalue(), final)
+        self._block.truncate(0)
         self._first_tick += self._count
         self._count = 0
         self._seen = False

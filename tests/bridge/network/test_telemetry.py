@@ -1,5 +1,8 @@
 """Rows and blocks of telemetry."""
 
+import struct
+
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.controller_rows import SIGNALS
@@ -40,6 +43,27 @@ def test_blocks_are_consecutive_whole_and_end_with_a_final_one() -> None:
     rows = b"".join(block for _, _, block, _ in blocks)
     ticks = [row[0] for row in PLANT_ROW.iter_unpack(rows)]
     assert ticks == [float(k) for k in range(2 * BLOCK_TICKS + 3)]
+
+
+@given(st.lists(st.lists(st.floats(), min_size=3, max_size=3), max_size=10))
+def test_a_row_is_its_values_as_float64_bit_for_bit(values: list[list[float]]) -> None:
+    row = struct.Struct("<3d")
+    blocks: list[tuple[int, int, bytes, bool]] = []
+    buffer = RowBuffer(row, lambda *block: blocks.append(block))
+    for tick, of_tick in enumerate(values):
+        buffer.add(tick, of_tick)
+    buffer.finish()
+    ((first, count, rows, final),) = blocks
+    assert (first, count, final) == (0, len(values), True)
+    assert rows == b"".join(row.pack(*of_tick) for of_tick in values)
+
+
+@pytest.mark.parametrize("length", [0, 2, 4])
+def test_a_row_of_another_length_than_the_tables_is_refused(length: int) -> None:
+    buffer = RowBuffer(struct.Struct("<3d"), lambda *_: None)
+    buffer.add(0, (1.0, 2.0, 3.0))
+    with pytest.raises(ValueError, match=f"tick 1: a row of {length} values instead of 3"):
+        buffer.add(1, [0.0] * length)
 
 
 def test_before_an_absence_all_is_handed_on_and_the_end_of_the_run_is_named() -> None:
