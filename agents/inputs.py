@@ -119,8 +119,8 @@ def feed(agent: Agent, entry: Input) -> Sequence[Frame]:
     """
     match entry.kind:
         case Kind.FRAME:
-            can_id, data = entry.frame()
-            agent.on_frame(can_id, data, entry.time_ns)
+            frame = entry.frame()
+            agent.on_frame(frame.can_id, frame.data, entry.time_ns)
         case Kind.TICK:
             return agent.step(entry.tick())
         case Kind.CLOCK:

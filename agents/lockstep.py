@@ -143,8 +143,8 @@ class LockstepLoop:
         self._asked_ns = self._told_ns = self._clock.monotonic_ns()
         next_tick = first_tick
         while True:
-            for at_ns, (can_id, data) in frames:
-                on_frame(can_id, data, at_ns)
+            for at_ns, frame in frames:
+                on_frame(frame.can_id, frame.data, at_ns)
                 tick = clock.due(at_ns)
                 if tick is not None:
                     if self._tick(tick, stop):

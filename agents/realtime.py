@@ -290,13 +290,13 @@ class RealtimeLoop:
 
     def _take(self, frame: Frame, came_ns: int) -> None:
         """Give the agent one frame that came at a time; measure the round trip that it ends."""
-        agent, (can_id, data) = self._agent, frame
-        if can_id & ERR:
+        agent = self._agent
+        if frame.can_id & ERR:
             self.counters.error_frames += 1
             return
         if self._echoes is not None and self._echoes.is_echo(frame, came_ns * 1e-9):
             return
-        agent.on_frame(can_id, data, came_ns - self._power_up_ns)
+        agent.on_frame(frame.can_id, frame.data, came_ns - self._power_up_ns)
         if self._sent_ns and agent.feedback_since(self._sent_ns - self._power_up_ns):
             self._round_trip_s = (came_ns - self._sent_ns) * 1e-9
             self._sent_ns = 0

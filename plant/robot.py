@@ -130,7 +130,7 @@ class EmulatedRobot:
 
     def on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Give one frame from the bus to the drives that it may concern; return their replies."""
-        can_id, right, left = frame[0], self._right, self._left
+        can_id, right, left = frame.can_id, self._right, self._left
         if can_id == right.setpoint_id != left.setpoint_id:
             return right.on_frame(frame, now_ns)
         if can_id == left.setpoint_id != right.setpoint_id:

@@ -155,7 +155,7 @@ class BusClient:
         Raises:
             can.CanOperationError: no classic frame, the bus is gone, or no credit in time.
         """
-        if wrong := flaw(frame[0], len(frame[1])):
+        if wrong := flaw(frame.can_id, len(frame.data)):
             raise can.CanOperationError(f"bus {self.channel!r}: not sent: {wrong}")
         if self._queue:
             self._await_credit(timeout_s)

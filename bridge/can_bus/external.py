@@ -113,12 +113,12 @@ class ExternalBuses:
         """Send frames of the drives, in order; what can't be sent is dropped and counted."""
         attachment = self._all[name]
         bus, echoes = attachment.bus, attachment.echoes
-        for n, (can_id, data) in enumerate(frames):
+        for n, frame in enumerate(frames):
             try:
                 if bus is not None:
-                    bus.send(to_message(can_id, data))
+                    bus.send(to_message(frame.can_id, frame.data))
                     if echoes is not None:
-                        echoes.sent(Frame(can_id, data), self._clock.monotonic_s())
+                        echoes.sent(frame, self._clock.monotonic_s())
             except _FAILURES as error:
                 self._note_failure(attachment, error)
                 bus = None

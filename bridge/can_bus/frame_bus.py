@@ -49,7 +49,7 @@ class MessageBus:
 
     def send(self, frame: Frame) -> None:
         """Send one frame as a message."""
-        self._bus.send(to_message(*frame))
+        self._bus.send(to_message(frame.can_id, frame.data))
 
 
 def in_frames(bus: can.BusABC) -> FrameBus:

@@ -364,6 +364,6 @@ class Hub:
 
 def _without_errors(frames: Sequence[Frame]) -> Sequence[Frame]:
     """What drives hear of these."""
-    if any(can_id & ERR for can_id, _ in frames):
+    if any(frame.can_id & ERR for frame in frames):
         return [frame for frame in frames if not frame.can_id & ERR]
     return frames

@@ -193,12 +193,12 @@ class FleetloopBus(can.BusABC):
         timestamp, channel, is_rx = stamp_ns / 1e9, self.channel, not flags & OWN
         put = self._inbox.append
         if before_ns:
-            for (can_id, content), ago_ns in zip(packet.frames, before_ns, strict=True):
+            for frame, ago_ns in zip(packet.frames, before_ns, strict=True):
                 at = (stamp_ns - ago_ns) / 1e9
-                put(to_message(can_id, content, at, channel, is_rx))
+                put(to_message(frame.can_id, frame.data, at, channel, is_rx))
             return
-        for can_id, content in packet.frames:
-            put(to_message(can_id, content, timestamp, channel, is_rx))
+        for frame in packet.frames:
+            put(to_message(frame.can_id, frame.data, timestamp, channel, is_rx))
 
 
 _KEYWORDS = frozenset(inspect.signature(FleetloopBus).parameters) - {"channel", "kwargs"}

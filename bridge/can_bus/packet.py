@@ -29,7 +29,9 @@ import struct
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from bridge.frame import ERR, ID_MASK_11, MAX_DATA, RTR, Frame, flaw
+from librt.strings import BytesWriter, read_i32_le, read_i64_le, write_i64_le
+
+from bridge.frame import ERR, ID_MASK_11, MAX_DATA, RTR, Frame, flaw, write_frame
 
 VERSION: Final = 3
 HELLO, WELCOME, REFUSED, FRAMES, BYE, LOST = 1, 2, 3, 4, 5, 6
@@ -38,13 +40,9 @@ MAX_FRAMES: Final = 1024
 MAX_BYTES: Final = 16 + 20 * MAX_FRAMES
 LONGEST_BEFORE_NS: Final = 2**32 - 1
 
-_new: Final = tuple.__new__  # of the tuples below, past their constructor: the hot path
 _HEADER: Final = struct.Struct("<BBHIq")
-_FRAME: Final = struct.Struct("<IB3x8s")
-_ONE: Final = struct.Struct("<BBHIqIB3x8s")
-_TWO: Final = struct.Struct("<BBHIqIB3x8sIB3x8s")
-_ONE_SIZE: Final = 32
-_TWO_SIZE: Final = 48
+_HEADER_SIZE: Final = 16
+_FRAME_SIZE: Final = 16
 
 Key = str | int
 """A client of a bus: the name of the robot that it controls in lockstep, else a number."""
@@ -122,26 +120,24 @@ class Packet:
 
 def encode_frames(flags: int, stamp_ns: int, frames: Sequence[Frame]) -> bytes:
     """A FRAMES packet of one instant: `MAX_FRAMES` frames of 8 bytes at most."""
-    count = len(frames)
-    if count == 2:
-        (id_1, data_1), (id_2, data_2) = frames
-        return _TWO.pack(
-            FRAMES, flags, 2, 0, stamp_ns, id_1, len(data_1), data_1, id_2, len(data_2), data_2
-        )
-    if count == 1:
-        ((can_id, data),) = frames
-        return _ONE.pack(FRAMES, flags, 1, 0, stamp_ns, can_id, len(data), data)
-    body = [_FRAME.pack(can_id, len(data), data) for can_id, data in frames]
-    return _HEADER.pack(FRAMES, flags, count, 0, stamp_ns) + b"".join(body)
+    packet = BytesWriter()
+    write_i64_le(packet, FRAMES | flags << 8 | len(frames) << 16)
+    write_i64_le(packet, stamp_ns)
+    for frame in frames:
+        write_frame(packet, frame)
+    return packet.getvalue()
 
 
 def encode_stamped(flags: int, stamp_ns: int, frames: Sequence[Stamped], credit: int) -> bytes:
     """A FRAMES packet of frames that ended at or before `stamp_ns`, each at its own time."""
     count = len(frames)
-    body = [_FRAME.pack(can_id, len(data), data) for _, (can_id, data) in frames]
+    packet = BytesWriter()
+    packet.write(_HEADER.pack(FRAMES, flags, count, credit & 0xFFFF_FFFF, stamp_ns))
+    for stamped in frames:
+        write_frame(packet, stamped.frame)
     before = [min(stamp_ns - end_ns, LONGEST_BEFORE_NS) for end_ns, _ in frames]
-    header = _HEADER.pack(FRAMES, flags, count, credit & 0xFFFF_FFFF, stamp_ns)
-    return header + b"".join(body) + struct.pack(f"<{count}I", *before)
+    packet.write(struct.pack(f"<{count}I", *before))
+    return packet.getvalue()
 
 
 def split(flags: int, stamp_ns: int, frames: Sequence[Stamped], credit: int) -> Iterator[bytes]:
@@ -180,50 +176,37 @@ def encode_lost(frames: int) -> bytes:
 def decode(packet: bytes) -> Packet | None:
     """The packet in the bytes, None if there is none."""
     size = len(packet)
-    if size == _TWO_SIZE and packet[0] == FRAMES and packet[2] == 2 and packet[3] == 0:
-        kind, flags, count, credit, stamp, id_1, n_1, data_1, id_2, n_2, data_2 = _TWO.unpack(
-            packet
-        )
-        if n_1 <= MAX_DATA and n_2 <= MAX_DATA and id_1 <= ID_MASK_11 and id_2 <= ID_MASK_11:
-            both = (_frame(id_1, n_1, data_1), _frame(id_2, n_2, data_2))
-            return Packet(kind, flags, count, stamp, credit, both)
-    if size == _ONE_SIZE and packet[0] == FRAMES and packet[2] == 1 and packet[3] == 0:
-        kind, flags, count, credit, stamp, can_id, n, data = _ONE.unpack(packet)
-        if n <= MAX_DATA and can_id <= ID_MASK_11:
-            return Packet(kind, flags, count, stamp, credit, (_frame(can_id, n, data),))
-    if size < _HEADER.size:
+    if size < _HEADER_SIZE:
         return None
-    kind, flags, count, credit, stamp = _HEADER.unpack_from(packet)
-    found = Packet(kind, flags, count, stamp, credit)
-    body = packet[_HEADER.size :]
+    kind, count = packet[0], packet[2] | packet[3] << 8
+    credit = int(read_i32_le(packet, 4)) & 0xFFFF_FFFF
+    found = Packet(kind, packet[1], count, int(read_i64_le(packet, 8)), credit)
     if kind == FRAMES:
-        return found if _decode_frames(found, body) else None
+        return found if _decode_frames(found, packet) else None
     if HELLO <= kind <= LOST:
-        found.text = body.decode("utf-8", "replace")
+        found.text = packet[_HEADER_SIZE:].decode("utf-8", "replace")
         return found
     return None
 
 
-def _frame(can_id: int, length: int, data: bytes) -> Frame:
-    return _new(Frame, (can_id, data if length == MAX_DATA else data[:length]))
-
-
-def _decode_frames(found: Packet, body: bytes) -> bool:
+def _decode_frames(found: Packet, packet: bytes) -> bool:
     """Put the frames in the bytes into their packet; False: it is none."""
     count = found.number
-    end = count * _FRAME.size
-    if count > MAX_FRAMES or len(body) not in (end, end + 4 * count):
+    end = _HEADER_SIZE + count * _FRAME_SIZE
+    stamped = len(packet) != end
+    if count > MAX_FRAMES or (stamped and len(packet) != end + 4 * count):
         return False
-    before = struct.unpack(f"<{count}I", body[end:]) if len(body) > end else ()
     frames, kept = [], []
-    for n, (can_id, length, data) in enumerate(_FRAME.iter_unpack(body[:end])):
+    for n in range(count):
+        at = _HEADER_SIZE + n * _FRAME_SIZE
+        can_id, length = int(read_i32_le(packet, at)) & 0xFFFF_FFFF, packet[at + 4]
         if (can_id > ID_MASK_11 or length > MAX_DATA) and flaw(can_id, length):
             continue
-        content = bytes(length) if can_id & RTR else data[:length]
-        frames.append(Frame(can_id, content))
+        data = bytes(length) if can_id & RTR else packet[at + 8 : at + 8 + length]
+        frames.append(Frame(can_id, data))
         kept.append(n)
-    found.flawed = count - len(kept)
-    if found.flawed and before:
-        before = tuple(before[n] for n in kept)
-    found.frames, found.before_ns = tuple(frames), before
+    found.frames, found.flawed = tuple(frames), count - len(kept)
+    if stamped:
+        before = struct.unpack(f"<{count}I", packet[end:])
+        found.before_ns = tuple([before[n] for n in kept])
     return True

@@ -15,7 +15,6 @@ from configs.errors import InfrastructureError
 
 _Message = can.Message
 _new = object.__new__
-_new_frame = tuple.__new__
 
 
 class BusClosedError(can.CanOperationError):
@@ -95,7 +94,7 @@ def to_frame(message: can.Message) -> Frame:
             and type(data) is bytearray
             and len(data) == message.dlc <= MAX_DATA
         ):
-            return _new_frame(Frame, (can_id, bytes(data)))
+            return Frame(can_id, bytes(data))
     return _checked(message)
 
 

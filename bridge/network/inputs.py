@@ -213,4 +213,4 @@ class InputBuffer:
 
 
 def _packed(frames: Sequence[Frame]) -> bytes:
-    return b"".join([_SENT.pack(can_id, len(data)) + data for can_id, data in frames])
+    return b"".join([_SENT.pack(it.can_id, len(it.data)) + it.data for it in frames])

@@ -8,9 +8,9 @@ import struct
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from librt.strings import BytesWriter, write_f64_le
+from librt.strings import BytesWriter, write_f64_le, write_i64_le
 
-from bridge.frame import Frame
+from bridge.frame import Frame, write_frame
 from bridge.network.link import Publisher
 from bridge.network.messages import Rows
 from configs.brief import ROWS_WITHIN_NS, UNWATCHED_ROWS_WITHIN_NS
@@ -59,7 +59,7 @@ class RowBuffer:
 
     __slots__ = (
         *("_age_ns", "_block", "_count", "_due_ns", "_first_tick", "_hand_on", "_handed_on"),
-        *("_late_ns", "_look_ns", "_row", "_seen", "_unwatched_age_ns", "_watched"),
+        *("_late_ns", "_look_ns", "_row", "_seen", "_size", "_unwatched_age_ns", "_watched"),
     )
 
     def __init__(
@@ -78,13 +78,18 @@ class RowBuffer:
         self._due_ns = 0  # when the block goes on if somebody watches
         self._late_ns = 0  # and when in any case
         self._row = row
+        self._size = row.size
         self._block = BytesWriter()
         self._handed_on = b""  # the block before
         self._first_tick = 0
         self._count = 0
 
     def add(self, tick: int, row: Sequence[float]) -> None:
-        """Add the row of one tick."""
+        """Add the row of one tick.
+
+        Raises:
+            ValueError: it has more or fewer values than the table of signals.
+        """
         self.begin(tick)
         for value in row:
             write_f64_le(self._block, value)
@@ -100,8 +105,18 @@ class RowBuffer:
         write_f64_le(self._block, value)
 
     def end(self) -> None:
-        """The row is complete."""
+        """The row is complete.
+
+        Raises:
+            ValueError: it has more or fewer values than the table of signals.
+        """
         self._count = count = self._count + 1
+        if len(self._block) != count * self._size:
+            tick, values = self._first_tick + count - 1, len(self._block) // 8
+            raise ValueError(
+                f"tick {tick}: a row of {values - (count - 1) * self._size // 8} values instead of"
+                f" {self._size // 8}"
+            )
         if count == BLOCK_TICKS:
             self._flush(final=False)
 
@@ -186,7 +201,6 @@ class RowLooks:
 
 FRAME_ROW: Final = struct.Struct("<qIBB2x8s")
 """A frame that crossed a bus: end in bus time [ns], SocketCAN's identifier, length, flags, data."""
-_TWO_FRAMES: Final = struct.Struct("<qIBB2x8sqIBB2x8s")
 FROM_DRIVE: Final = 1
 """Flag of a frame that a drive sent."""
 BLOCK_FRAMES: Final = 1024
@@ -202,30 +216,20 @@ def no_tap(end_ns: int, frames: Sequence[Frame], flags: int) -> None:
 class FrameBuffer:
     """Gathers the frames of one bus and hands them on as blocks: (first, count, frames, final)."""
 
-    __slots__ = ("_block", "_count", "_first", "_hand_on", "_pack_two")
+    __slots__ = ("_block", "_count", "_first", "_hand_on")
 
     def __init__(self, hand_on: Callable[[int, int, bytes, bool], None]) -> None:
         self._hand_on = hand_on
-        self._pack_two = _TWO_FRAMES.pack_into
-        self._block = bytearray(BLOCK_FRAMES * FRAME_ROW.size)
+        self._block = BytesWriter()
         self._first = 0
         self._count = 0
 
     def add(self, end_ns: int, frames: Sequence[Frame], flags: int) -> None:
         """Add frames that ended at one bus time."""
-        count = self._count
-        if len(frames) == 2 and count < BLOCK_FRAMES - 2:
-            (id_1, data_1), (id_2, data_2) = frames
-            n_1, n_2 = len(data_1), len(data_2)
-            at = count * FRAME_ROW.size
-            self._pack_two(
-                self._block, at, end_ns, id_1, n_1, flags, data_1, end_ns, id_2, n_2, flags, data_2
-            )
-            self._count = count + 2
-            return
-        for can_id, data in frames:
-            at = self._count * FRAME_ROW.size
-            FRAME_ROW.pack_into(self._block, at, end_ns, can_id, len(data), flags, data)
+        block = self._block
+        for frame in frames:
+            write_i64_le(block, end_ns)
+            write_frame(block, frame, flags)
             self._count += 1
             if self._count == BLOCK_FRAMES:
                 self._flush(final=False)
@@ -235,7 +239,7 @@ class FrameBuffer:
         self._flush(final=True)
 
     def _flush(self, *, final: bool) -> None:
-        frames = bytes(memoryview(self._block)[: self._count * FRAME_ROW.size])
-        self._hand_on(self._first, self._count, frames, final)
+        self._hand_on(self._first, self._count, self._block.getvalue(), final)
+        self._block.truncate(0)
         self._first += self._count
         self._count = 0

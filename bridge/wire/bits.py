@@ -111,7 +111,7 @@ def arbitration_key(can_id: int) -> int:
 
 def _fields(frame: Frame) -> tuple[int, int, bytes]:
     """Start through control field as a number, its bits, and the data that follow."""
-    can_id, data = frame
+    can_id, data = frame.can_id, frame.data
     length = len(data)
     if wrong := flaw(can_id, length) or ("an error frame has no length" if can_id & ERR else ""):
         raise ValueError(f"frame 0x{can_id:X}: {wrong}")

@@ -189,7 +189,9 @@ def _print_all(listener: Listener, wanted: dict[str, Filter], options: DumpOptio
         wait_s = None if silent_at is None else silent_at - SYSTEM_CLOCK.monotonic_s()
         if wait_s is not None and wait_s <= 0:
             return
-        heard = [item for item in listener.listen(wait_s) if wanted[item.bus].passes(item[1][0])]
+        heard = [
+            item for item in listener.listen(wait_s) if wanted[item.bus].passes(item.frame.can_id)
+        ]
         if not heard:
             continue
         heard = heard[:left]

@@ -70,7 +70,7 @@ def ask(bus: FleetloopBus, name: str, within_s: float, file: EndpointFile) -> Ve
             message = bus.recv(left_s)
             request = query.on_frame(to_frame(message)) if message is not None else None
             if request is not None:
-                bus.send(to_message(*request), left_s)
+                bus.send(to_message(request.can_id, request.data), left_s)
     except can.CanError as error:
         raise InfrastructureError(str(error)) from error
     if query.versions is None:

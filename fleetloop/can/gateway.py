@@ -130,7 +130,7 @@ class Gateway:
         with self._lock:
             self.guard.sent(frame, now_s)
         # A message of its own: some interfaces take the channel from the message.
-        self.far.send(to_message(*frame), SEND_S)
+        self.far.send(to_message(frame.can_id, frame.data), SEND_S)
         self.outward.passes(now_s)
 
     # --- from the far one to ours ----------------------------------------------------------------
@@ -181,7 +181,7 @@ class Gateway:
             counters.echoes += 1
             return
         try:
-            self.near.send(to_message(*frame), WAIT_S)
+            self.near.send(to_message(frame.can_id, frame.data), WAIT_S)
         except BusClosedError:
             raise
         except can.CanOperationError:

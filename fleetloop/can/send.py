@@ -34,7 +34,7 @@ def send(
         ScenarioError: a text is no frame; nothing was sent.
         InfrastructureError: no such bus, or it ended.
     """
-    messages = [to_message(*text.parse(frame)) for frame in frames]
+    messages = [to_message(it.can_id, it.data) for it in map(text.parse, frames)]
     with open_bus(channel) as bus:
         sent = 0
         start = clock.monotonic_s()

@@ -108,7 +108,7 @@ class Port:
             self._kept += reply[: max(2 * KEPT_BYTES - len(self._kept), 0)]
             for frame in frames:
                 try:
-                    self._bus.send(to_message(*frame), 0.1)
+                    self._bus.send(to_message(frame.can_id, frame.data), 0.1)
                     self.counters.sent += 1
                 except BusClosedError:
                     raise

@@ -79,7 +79,7 @@ class Adapter:
 
     def show(self, frame: Frame, stamp_ns: int) -> bytes:
         """The line for a frame of the bus, empty if the software doesn't want it."""
-        can_id, data = frame
+        can_id, data = frame.can_id, frame.data
         if not self.opened:
             return b""
         if can_id & ERR:

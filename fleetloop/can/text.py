@@ -25,7 +25,7 @@ _DATA = re.compile(r"(?:\.?[0-9A-Fa-f]{2})*")
 
 def compact(frame: Frame) -> str:
     """The frame as `candump -L` prints it and `cansend` reads it."""
-    can_id, data = frame
+    can_id, data = frame.can_id, frame.data
     head = f"{_identifier(can_id)}#"
     if can_id & RTR and not can_id & ERR:
         return f"{head}R{len(data) or ''}"
@@ -40,7 +40,7 @@ def long(frame: Frame, *, indent: bool = False, ascii_too: bool = False) -> str:
         indent: shift an 11-bit identifier to where a 29-bit one ends.
         ascii_too: append the data as characters.
     """
-    can_id, data = frame
+    can_id, data = frame.can_id, frame.data
     shift = _INDENT if indent and not can_id & (EFF | ERR) else ""
     head = f"{shift}{_identifier(can_id)}   [{len(data)}] "
     if can_id & RTR and not can_id & ERR:

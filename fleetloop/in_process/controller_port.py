@@ -23,8 +23,8 @@ class Controller:
         agent, clock = self._agent, self._clock
         said: Sequence[Frame] = ()
         tick = None
-        for can_id, data in frames:
-            agent.on_frame(can_id, data, stamp_ns)
+        for frame in frames:
+            agent.on_frame(frame.can_id, frame.data, stamp_ns)
             if tick is None:
                 tick = clock.due(stamp_ns)
                 if tick is not None:
@@ -39,8 +39,8 @@ class Controller:
         """The answer to a question of a bus time: frames with their bus times."""
         agent, clock = self._agent, self._clock
         said: list[Frame] = []
-        for at_ns, (can_id, data) in received:
-            agent.on_frame(can_id, data, at_ns)
+        for at_ns, frame in received:
+            agent.on_frame(frame.can_id, frame.data, at_ns)
             tick = clock.due(at_ns)
             if tick is not None:
                 said += agent.step(tick)

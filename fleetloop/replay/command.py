@@ -218,7 +218,7 @@ def _draw(verdict: Verdict, options: ReplayOptions, out: Path) -> None:
 
 def _words(frames: Sequence[Frame]) -> str:
     """Frames in cansend's syntax."""
-    return " ".join(f"{can_id:03X}#{data.hex().upper()}" for can_id, data in frames) or "none"
+    return " ".join(f"{it.can_id:03X}#{it.data.hex().upper()}" for it in frames) or "none"
 
 
 def _as_json(verdict: Verdict, options: ReplayOptions) -> dict[str, object]:

@@ -112,7 +112,10 @@ class Wire(can.BusABC):
         if self.error is not None and not self.told and self.error is not FULL:
             self.told = True
             raise self.error
-        return to_message(*self.inbox.popleft()) if self.inbox else None
+        if not self.inbox:
+            return None
+        frame = self.inbox.popleft()
+        return to_message(frame.can_id, frame.data)
 
 
 class PoseLink:

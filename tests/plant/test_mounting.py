@@ -27,7 +27,7 @@ def driven(*overrides: str) -> tuple[tuple[float, ...], tuple[float, ...], Emula
     for k in range(50):
         robot.advance(k * 0.002, 0.002, 2)
     for frame in robot.frames_due(100_000_000):
-        client.on_frame(*frame, 100_000_000)
+        client.on_frame(frame.can_id, frame.data, 100_000_000)
     motion = client.motion()
     assert motion is not None
     return motion, robot.row(0.1), robot

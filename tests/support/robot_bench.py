@@ -85,7 +85,7 @@ class Bench:
                 command = Command(frame.can_id & 0x1F)
                 node = axis.node_id
                 if node not in self.silent and (node, command) not in self.mute:
-                    self.agent.on_frame(*frame, now_ns)
+                    self.agent.on_frame(frame.can_id, frame.data, now_ns)
         if self.pose is not None and self.schedule.localises(tick):
             self.agent.receive_pose(PoseFix(tick, tick * self.schedule.period_ns, *self.pose))
 
@@ -118,7 +118,7 @@ class Bench:
         frame = Frame(identifier(node, Command.ESTOP), b"")
         self.axes[node].on_frame(frame, self.now_ns)
         if heard:
-            self.agent.on_frame(*frame, self.now_ns)
+            self.agent.on_frame(frame.can_id, frame.data, self.now_ns)
 
     def reboot(self, node: int) -> None:
         """A drive loses its power for a moment: idle, without an error, limits forgotten."""

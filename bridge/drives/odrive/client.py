@@ -41,7 +41,6 @@ _FOREIGN: Final = (
     Command.SET_INPUT_TORQUE,
     Command.SET_LIMITS,
 )
-_new: Final = tuple.__new__  # of a frame, past its constructor: this is the hot path
 
 _Handler = Callable[[bytes | bytearray, int], None]
 
@@ -236,7 +235,7 @@ class OdriveClient(DriveClient):
             )
         of_right, of_left = self._to_wheel
         self.sent_wheel_N_m = (f.float_at(right, 0) * of_right, f.float_at(left, 0) * of_left)
-        return _new(Frame, (self._right_id, right)), _new(Frame, (self._left_id, left))
+        return Frame(self._right_id, right), Frame(self._left_id, left)
 
     def disarm(self) -> Sequence[Frame]:
         """Torque 0 and idle for both wheels; the way to `armed` begins anew."""

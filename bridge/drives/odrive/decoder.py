@@ -130,7 +130,7 @@ LAYOUTS: Mapping[Command, Layout] = {
 
 def decode(frame: Frame) -> Message | None:
     """The message in a frame, None if it isn't CANSimple's. Missing bytes read as zero."""
-    can_id, data = frame
+    can_id, data = frame.can_id, frame.data
     if can_id & (EFF | ERR):
         return None
     number = can_id & 0x7FF
@@ -186,7 +186,7 @@ def _value(signal: Signal, raw: float) -> Value:
 
 def node_seen(frame: Frame) -> NodeSeen | None:
     """The node that a frame concerns, with its state if it is a heartbeat; None: no CANSimple."""
-    can_id, data = frame
+    can_id, data = frame.can_id, frame.data
     if can_id & (EFF | ERR) or (can_id & (1 << f.BITS) - 1) not in LAYOUTS:
         return None
     node, command = (can_id & 0x7FF) >> f.BITS, can_id & (1 << f.BITS) - 1

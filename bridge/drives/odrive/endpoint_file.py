@@ -49,7 +49,7 @@ class GetVersion:
 
     def on_frame(self, frame: Frame) -> Frame | None:
         """Process a frame from the bus; return the request at the first heartbeat."""
-        can_id, data = frame
+        can_id, data = frame.can_id, frame.data
         if self._node is None:
             command = can_id & ((1 << f.BITS) - 1)
             if can_id < 1 << 11 and command == Command.HEARTBEAT and len(data) == f.HEARTBEAT.size:

@@ -40,7 +40,6 @@ from bridge.frame import EFF, ERR, RTR, Frame
 ANSWER_WITHIN_NS: Final = 20_000_000
 """Longest delay of an unaddressed drive's answer to Address."""
 _NONE: Final[Sequence[Frame]] = ()
-_new: Final = tuple.__new__  # of a frame, past its constructor: this is the hot path
 
 
 class OdriveNode(LocalAxis):
@@ -86,7 +85,7 @@ class OdriveNode(LocalAxis):
 
     def on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """Process one frame from the bus; return the replies."""
-        can_id, data = frame
+        can_id, data = frame.can_id, frame.data
         if can_id == self.setpoint_id and len(data) == 4:
             if now_ns - self.fed_ns > self._silence_ns:
                 self.supervise(now_ns)
@@ -140,7 +139,7 @@ class OdriveNode(LocalAxis):
             data = f.floats_data(self.position, self.velocity)
         except OverflowError:  # a robot that diverges
             data = floats(self.position, self.velocity)
-        return _new(Frame, (self._encoder_id, data))
+        return Frame(self._encoder_id, data)
 
     # --- transmission ----------------------------------------------------------------------------
 
@@ -188,7 +187,7 @@ class OdriveNode(LocalAxis):
     # --- reception -------------------------------------------------------------------------------
 
     def _on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
-        can_id, data = frame
+        can_id, data = frame.can_id, frame.data
         node, command = (can_id & 0x7FF) >> f.BITS, can_id & 0x1F
         ours = self.parameters.node_id
         if command == Command.ADDRESS and node in (ours, f.UNADDRESSED):
@@ -218,7 +217,7 @@ class OdriveNode(LocalAxis):
         return _NONE
 
     def _frame(self, command: int, data: bytes) -> Frame:
-        return _new(Frame, (self.parameters.node_id << f.BITS | command, data))
+        return Frame(self.parameters.node_id << f.BITS | command, data)
 
     def _replan(self) -> None:
         self._cyclic_ns[Command.GET_ENCODER_ESTIMATES] = self._next_encoder_ns

@@ -104,7 +104,7 @@ def test_who_says_more_than_is_taken_is_not_read_until_it_is(
     for _ in range(sent):
         serving.hub.serve(0.0)
         taken += serving.hub.receive("r1")
-    ours = [int.from_bytes(data, "big") for can_id, data in taken if can_id == 1]
+    ours = [int.from_bytes(frame.data, "big") for frame in taken if frame.can_id == 1]
     assert ours == list(range(sent))
     assert Frame(2, b"") in taken
 

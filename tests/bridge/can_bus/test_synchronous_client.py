@@ -40,12 +40,12 @@ def answer_messages(bus: FleetloopBus) -> None:
 
 def answer_frames(bus: FleetloopBus) -> None:
     while True:
-        for _, (can_id, data) in bus.client.receive_timed_frames(10.0) or ():
-            if can_id == LEAVE:
+        for _, frame in bus.client.receive_timed_frames(10.0) or ():
+            if frame.can_id == LEAVE:
                 return
-            if can_id == 0x009:
-                bus.client.send(Frame(0x00E, data[:4]))
-                bus.client.send(Frame(0x02E, data[4:]))
+            if frame.can_id == 0x009:
+                bus.client.send(Frame(0x00E, frame.data[:4]))
+                bus.client.send(Frame(0x02E, frame.data[4:]))
 
 
 @pytest.fixture(params=[answer_messages, answer_frames])

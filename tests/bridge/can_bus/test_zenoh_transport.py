@@ -80,7 +80,7 @@ def test_frames_go_both_ways_lossless_in_order_and_without_echo(running: Running
         for frame in sent:
             running.deliver(frame, stamp_ns=2_500_000)
         heard = [guest.recv(5.0) for _ in sent]
-        assert [(m.arbitration_id, bytes(m.data)) for m in heard] == sent
+        assert [Frame(m.arbitration_id, bytes(m.data)) for m in heard] == sent
         assert {m.timestamp for m in heard} == {0.0025}
         for n in range(200):
             guest.send(can.Message(arbitration_id=0x300 + n, is_extended_id=False))

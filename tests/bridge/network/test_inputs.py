@@ -33,7 +33,7 @@ class Kept:
 @given(frame=FRAMES, at_ns=TICKS)
 def test_a_frame_comes_out_as_it_was(frame: Frame, at_ns: int) -> None:
     kept = Kept()
-    kept.buffer.frame(*frame, at_ns)
+    kept.buffer.frame(frame.can_id, frame.data, at_ns)
     (entry,) = entries(kept.log())
     assert (entry.kind, entry.time_ns, entry.frame()) == (Kind.FRAME, at_ns, frame)
 

@@ -1,10 +1,23 @@
 """Rows and blocks of telemetry."""
 
+import struct
+
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.controller_rows import SIGNALS
 
-from bridge.network.telemetry import BLOCK_TICKS, PLANT_ROW, RowBuffer, RowLooks
+from bridge.frame import Frame
+from bridge.network.telemetry import (
+    BLOCK_FRAMES,
+    BLOCK_TICKS,
+    FRAME_ROW,
+    FROM_DRIVE,
+    PLANT_ROW,
+    FrameBuffer,
+    RowBuffer,
+    RowLooks,
+)
 from configs.brief import ROWS_WITHIN_NS, UNWATCHED_ROWS_WITHIN_NS
 from configs.signals import PLANT_SIGNALS
 
@@ -30,6 +43,27 @@ def test_blocks_are_consecutive_whole_and_end_with_a_final_one() -> None:
     rows = b"".join(block for _, _, block, _ in blocks)
     ticks = [row[0] for row in PLANT_ROW.iter_unpack(rows)]
     assert ticks == [float(k) for k in range(2 * BLOCK_TICKS + 3)]
+
+
+@given(st.lists(st.lists(st.floats(), min_size=3, max_size=3), max_size=10))
+def test_a_row_is_its_values_as_float64_bit_for_bit(values: list[list[float]]) -> None:
+    row = struct.Struct("<3d")
+    blocks: list[tuple[int, int, bytes, bool]] = []
+    buffer = RowBuffer(row, lambda *block: blocks.append(block))
+    for tick, of_tick in enumerate(values):
+        buffer.add(tick, of_tick)
+    buffer.finish()
+    ((first, count, rows, final),) = blocks
+    assert (first, count, final) == (0, len(values), True)
+    assert rows == b"".join(row.pack(*of_tick) for of_tick in values)
+
+
+@pytest.mark.parametrize("length", [0, 2, 4])
+def test_a_row_of_another_length_than_the_tables_is_refused(length: int) -> None:
+    buffer = RowBuffer(struct.Struct("<3d"), lambda *_: None)
+    buffer.add(0, (1.0, 2.0, 3.0))
+    with pytest.raises(ValueError, match=f"tick 1: a row of {length} values instead of 3"):
+        buffer.add(1, [0.0] * length)
 
 
 def test_before_an_absence_all_is_handed_on_and_the_end_of_the_run_is_named() -> None:
@@ -101,3 +135,49 @@ def test_blocks_that_fill_in_time_are_not_divided() -> None:
     assert {count for _, _, count in handed_on(every_ns, 40_000_000, 4 * BLOCK_TICKS)} == {
         BLOCK_TICKS
     }
+
+
+any_frame = st.builds(Frame, st.integers(0, 2**32 - 1), st.binary(max_size=8))
+crossings = st.lists(
+    st.tuples(
+        st.integers(-(2**63), 2**63 - 1),
+        st.lists(any_frame, max_size=5),
+        st.sampled_from([0, FROM_DRIVE, 255]),
+    ),
+    max_size=20,
+)
+
+
+@given(crossings)
+def test_every_frame_that_crossed_a_bus_is_one_row(
+    crossed: list[tuple[int, list[Frame], int]],
+) -> None:
+    blocks: list[tuple[int, int, bytes, bool]] = []
+    buffer = FrameBuffer(lambda *block: blocks.append(block))
+    for end_ns, frames, flags in crossed:
+        buffer.add(end_ns, frames, flags)
+    buffer.finish()
+    ((first, count, rows, final),) = blocks
+    expected = [
+        (end_ns, frame.can_id, len(frame.data), flags, frame.data.ljust(8, b"\0"))
+        for end_ns, frames, flags in crossed
+        for frame in frames
+    ]
+    assert (first, count, final) == (0, len(expected), True)
+    assert list(FRAME_ROW.iter_unpack(rows)) == expected
+
+
+@given(st.integers(1, 7), st.integers(0, 3 * BLOCK_FRAMES // 7))
+@settings(max_examples=20)
+def test_blocks_of_frames_are_full_but_the_last_and_lose_nothing(together: int, times: int) -> None:
+    blocks: list[tuple[int, int, bytes, bool]] = []
+    buffer = FrameBuffer(lambda *block: blocks.append(block))
+    for k in range(times):
+        buffer.add(k, [Frame(n, bytes(n)) for n in range(together)], FROM_DRIVE)
+    buffer.finish()
+    firsts = [first for first, *_ in blocks]
+    assert firsts == [n * BLOCK_FRAMES for n in range(len(blocks))]
+    assert {count for _, count, *_ in blocks[:-1]} <= {BLOCK_FRAMES}
+    assert [final for *_, final in blocks] == [False] * (len(blocks) - 1) + [True]
+    rows = list(FRAME_ROW.iter_unpack(b"".join(rows for _, _, rows, _ in blocks)))
+    assert [row[:3] for row in rows] == [(k, n, n) for k in range(times) for n in range(together)]

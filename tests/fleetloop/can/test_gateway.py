@@ -56,7 +56,7 @@ def test_frames_go_both_ways_unchanged_and_none_comes_back(
         buses.await_clients(2)
         buses.deliver(ENCODER)
         heard = stranger.recv(5.0)
-        assert (heard.arbitration_id, bytes(heard.data)) == ENCODER
+        assert Frame(heard.arbitration_id, bytes(heard.data)) == ENCODER
         client.send(message(0x17, is_remote_frame=True, dlc=8))
         asked = stranger.recv(5.0)
         assert (asked.is_remote_frame, asked.dlc) == (True, 8)

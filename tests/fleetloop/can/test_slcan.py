@@ -145,7 +145,7 @@ SENT = [
 def test_python_can_s_slcan_sends_and_receives_every_kind_of_frame(buses, served) -> None:
     with software(served) as bus:
         for frame in SENT:
-            bus.send(to_message(*frame))
+            bus.send(to_message(frame.can_id, frame.data))
         assert buses.taken(len(SENT)) == SENT
         buses.deliver(*SENT)
         for frame in SENT:
@@ -153,7 +153,7 @@ def test_python_can_s_slcan_sends_and_receives_every_kind_of_frame(buses, served
             while heard is None:  # its replies come between, as None
                 heard = bus.recv(5.0)
             assert heard.equals(
-                to_message(*frame),
+                to_message(frame.can_id, frame.data),
                 timestamp_delta=None,
                 check_channel=False,
                 check_direction=False,

@@ -124,7 +124,7 @@ def test_python_can_s_reader_reads_compact_lines(sent: list[Frame]) -> None:
     with can.CanutilsLogReader(io.StringIO(log)) as reader:
         heard = list(reader)
     for frame, message in zip(sent, heard, strict=True):
-        expected = to_message(*frame)
+        expected = to_message(frame.can_id, frame.data)
         assert message.equals(
             expected, timestamp_delta=None, check_channel=False, check_direction=False
         )

@@ -35,8 +35,9 @@ Recorded = list[tuple[int, Frame, bool]]
 
 def block_of(items: Recorded) -> Frames:
     block = np.zeros(len(items), FRAME)
-    for row, (stamp_ns, (can_id, data), from_drive) in zip(block, items, strict=True):
-        row["stamp_ns"], row["can_id"], row["length"] = stamp_ns, can_id, len(data)
+    for row, (stamp_ns, frame, from_drive) in zip(block, items, strict=True):
+        data = frame.data
+        row["stamp_ns"], row["can_id"], row["length"] = stamp_ns, frame.can_id, len(data)
         row["flags"] = FROM_DRIVE if from_drive else 0
         row["data"][: len(data)] = list(data)
     return block
@@ -50,7 +51,7 @@ def regular(count: int) -> Recorded:
 
 def is_read_as(message: can.Message, item: tuple[int, Frame, bool]) -> bool:
     stamp_ns, frame, from_drive = item
-    expected = to_message(*frame, stamp_ns / 1e9, None, from_drive)
+    expected = to_message(frame.can_id, frame.data, stamp_ns / 1e9, None, from_drive)
     return message.equals(
         expected,
         timestamp_delta=1e-6,

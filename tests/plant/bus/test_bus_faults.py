@@ -204,7 +204,7 @@ def test_a_controller_that_is_cut_off_is_not_acknowledged_and_its_queue_fills() 
     stale = [entry.frame for entry in host.queue.entries]
     fleet.until(0.605)
     after = [frame for frame in fleet.passed() if frame.t_s >= 0.6 and not frame.of_drive]
-    assert [(frame.can_id, frame.data) for frame in after[:10]] == stale
+    assert [Frame(frame.can_id, frame.data) for frame in after[:10]] == stale
     fleet.until(1.3)
     assert host.confinement.tec == 0
 

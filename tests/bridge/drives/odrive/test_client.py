@@ -36,7 +36,7 @@ class Robot:
         self.now_ns += MS
         for axis in self.axes:
             for frame in axis.due(self.now_ns):
-                self.client.on_frame(*frame, self.now_ns)
+                self.client.on_frame(frame.can_id, frame.data, self.now_ns)
 
     def arm(self) -> int:
         for count in range(1000):
@@ -220,7 +220,7 @@ def test_a_second_sender_of_encoder_frames_or_heartbeats_is_a_fault(robot: Robot
         robot.tick(*robot.client.torque(0.0, 0.0))
         for frame in twin.due(robot.now_ns):
             if frame.can_id & 0x1F == Command.GET_ENCODER_ESTIMATES:
-                robot.client.on_frame(*frame, robot.now_ns)
+                robot.client.on_frame(frame.can_id, frame.data, robot.now_ns)
     fault = robot.client.fault(robot.now_ns)
     assert fault.startswith("left drive (node 1): 2.0 times the encoder frames of one sender")
     assert robot.client.obstacle(robot.now_ns) == fault
@@ -242,9 +242,9 @@ def test_answers_to_somebody_elses_requests_are_no_second_sender(robot: Robot, a
         robot.tick(*robot.client.torque(0.0, 0.0))
         for command in (Command.GET_ENCODER_ESTIMATES, Command.HEARTBEAT):
             question = Frame(identifier(1, command) | ask, bytes(8) if ask else b"")
-            robot.client.on_frame(*question, robot.now_ns)
+            robot.client.on_frame(question.can_id, question.data, robot.now_ns)
             for answer in robot.axes[1].on_frame(question, robot.now_ns):
-                robot.client.on_frame(*answer, robot.now_ns)
+                robot.client.on_frame(answer.can_id, answer.data, robot.now_ns)
         assert robot.client.fault(robot.now_ns) is None
 
 
@@ -258,7 +258,7 @@ def test_a_drive_that_delivers_a_fifth_of_a_second_at_once_is_no_second_sender()
         for axis in robot.axes:
             for k in range(200):  # a backlog
                 for frame in axis.due(stamp_ns + k * MS):
-                    robot.client.on_frame(*frame, stamp_ns + 200 * MS)
+                    robot.client.on_frame(frame.can_id, frame.data, stamp_ns + 200 * MS)
         robot.now_ns = stamp_ns + 200 * MS
         assert robot.client.fault(robot.now_ns) is None
 

@@ -96,7 +96,7 @@ def test_every_frame_that_the_controller_sends_is_one_of_the_dbc(dbc) -> None:
     sent = []
     for now_ns in range(0, 400_000_000, 1_000_000):
         for frame in (frame for drive in drives for frame in drive.due(now_ns)):
-            client.on_frame(*frame, now_ns)
+            client.on_frame(frame.can_id, frame.data, now_ns)
         said = client.arm(now_ns)
         for frame in said:
             for drive in drives:
