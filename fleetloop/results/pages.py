@@ -68,11 +68,15 @@ def table_tag(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
-def figure_tag(caption: str, png: bytes, *, across: bool = False) -> str:
-    """A picture with its caption; on paper one `across` is as wide as the page."""
+def figure_tag(caption: str, png: bytes, *, across: bool = False, narrow: bool = False) -> str:
+    """A picture with its caption; on paper one `across` is as wide as the page.
+
+    One that is `narrow`, as wide as a column, has the same scale on a screen as wider ones.
+    """
     text = escape(caption)
     source = f"data:image/png;base64,{base64.b64encode(png).decode()}"
-    css = ' class="across"' if across else ""
+    names = " ".join(name for name, is_so in (("across", across), ("narrow", narrow)) if is_so)
+    css = f' class="{names}"' if names else ""
     return f'<figure{css}><img alt="{text}" src="{source}"><figcaption>{text}</figcaption></figure>'
 
 

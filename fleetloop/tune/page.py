@@ -6,6 +6,7 @@ from importlib import resources
 from string import Template
 
 from fleetloop.results import pages
+from fleetloop.results.drawing import WIDTH_IN
 from fleetloop.results.figures import Captioned
 from fleetloop.results.pages import figure_tag, table_tag
 from fleetloop.tune import tables
@@ -41,7 +42,10 @@ def page(
             " another seed; no trial was chosen by them."
         ),
         best=escape(best),
-        figures="\n".join(figure_tag(item.caption, data) for item, data in figures),
+        figures="\n".join(
+            figure_tag(item.caption, data, narrow=item.figure.get_figwidth() <= WIDTH_IN)
+            for item, data in figures
+        ),
         trials=table_tag(_header(tuning), _rows(tuning, trials)),
         tuning=escape(tuning.to_toml()),
     )
