@@ -143,6 +143,8 @@ def _cases(tuning: Tuning, cases: Mapping[str, Sequence[float | None]]) -> Figur
     if np.isfinite(both).any():
         least, most = np.nanmin(both), np.nanmax(both)
         axes.plot([least, most], [least, most], color="0.5", linewidth=0.8)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(5))
     quantity = tuning.objective.quantity
     axes.set(xlabel=f"{quantity}, {x_name}", ylabel=f"{quantity}, {y_name}")
     return figure
