@@ -6,6 +6,7 @@ from math import isclose, pi, sin
 import numpy as np
 import pytest
 
+from agents.laws.adaptive_dsc import DscState
 from agents.laws.interface import PathVariable, RobotMotion
 from agents.paths import Reference
 from configs.loading import load
@@ -103,7 +104,7 @@ def _offsets(loop: Loop, *, v: float, fixes: int) -> np.ndarray:
         motion = RobotMotion(*fix, state.v, state.omega)
         out = law.step(memory, motion, reference, PathVariable(v * h * tick, v, 0.0))
         theta = loop.gains.theta_hat_0
-        memory = out.state._replace(theta_1=theta[:4], theta_2=theta[4:], kappa=0.0)
+        memory = DscState(out.state.filters, theta[:4], theta[4:], 0.0)
         state = rk4(loop.body, state, out.tau_right, out.tau_left, 0.0, h)
     return np.array(off)
 
