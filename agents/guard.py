@@ -11,10 +11,9 @@ from typing import Final
 
 from agents.limits import TorqueLimiter
 from agents.rearming import Rearming
-from bridge.drives import protocol
 from bridge.drives.dry_run import DryRun
 from bridge.drives.interface import DriveClient
-from bridge.drives.wrapped import as_client
+from bridge.drives.wrapped import client_of
 from bridge.frame import Frame
 from configs.brief import AgentBrief
 from configs.errors import InfrastructureError
@@ -52,7 +51,7 @@ class Guard:
 
     def __init__(self, brief: AgentBrief) -> None:
         host, schedule = brief.host, brief.schedule
-        client = as_client(protocol(brief.drives.choice.plugin).client(brief.drives))
+        client = client_of(brief.drives, brief.robot)
         self.drives: DriveClient = DryRun(client) if host.dry_run else client
         self.phase = Phase.STOPPED if brief.rejoins else Phase.ARMING
         self.begun = brief.rejoins

@@ -43,7 +43,10 @@ def say_json(value: object) -> None:
 
 
 class ResultConsole(Console):
-    """Standard output for tables; a closed reader is no failure."""
+    """Standard output for tables; a closed reader is no failure. `:X:` in a name is no emoji."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(emoji=False, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
         """As the stream will show it."""
@@ -86,7 +89,7 @@ class Bars:
     """
 
     def __init__(self, *columns: str | ProgressColumn, quiet: bool, bar_width: int = 24) -> None:
-        self._console = console = Console(stderr=True)
+        self._console = console = Console(stderr=True, emoji=False)
         # A terminal that can't move its cursor is told lines, as a log is.
         self._moving = not quiet and console.is_terminal and not console.is_dumb_terminal
         self._plain = not quiet and not self._moving

@@ -18,9 +18,8 @@ from collections.abc import Sequence
 from math import ceil, inf
 from typing import Final
 
-from bridge.drives import protocol
 from bridge.drives.interface import DriveMeasurements, DriveNode
-from bridge.drives.wrapped import as_node
+from bridge.drives.wrapped import node_of
 from bridge.frame import Frame
 from bridge.network.messages import PoseFix
 from bridge.network.telemetry import PLANT_ROW, RowBuffer
@@ -66,11 +65,11 @@ class EmulatedRobot:
     )
 
     def __init__(self, brief: RobotBrief) -> None:
-        node = protocol(brief.drive.choice.plugin).node
         self.brief = brief
         self._body = RigidBody(brief.body, brief.disturbance)
-        self._right = as_node(node(brief.drive, brief.right_node, brief.drive.serial_number))
-        self._left = as_node(node(brief.drive, brief.left_node, brief.drive.serial_number + 1))
+        drive, serial_number = brief.drive, brief.drive.serial_number
+        self._right = node_of(drive, brief.right_node, serial_number, brief.robot)
+        self._left = node_of(drive, brief.left_node, serial_number + 1, brief.robot)
         self.drives: tuple[DriveNode, DriveNode] = (self._right, self._left)
         self.divergence: Divergence | None = None
         """The reason why the body is held for good, None if it moves."""

@@ -69,7 +69,7 @@ def to_message(
 
 def can_id_of(message: can.Message) -> int:
     """SocketCAN's identifier of a message, with its flags."""
-    can_id = message.arbitration_id
+    can_id = index(message.arbitration_id)
     if message.is_extended_id:
         can_id |= EFF
     if message.is_error_frame:

@@ -7,23 +7,48 @@ the torque that the wrapped client would have sent.
 
 from collections.abc import Sequence
 
-from bridge.drives.interface import DriveClient
-from bridge.drives.wrapped import WrappedClient
+from bridge.drives.interface import DriveClient, Motion
 from bridge.frame import Frame
 
 _NOTHING: tuple[Frame, ...] = ()
 
 
-class DryRun(WrappedClient):
+class DryRun(DriveClient):
     """The controller's end of two drives, receive only."""
 
     def __init__(self, client: DriveClient) -> None:
-        super().__init__(client)
+        self._client = client
         self.armed = False
         self.sent_wheel_N_m = (0.0, 0.0)
 
-    def _copy(self) -> None:
-        """Nothing: what it shows is its own."""
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Commands of other hosts to the drives, in words."""
+        return self._client.notices
+
+    def on_frame(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
+        """As the client that is wrapped."""
+        self._client.on_frame(can_id, data, now_ns)
+
+    def feedback_since(self, bus_ns: int) -> bool:
+        """As the client that is wrapped."""
+        return self._client.feedback_since(bus_ns)
+
+    def motion(self) -> Motion | None:
+        """As the client that is wrapped."""
+        return self._client.motion()
+
+    def obstacle(self, now_ns: int) -> str | None:
+        """As the client that is wrapped."""
+        return self._client.obstacle(now_ns)
+
+    def refusal(self) -> str | None:
+        """As the client that is wrapped."""
+        return self._client.refusal()
+
+    def fault(self, now_ns: int) -> str | None:
+        """As the client that is wrapped."""
+        return self._client.fault(now_ns)
 
     def arm(self, now_ns: int) -> Sequence[Frame]:
         """No frames; armed once the drives have no fault."""

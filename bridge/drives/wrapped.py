@@ -1,180 +1,309 @@
-"""Drive clients and nodes behind the classes of `bridge.drives.interface`.
+"""Both ends of a robot's drives as the classes of `bridge.drives.interface`, whoever made them.
 
-Controllers and plant call these classes directly. What a user makes only has to have their methods;
-it is wrapped, and what it shows in attributes is copied after each call that may change it.
+Controllers and plant call these classes directly. What a protocol of a user's own makes only has to
+have their methods, or derives from them; it is wrapped: numbers may be of any type, what it shows
+in attributes is copied after each call that may change it, and what it raises, or answers that is
+none, ends the run with an error that names protocol, robot and method.
 """
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from math import isfinite
+from operator import index
+from typing import Any, TypeVar
 
-from mypy_extensions import mypyc_attr
-
+from bridge.drives import protocol
 from bridge.drives.interface import DriveClient, DriveMeasurements, DriveNode, Motion
-from bridge.frame import Frame
+from bridge.frame import Frame, flaw
+from configs.brief import DriveLink, DriveModel
+from configs.errors import FleetloopError, InfrastructureError
+from configs.plugins import Plugin, raised
+
+T = TypeVar("T")
+_SHIPPED = "bridge.drives."
 
 
-def as_client(made: object) -> DriveClient:
-    """A client as the class that is called."""
-    return made if isinstance(made, DriveClient) else WrappedClient(made)
+def client_of(link: DriveLink, robot: str) -> DriveClient:
+    """The controller's end of the drives of a robot.
+
+    Raises:
+        InfrastructureError: the protocol is a user's own, and its client can't be made.
+    """
+    plugin = link.choice.plugin
+    own = Own(plugin, f"client of {robot}")
+    made = own.ask("constructor", protocol(plugin).client, _any, link)
+    return made if _is_shipped(made, DriveClient) else WrappedClient(made, own)
 
 
-def as_node(made: object) -> DriveNode:
-    """A node as the class that is called."""
-    return made if isinstance(made, DriveNode) else WrappedNode(made)
+def node_of(model: DriveModel, node: int, serial_number: int, robot: str) -> DriveNode:
+    """The emulated drive of one wheel of a robot.
+
+    Raises:
+        InfrastructureError: the protocol is a user's own, and its node can't be made.
+    """
+    plugin = model.choice.plugin
+    own = Own(plugin, f"node {node} of {robot}")
+    made = own.ask("constructor", protocol(plugin).node, _any, model, node, serial_number)
+    return made if _is_shipped(made, DriveNode) else WrappedNode(made, own)
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
+def _is_shipped(made: object, kind: type) -> bool:
+    return isinstance(made, kind) and type(made).__module__.startswith(_SHIPPED)
+
+
+class Own:
+    """One end of a protocol, in the words of its errors."""
+
+    def __init__(self, plugin: Plugin, end: str) -> None:
+        self._of = f"drive protocol {plugin.name}, {end}"
+
+    def ask(
+        self, what: str, method: Callable[..., Any], answer: Callable[[Any], T], *arguments: Any
+    ) -> T:
+        """What a method, or a function of the row, answers.
+
+        Raises:
+            InfrastructureError: it raises, or what it returns is no such answer.
+        """
+        try:
+            returned = method(*arguments)
+        except FleetloopError:
+            raise
+        except (Exception, SystemExit) as error:
+            raise InfrastructureError(f"{self._of}: {what} failed: {raised(error)}") from error
+        return self.taken(what, answer, returned)
+
+    def taken(self, what: str, answer: Callable[[Any], T], returned: object) -> T:
+        """An answer, or the value of an attribute.
+
+        Raises:
+            InfrastructureError: it is none.
+        """
+        try:
+            return answer(returned)
+        except (TypeError, ValueError, AttributeError, LookupError, OverflowError) as error:
+            raise InfrastructureError(
+                f"{self._of}: {what} gave {returned!r:.80}: {error}"
+            ) from error
+
+    def attribute(self, of: object, name: str, answer: Callable[[Any], T]) -> T:
+        """The value of an attribute.
+
+        Raises:
+            InfrastructureError: it isn't there, or is no such value.
+        """
+        try:
+            value = getattr(of, name)
+        except AttributeError as error:
+            raise InfrastructureError(f"{self._of}: {name}: {error}") from error
+        except Exception as error:
+            raise InfrastructureError(f"{self._of}: {name} failed: {raised(error)}") from error
+        return self.taken(name, answer, value)
+
+
+# --- what answers have to be ----------------------------------------------------------------------
+
+
+def _any(value: Any) -> Any:
+    if value is None:
+        raise TypeError("nothing was made")
+    return value
+
+
+def _nothing(_: Any) -> None:
+    return None
+
+
+def _motion(value: Any) -> Motion | None:
+    if value is None:
+        return None
+    right_rad, left_rad, right_rad_s, left_rad_s = map(float, value)
+    if not all(map(isfinite, (right_rad, left_rad, right_rad_s, left_rad_s))):
+        raise ValueError("must be finite")
+    return right_rad, left_rad, right_rad_s, left_rad_s
+
+
+def _pair(value: Any) -> tuple[float, float]:
+    right, left = map(float, value)
+    return right, left
+
+
+def _reason(value: Any) -> str | None:
+    if value is None or isinstance(value, str):
+        return value
+    raise TypeError("must be a text, or None")
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    raise TypeError("must be a text")
+
+
+def _texts(value: Any) -> tuple[str, ...]:
+    return tuple(map(_text, value))
+
+
+def _time_ns(value: Any) -> int:
+    return value if isinstance(value, int) else round(value)
+
+
+def _frame(value: Any) -> Frame:
+    can_id, data = index(value.can_id), bytes(memoryview(value.data))
+    if wrong := flaw(can_id, len(data)):
+        raise ValueError(wrong)
+    return Frame(can_id, data)
+
+
+def _frames(value: Any) -> Sequence[Frame]:
+    return [_frame(one) for one in value]
+
+
+# --- the two ends ---------------------------------------------------------------------------------
+
+
 class WrappedClient(DriveClient):
     """Another client, as it is."""
 
-    def __init__(self, client: Any) -> None:
-        self._client = client
+    def __init__(self, client: Any, own: Own) -> None:
+        self._client, self._own = client, own
         self._copy()
 
     def _copy(self) -> None:
-        self.armed = bool(self._client.armed)
-        right, left = self._client.sent_wheel_N_m
-        self.sent_wheel_N_m = (float(right), float(left))
+        self.armed = self._own.attribute(self._client, "armed", bool)
+        self.sent_wheel_N_m = self._own.attribute(self._client, "sent_wheel_N_m", _pair)
+
+    def _ask(self, name: str, answer: Callable[[Any], T], *arguments: Any) -> T:
+        """What a method answers; what may have changed is copied."""
+        method = self._own.attribute(self._client, name, _any)
+        answered = self._own.ask(name, method, answer, *arguments)
+        self._copy()
+        return answered
 
     @property
     def notices(self) -> tuple[str, ...]:
         """As `DriveClient.notices`."""
-        return tuple(self._client.notices)
+        return self._own.attribute(self._client, "notices", _texts)
 
     def on_frame(self, can_id: int, data: bytes | bytearray, now_ns: int) -> None:
         """As `DriveClient.on_frame`."""
-        self._client.on_frame(can_id, data, now_ns)
-        self._copy()
+        self._ask("on_frame", _nothing, can_id, data, now_ns)
 
     def feedback_since(self, bus_ns: int) -> bool:
         """As `DriveClient.feedback_since`."""
-        return bool(self._client.feedback_since(bus_ns))
+        return self._ask("feedback_since", bool, bus_ns)
 
     def motion(self) -> Motion | None:
         """As `DriveClient.motion`."""
-        motion = self._client.motion()
-        if motion is None:
-            return None
-        right_rad, left_rad, right_rad_s, left_rad_s = motion
-        return float(right_rad), float(left_rad), float(right_rad_s), float(left_rad_s)
+        return self._ask("motion", _motion)
 
     def arm(self, now_ns: int) -> Sequence[Frame]:
         """As `DriveClient.arm`."""
-        return self._said(self._client.arm(now_ns))
+        return self._ask("arm", _frames, now_ns)
 
     def missing(self, now_ns: int) -> str:
         """As `DriveClient.missing`."""
-        return str(self._client.missing(now_ns))
+        return self._ask("missing", _text, now_ns)
 
     def obstacle(self, now_ns: int) -> str | None:
         """As `DriveClient.obstacle`."""
-        reason: str | None = self._client.obstacle(now_ns)
-        return reason
+        return self._ask("obstacle", _reason, now_ns)
 
     def refusal(self) -> str | None:
         """As `DriveClient.refusal`."""
-        reason: str | None = self._client.refusal()
-        return reason
+        return self._ask("refusal", _reason)
 
     def fault(self, now_ns: int) -> str | None:
         """As `DriveClient.fault`."""
-        reason: str | None = self._client.fault(now_ns)
-        return reason
+        return self._ask("fault", _reason, now_ns)
 
     def torque(self, right_wheel_N_m: float, left_wheel_N_m: float) -> Sequence[Frame]:
         """As `DriveClient.torque`."""
-        return self._said(self._client.torque(right_wheel_N_m, left_wheel_N_m))
+        return self._ask("torque", _frames, right_wheel_N_m, left_wheel_N_m)
 
     def rest(self, now_ns: int) -> Sequence[Frame]:
         """As `DriveClient.rest`."""
-        return self._said(self._client.rest(now_ns))
+        return self._ask("rest", _frames, now_ns)
 
     def disarm(self) -> Sequence[Frame]:
         """As `DriveClient.disarm`."""
-        return self._said(self._client.disarm())
+        return self._ask("disarm", _frames)
 
     def estop(self) -> Sequence[Frame]:
         """As `DriveClient.estop`."""
-        return self._said(self._client.estop())
-
-    def _said(self, frames: Sequence[Frame]) -> Sequence[Frame]:
-        self._copy()
-        return frames
+        return self._ask("estop", _frames)
 
 
 class WrappedNode(DriveNode):
     """Another node, as it is."""
 
-    def __init__(self, node: Any) -> None:
-        self._node = node
+    def __init__(self, node: Any, own: Own) -> None:
+        self._node, self._own = node, own
         self._copy()
 
     def _copy(self) -> None:
-        node = self._node
-        self.fed_ns, self.setpoint_id = node.fed_ns, node.setpoint_id
-        self.ignored, self.input_torque_shaft = node.ignored, node.input_torque_shaft
+        take = self._own.attribute
+        self.fed_ns = take(self._node, "fed_ns", _time_ns)
+        self.setpoint_id = take(self._node, "setpoint_id", index)
+        self.ignored = take(self._node, "ignored", index)
+        self.input_torque_shaft = take(self._node, "input_torque_shaft", float)
+
+    def _ask(self, name: str, answer: Callable[[Any], T], *arguments: Any) -> T:
+        """What a method answers; what may have changed is copied."""
+        method = self._own.attribute(self._node, name, _any)
+        answered = self._own.ask(name, method, answer, *arguments)
+        self._copy()
+        return answered
 
     def update_encoder(self, revolutions: float, rev_s: float) -> None:
         """As `DriveNode.update_encoder`."""
-        self._node.update_encoder(revolutions, rev_s)
+        self._ask("update_encoder", _nothing, revolutions, rev_s)
 
     def lose_estimate(self) -> None:
         """As `DriveNode.lose_estimate`."""
-        self._node.lose_estimate()
-        self._copy()
+        self._ask("lose_estimate", _nothing)
 
     def due(self, now_ns: int) -> Sequence[Frame]:
         """As `DriveNode.due`."""
-        return self._said(self._node.due(now_ns))
+        return self._ask("due", _frames, now_ns)
 
     def feedback(self, now_ns: int) -> Frame:
         """As `DriveNode.feedback`."""
-        frame: Frame = self._node.feedback(now_ns)
-        return frame
+        return self._ask("feedback", _frame, now_ns)
 
     def on_frame(self, frame: Frame, now_ns: int) -> Sequence[Frame]:
         """As `DriveNode.on_frame`."""
-        return self._said(self._node.on_frame(frame, now_ns))
+        return self._ask("on_frame", _frames, frame, now_ns)
 
     @property
     def state_in_words(self) -> str:
         """As `DriveNode.state_in_words`."""
-        return str(self._node.state_in_words)
+        return self._own.attribute(self._node, "state_in_words", _text)
 
     @property
     def next_due_ns(self) -> int:
         """As `DriveNode.next_due_ns`."""
-        return int(self._node.next_due_ns)
+        return self._own.attribute(self._node, "next_due_ns", _time_ns)
 
     def update_measurements(self, measurements: DriveMeasurements) -> None:
         """As `DriveNode.update_measurements`."""
-        self._node.update_measurements(measurements)
-        self._copy()
+        self._ask("update_measurements", _nothing, measurements)
 
     def torque_demand_shaft(self, dt_s: float) -> float:
         """As `DriveNode.torque_demand_shaft`."""
-        return float(self._node.torque_demand_shaft(dt_s))
+        return self._ask("torque_demand_shaft", float, dt_s)
 
     def estop(self) -> None:
         """As `DriveNode.estop`."""
-        self._node.estop()
-        self._copy()
+        self._ask("estop", _nothing)
 
     def expire_watchdog(self) -> None:
         """As `DriveNode.expire_watchdog`."""
-        self._node.expire_watchdog()
-        self._copy()
+        self._ask("expire_watchdog", _nothing)
 
     def reboot(self, now_ns: int) -> None:
         """As `DriveNode.reboot`."""
-        self._node.reboot(now_ns)
-        self._copy()
+        self._ask("reboot", _nothing, now_ns)
 
     def trip(self, error: str | None) -> None:
         """As `DriveNode.trip`."""
-        self._node.trip(error)
-        self._copy()
-
-    def _said(self, frames: Sequence[Frame]) -> Sequence[Frame]:
-        self._copy()
-        return frames
+        self._ask("trip", _nothing, error)

@@ -10,6 +10,8 @@ from dataclasses import replace
 from statistics import fmean
 
 from bridge.drives import protocol
+from bridge.drives.interface import CyclicMessage
+from bridge.drives.wrapped import Own
 from bridge.frame import Frame
 from bridge.wire.bits import frame_bits
 from bridge.wire.response_time import Analysis, Message, analyse
@@ -43,16 +45,28 @@ def bus_messages(robots: Iterable[RobotBrief], period_ns: int) -> list[Message]:
     messages = []
     for robot in robots:
         mounting = robot.mounting
-        cyclic_messages = protocol(robot.drive.choice.plugin).cyclic_messages
+        plugin = robot.drive.choice.plugin
+        own, method = Own(plugin, f"drives of {robot.robot}"), protocol(plugin).cyclic_messages
         for node, sign in (
             (robot.right_node, mounting.right_sign),
             (robot.left_node, mounting.left_sign),
         ):
             gear = sign * mounting.gear_ratio
-            for can_id, every_ns, payloads in cyclic_messages(robot.drive, node, period_ns, gear):
-                mean = fmean(frame_bits(Frame(can_id, data)) for data in payloads)
-                messages.append(Message(can_id, len(payloads[0]), every_ns, mean))
+            asked = (robot.drive, node, period_ns, gear)
+            messages += own.ask("cyclic_messages", method, _messages, *asked)
     return messages
+
+
+def _messages(cyclic: Iterable[CyclicMessage]) -> list[Message]:
+    return [
+        Message(
+            can_id,
+            len(payloads[0]),
+            every_ns,
+            fmean(frame_bits(Frame(can_id, data)) for data in payloads),
+        )
+        for can_id, every_ns, payloads in cyclic
+    ]
 
 
 def _finding(scenario: Scenario, robots: tuple[str, ...], analysis: Analysis) -> Finding:

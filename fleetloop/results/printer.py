@@ -1,15 +1,19 @@
 """SVG and PDF files of figures, made by a process beside the one that makes all else of a report.
 
 They take almost half of a report's processor time. The process gets figures on its standard input
-and ends with it, also when whoever feeds it is killed.
+and ends with it, and at once when whoever feeds it ends.
 
-    python -m fleetloop.results.printer FOLDER      that process: pickled pairs (name, figure)
+    python -m fleetloop.results.printer PARENT FOLDER   that process: pickled pairs (name, figure)
 """
 
 import contextlib
+import ctypes
+import os
 import pickle
+import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
@@ -25,8 +29,9 @@ from fleetloop.results.drawing import STYLE
 from fleetloop.results.pictures import picture
 
 FORMATS = ("svg", "pdf")
-LONGEST_S = 600.0
-"""From the last figure to the end."""
+LONGEST_S = 900.0
+"""From the beginning to the end."""
+_PR_SET_PDEATHSIG = 1
 _BUFFER_BYTES = 1 << 20
 _FAILED = 3
 
@@ -44,7 +49,7 @@ class Printer:
     def __init__(self, folder: Path) -> None:
         # -P: a folder here that is named like one of our packages must not shadow it. Its own
         # session: Ctrl-C reaches the caller, whose end is this one's.
-        command = [sys.executable, "-P", "-m", __name__, str(folder)]
+        command = [sys.executable, "-P", "-m", __name__, str(os.getpid()), str(folder)]
         try:
             self._process = subprocess.Popen(
                 command,
@@ -56,6 +61,10 @@ class Printer:
             )
         except OSError as error:
             raise InfrastructureError(f"can't start a process for figures: {error}") from error
+        self._overdue = False
+        self._bound = threading.Timer(LONGEST_S, self._give_up)
+        self._bound.daemon = True
+        self._bound.start()
 
     def __enter__(self) -> Self:
         return self
@@ -78,18 +87,23 @@ class Printer:
             with contextlib.suppress(BrokenPipeError):  # it has ended: told at the end
                 pickle.dump((name, figure), self._process.stdin)
 
+    def _give_up(self) -> None:
+        """It took too long: whatever waits for it goes on."""
+        self._overdue = True
+        self._process.kill()
+
     def _end(self) -> str:
         """Wait for the end; what it said, or that it took too long."""
         try:
-            _, errors = self._process.communicate(timeout=LONGEST_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.communicate()
-            return f"SVG and PDF files took longer than {LONGEST_S:g} s"
+            _, errors = self._process.communicate()
         except BaseException:  # Ctrl-C
             self._process.kill()
             self._process.communicate()
             raise
+        finally:
+            self._bound.cancel()
+        if self._overdue:
+            return f"SVG and PDF files took longer than {LONGEST_S:g} s"
         lines = errors.decode(errors="replace").splitlines()
         if self._process.returncode == _FAILED and lines:
             return lines[-1]
@@ -115,8 +129,12 @@ def serve(folder: Path, figures: IO[bytes]) -> None:
 
 def main() -> int:
     """The process; its exit status."""
+    parent, folder = sys.argv[1:]
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != int(parent):
+        return _FAILED
     try:
-        serve(Path(sys.argv[1]), sys.stdin.buffer)
+        serve(Path(folder), sys.stdin.buffer)
     except FleetloopError as error:
         sys.stderr.write(f"{error}\n")
         return _FAILED
