@@ -10,6 +10,7 @@ import contextlib
 import ctypes
 import os
 import pickle
+import queue
 import signal
 import subprocess
 import sys
@@ -32,7 +33,6 @@ FORMATS = ("svg", "pdf")
 LONGEST_S = 900.0
 """From the beginning to the end."""
 _PR_SET_PDEATHSIG = 1
-_BUFFER_BYTES = 1 << 20
 _FAILED = 3
 
 
@@ -55,7 +55,6 @@ class Printer:
                 command,
                 stdin=subprocess.PIPE,
                 stderr=subprocess.PIPE,
-                pipesize=_BUFFER_BYTES,
                 start_new_session=True,
                 env=packages.environment(),
             )
@@ -65,6 +64,9 @@ class Printer:
         self._bound = threading.Timer(LONGEST_S, self._give_up)
         self._bound.daemon = True
         self._bound.start()
+        self._figures: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._feeder = threading.Thread(target=self._feed, name="figures", daemon=True)
+        self._feeder.start()
 
     def __enter__(self) -> Self:
         return self
@@ -83,9 +85,14 @@ class Printer:
 
     def print(self, name: str, figure: Figure) -> None:
         """Write a figure that is laid out, some time before the end; it may be changed then."""
-        if self._process.stdin is not None:
-            with contextlib.suppress(BrokenPipeError):  # it has ended: told at the end
-                pickle.dump((name, figure), self._process.stdin)
+        self._figures.put(pickle.dumps((name, figure)))
+
+    def _feed(self) -> None:
+        """Hand figures over, in a thread: the process takes them more slowly than they come."""
+        with contextlib.suppress(BrokenPipeError):  # it has ended: told at the end
+            for figure in iter(self._figures.get, None):
+                if self._process.stdin is not None:
+                    self._process.stdin.write(figure)
 
     def _give_up(self) -> None:
         """It took too long: whatever waits for it goes on."""
@@ -94,7 +101,9 @@ class Printer:
 
     def _end(self) -> str:
         """Wait for the end; what it said, or that it took too long."""
+        self._figures.put(None)
         try:
+            self._feeder.join()
             _, errors = self._process.communicate()
         except BaseException:  # Ctrl-C
             self._process.kill()
