@@ -22,7 +22,7 @@ from typing import Final
 from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from bridge.network.refused_messages import Refusals
 from configs.brief import LEAD_TICKS, AgentBrief
-from configs.reach import beyond, within_world
+from configs.reach import beyond, too_fast, within_world
 from configs.ticks import Ticks
 
 LOCALISATION: Final = "the localisation system"
@@ -101,7 +101,7 @@ class Admission:
     def admits_leader_speed(self, speed: LeaderSpeed) -> bool:
         """Whether the leader's speed is plausible; one that isn't is counted."""
         for change in speed.changes:
-            if far := self.reach.too_fast(change.speed_m_s, "v_r"):
+            if far := too_fast(self.reach, change.speed_m_s, "v_r"):
                 self.refusals.note("speed", LEADER, "reach", far)
                 return False
         return True

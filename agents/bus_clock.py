@@ -8,6 +8,7 @@ Each tick is due once, in order.
 from collections.abc import Callable
 
 from configs.brief import Schedule
+from configs.ticks import Ticks
 
 
 class BusClock:
@@ -26,7 +27,7 @@ class BusClock:
         self._feedback_since = feedback_since
         self._period_ns = schedule.period_ns
         self._next = -schedule.countdown_ticks if first is None else first
-        self._due_ns = schedule.bus_time_ns(self._next)
+        self._due_ns = Ticks(schedule).bus_time_ns(self._next)
 
     def due(self, now_ns: int) -> int | None:
         """The tick to compute after a frame of bus time `now_ns`; None if none is due."""

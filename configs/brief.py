@@ -57,7 +57,8 @@ class Wheels:
 class Schedule:
     """The ticks of a run.
 
-    Tick k is scenario time k × period; ticks below 0 are the countdown (arming).
+    Tick k is scenario time k × period; ticks below 0 are the countdown (arming). What is due at a
+    tick, and its bus time, is `configs.ticks`.
     """
 
     period_ns: int
@@ -85,26 +86,9 @@ class Schedule:
         """The longest time from the go to tick 0 [s]."""
         return self.start_deadline_s + self.countdown_ticks * self.period_s
 
-    def shares(self, tick: int) -> bool:
-        """Whether path states are due at this tick."""
-        return tick >= 0 and tick % self.share_every == 0
-
-    def localises(self, tick: int) -> bool:
-        """Whether the localisation system takes poses at this tick."""
-        return tick >= 0 and tick % self.localise_every == 0
-
-    @property
-    def place_delay_ticks(self) -> int:
-        """Delay of other robots' poses to the emulated network: a tick or more."""
-        return max(self.pose_delay_ticks, 1)
-
     def when(self, tick: int) -> str:
         """A tick in words."""
         return when(tick, self.period_ns)
-
-    def bus_time_ns(self, tick: int) -> int:
-        """Bus time of a tick: nanoseconds since power-up, 0 at the first tick of the countdown."""
-        return (tick + self.countdown_ticks) * self.period_ns
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,7 +50,7 @@ def reached(
 
 
 class Reach(NamedTuple):
-    """The bounds of one scenario."""
+    """The bounds of one scenario; `beyond` and `too_fast` hold something against them."""
 
     s_min_m: float  # at t = 0, with its margin
     s_max_m: float
@@ -58,17 +58,9 @@ class Reach(NamedTuple):
     v_max_m_s: float
     v_margin_m_s: float  # of v̂, beyond the hull
 
-    def beyond(self, t_s: float, s: float, v_hat: float) -> str | None:
-        """Why no robot can say this of a time, None if one can. What isn't finite is beyond."""
-        return beyond(self, t_s, s, v_hat)
-
-    def too_fast(self, speed_m_s: float, what: str) -> str | None:
-        """Why no speed of this scenario is this one, None if one can be."""
-        return too_fast(self, speed_m_s, what)
-
 
 def beyond(reach: Reach, t_s: float, s: float, v_hat: float) -> str | None:
-    """As `Reach.beyond`: loops ask it at every tick, compiled."""
+    """Why no robot can say this of a time, None if one can. What isn't finite is beyond."""
     s_min_m, s_max_m, v_min_m_s, v_max_m_s, _ = reach
     low, high = reached(t_s, s_min_m, s_max_m, v_min_m_s, v_max_m_s)
     if not low <= s <= high:
@@ -77,7 +69,7 @@ def beyond(reach: Reach, t_s: float, s: float, v_hat: float) -> str | None:
 
 
 def too_fast(reach: Reach, speed_m_s: float, what: str) -> str | None:
-    """As `Reach.too_fast`."""
+    """Why no speed of this scenario is this one, None if one can be."""
     _, _, v_min_m_s, v_max_m_s, margin_m_s = reach
     low, high = v_min_m_s - margin_m_s, v_max_m_s + margin_m_s
     if low <= speed_m_s <= high:

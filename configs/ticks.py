@@ -1,4 +1,4 @@
-"""What loops ask a schedule at every tick, compiled: what is due at one, and when one is."""
+"""What is asked of a schedule at every tick, compiled: what is due at one, and when one is."""
 
 from configs.brief import Schedule
 
@@ -21,15 +21,15 @@ class Ticks:
         self._share_every = schedule.share_every
         self._localise_every = schedule.localise_every
         self._pose_delay_ticks = schedule.pose_delay_ticks
-        self.place_delay_ticks: int = schedule.place_delay_ticks
-        """As `Schedule.place_delay_ticks`."""
+        self.place_delay_ticks = max(schedule.pose_delay_ticks, 1)
+        """Delay of other robots' poses to the emulated network: a tick or more."""
 
     def shares(self, tick: int) -> bool:
-        """Whether path states are due at a tick, as `Schedule.shares`."""
+        """Whether path states are due at a tick."""
         return tick >= 0 and tick % self._share_every == 0
 
     def localises(self, tick: int) -> bool:
-        """Whether the localisation system takes poses at a tick, as `Schedule.localises`."""
+        """Whether the localisation system takes poses at a tick."""
         return tick >= 0 and tick % self._localise_every == 0
 
     def owes(self, tick: int) -> bool:
@@ -41,5 +41,5 @@ class Ticks:
         )
 
     def bus_time_ns(self, tick: int) -> int:
-        """Bus time of a tick, as `Schedule.bus_time_ns`."""
+        """Bus time of a tick: nanoseconds since power-up, 0 at the first tick of the countdown."""
         return (tick + self._countdown_ticks) * self._period_ns

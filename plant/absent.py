@@ -26,6 +26,7 @@ from configs.brief import PlantBrief
 from configs.edges import FOREVER
 from configs.events import Event
 from configs.faults.absences import Absence, overlapping
+from configs.ticks import Ticks
 
 _AT_ONCE: Final = -FOREVER
 
@@ -62,7 +63,7 @@ class AbsentControllers:
         self._policy = brief.schedule.on_late
         self.allowed = self._policy != "abort"
         """Whether the run goes on without a controller."""
-        self._shares = brief.schedule.shares
+        self._shares = Ticks(brief.schedule).shares
         self._hub = hub
         self._silences = silences
         self._announce = announce

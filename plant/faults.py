@@ -15,6 +15,7 @@ from bridge.fault_schedule import FaultSchedule
 from configs.brief import Schedule
 from configs.events import Event
 from configs.faults.base import PlannedFault
+from configs.ticks import Ticks
 from plant.disturbance import Disturbances
 from plant.effects import PoseDrift, RobotEffects, WheelEffects, of_side
 from plant.robot import EmulatedRobot
@@ -200,13 +201,13 @@ STRIKES: Final[Mapping[str, Strike]] = {
 class BusFaults:
     """The faults of the robots on one bus."""
 
-    __slots__ = ("_robots", "_ticks", "disturbances", "note", "schedule", "struck")
+    __slots__ = ("_period_ns", "_robots", "_ticks", "disturbances", "note", "schedule", "struck")
 
     def __init__(
         self, planned: Iterable[PlannedFault], robots: Sequence[EmulatedRobot], ticks: Schedule
     ) -> None:
         self._robots = {robot.brief.robot: robot for robot in robots}
-        self._ticks = ticks
+        self._ticks, self._period_ns = Ticks(ticks), ticks.period_ns
         self.disturbances = Disturbances(robots)
         """Faults of the bus itself: of its frames and CAN controllers."""
         self.schedule = FaultSchedule(one for one in planned if one.target in self._robots)
@@ -229,7 +230,7 @@ class BusFaults:
             effects = RobotEffects()
             for planned in self.schedule.acting:
                 if planned.target == name and planned.fault.kind in EFFECTS:
-                    begun_ns = planned.from_tick * self._ticks.period_ns
+                    begun_ns = planned.from_tick * self._period_ns
                     EFFECTS[planned.fault.kind](effects, planned.fault, begun_ns)
             self._robots[name].apply(effects)
         strikes = [c.planned for c in changes if c.planned.fault.kind in STRIKES]

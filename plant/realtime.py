@@ -60,7 +60,7 @@ class RealtimeLoop:
         self._ticks = Ticks(brief.schedule)
         self._record_others = record_others
         self._orders = orders
-        self._zero_ns = brief.schedule.bus_time_ns(0)
+        self._zero_ns = self._ticks.bus_time_ns(0)
         self._end = end
         self._report = report
         external = {robot.brief.bus for robot in robots}.difference(hub.names)

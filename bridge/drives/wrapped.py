@@ -28,10 +28,9 @@ def client_of(link: DriveLink, robot: str) -> DriveClient:
     Raises:
         InfrastructureError: the protocol is a user's own, and its client can't be made.
     """
-    plugin = link.choice.plugin
-    own = Own(plugin, f"client of {robot}")
-    made = own.ask("constructor", protocol(plugin).client, _any, link)
-    return made if _is_shipped(made, DriveClient) else WrappedClient(made, own)
+    own = Own(link.choice.plugin, f"client of {robot}")
+    made = own.ask("constructor", protocol(link.choice.plugin).client, _any, link)
+    return made if own.is_shipped else WrappedClient(made, own)
 
 
 def node_of(model: DriveModel, node: int, serial_number: int, robot: str) -> DriveNode:
@@ -40,21 +39,24 @@ def node_of(model: DriveModel, node: int, serial_number: int, robot: str) -> Dri
     Raises:
         InfrastructureError: the protocol is a user's own, and its node can't be made.
     """
-    plugin = model.choice.plugin
-    own = Own(plugin, f"node {node} of {robot}")
-    made = own.ask("constructor", protocol(plugin).node, _any, model, node, serial_number)
-    return made if _is_shipped(made, DriveNode) else WrappedNode(made, own)
-
-
-def _is_shipped(made: object, kind: type) -> bool:
-    return isinstance(made, kind) and type(made).__module__.startswith(_SHIPPED)
+    own = Own(model.choice.plugin, f"node {node} of {robot}")
+    make = protocol(model.choice.plugin).node
+    made = own.ask("constructor", make, _any, model, node, serial_number)
+    return made if own.is_shipped else WrappedNode(made, own)
 
 
 class Own:
-    """One end of a protocol, in the words of its errors."""
+    """One end of a protocol, in the words of its errors; those of a shipped one are bugs, and stay.
+
+    Args:
+        plugin: where the protocol is.
+        end: of it, in words.
+    """
 
     def __init__(self, plugin: Plugin, end: str) -> None:
         self._of = f"drive protocol {plugin.name}, {end}"
+        self.is_shipped = plugin.target.startswith(_SHIPPED)
+        """Whether it is Fleetloop's, and makes the classes themselves."""
 
     def ask(
         self, what: str, method: Callable[..., Any], answer: Callable[[Any], T], *arguments: Any
@@ -66,9 +68,9 @@ class Own:
         """
         try:
             returned = method(*arguments)
-        except FleetloopError:
-            raise
         except (Exception, SystemExit) as error:
+            if self.is_shipped or isinstance(error, FleetloopError):
+                raise
             raise InfrastructureError(f"{self._of}: {what} failed: {raised(error)}") from error
         return self.taken(what, answer, returned)
 
@@ -81,6 +83,8 @@ class Own:
         try:
             return answer(returned)
         except (TypeError, ValueError, AttributeError, LookupError, OverflowError) as error:
+            if self.is_shipped:
+                raise
             raise InfrastructureError(
                 f"{self._of}: {what} gave {returned!r:.80}: {error}"
             ) from error
@@ -113,12 +117,17 @@ def _nothing(_: Any) -> None:
     return None
 
 
+def _finite(value: Any) -> float:
+    number = float(value)
+    if not isfinite(number):
+        raise ValueError("must be finite")
+    return number
+
+
 def _motion(value: Any) -> Motion | None:
     if value is None:
         return None
-    right_rad, left_rad, right_rad_s, left_rad_s = map(float, value)
-    if not all(map(isfinite, (right_rad, left_rad, right_rad_s, left_rad_s))):
-        raise ValueError("must be finite")
+    right_rad, left_rad, right_rad_s, left_rad_s = map(_finite, value)
     return right_rad, left_rad, right_rad_s, left_rad_s
 
 
@@ -290,7 +299,7 @@ class WrappedNode(DriveNode):
 
     def torque_demand_shaft(self, dt_s: float) -> float:
         """As `DriveNode.torque_demand_shaft`."""
-        return self._ask("torque_demand_shaft", float, dt_s)
+        return self._ask("torque_demand_shaft", _finite, dt_s)
 
     def estop(self) -> None:
         """As `DriveNode.estop`."""

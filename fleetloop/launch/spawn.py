@@ -18,6 +18,7 @@ from configs.loading import to_toml
 from configs.resolve import agent_brief, agent_faults, plant_brief, schedule, signals_of
 from configs.roles import AGENT, PLANT, RECORDER, STARTED, VIEWER
 from configs.scenario import Scenario
+from configs.ticks import Ticks
 from fleetloop.door.server import NAME as DOOR
 from fleetloop.launch import placement
 from fleetloop.launch.child import Child
@@ -208,7 +209,7 @@ def _recorder(place: Place) -> RecorderBrief:
         place.network,
         str(place.folder),
         ticks.ticks,
-        ticks.bus_time_ns(ticks.ticks) + AFTERWARDS_NS,
+        Ticks(ticks).bus_time_ns(ticks.ticks) + AFTERWARDS_NS,
         fills_gaps=_may_have_gaps(orders),
         logged_inputs=orders.scenario.records_inputs,
         elsewhere=orders.deployment.elsewhere(orders.scenario),

@@ -14,7 +14,7 @@ from math import ceil, log2
 
 import numpy as np
 
-from fleetloop.sweep.draws import Draw, Value
+from fleetloop.sweep.draws import Draw, Value, level
 from fleetloop.sweep.extra import require
 from fleetloop.sweep.study import Study
 
@@ -46,7 +46,7 @@ class Design:
         values = []
         for draw in reversed(self._draws):
             case, n = divmod(case, draw.count or 1)
-            values.append(draw.level(n))
+            values.append(level(draw, n))
         return tuple(reversed(values))
 
     def _drawn(self, case: int) -> np.ndarray:

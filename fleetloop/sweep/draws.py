@@ -36,14 +36,16 @@ class Draw(Protocol):
     def at(self, u: float) -> Value:
         """Q(u)."""
 
-    def level(self, n: int) -> Value:
-        """One of its levels."""
-
     def shown(self, value: Value) -> Value:
         """As the dataset has it."""
 
     def overrides(self, value: Value, table: dict[str, Any]) -> object:
         """What the keys are set to; `table` is what is there, if it is a table."""
+
+
+def level(draw: Draw, n: int) -> Value:
+    """One of the levels of a draw that has some: Q((n + ½)/count)."""
+    return draw.at((n + 0.5) / (draw.count or 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,10 +76,6 @@ class Levels(_Plain):
         """By equal shares."""
         return self.values[_share(u, len(self.values))]
 
-    def level(self, n: int) -> Value:
-        """In their order."""
-        return self.values[n]
-
 
 @dataclass(frozen=True, slots=True)
 class Spaced(_Plain):
@@ -95,10 +93,7 @@ class Spaced(_Plain):
 
     def at(self, u: float) -> Value:
         """By equal shares."""
-        return self.level(_share(u, self.steps))
-
-    def level(self, n: int) -> Value:
-        """In ascending order."""
+        n = _share(u, self.steps)
         return _between(self.least, self.most, n / (self.steps - 1), log=self.log)
 
 
@@ -117,10 +112,6 @@ class Integers(_Plain):
     def at(self, u: float) -> Value:
         """By equal shares."""
         return self.first + _share(u, self.last - self.first + 1)
-
-    def level(self, n: int) -> Value:
-        """In ascending order."""
-        return self.first + n
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,10 +132,6 @@ class Graphs:
     def at(self, u: float) -> Value:
         """By equal shares."""
         return self.first + _share(u, self.last - self.first + 1)
-
-    def level(self, n: int) -> Value:
-        """In ascending order of the seeds."""
-        return self.first + n
 
     def shown(self, value: Value) -> Value:
         """Its edges: "r1>r2 r2>r3"."""
@@ -187,10 +174,6 @@ class Uniform(_Plain):
         """The share u of the way."""
         return _between(self.least, self.most, u, log=self.log)
 
-    def level(self, n: int) -> Value:
-        """It has none."""
-        raise NotImplementedError
-
 
 @dataclass(frozen=True, slots=True)
 class NormalDraw(_Plain):
@@ -213,10 +196,6 @@ class NormalDraw(_Plain):
         above = 1.0 if self.most is None else whole.cdf(self.most)
         p = min(max(below + u * (above - below), _U_LEAST), 1.0 - _U_LEAST)
         return _within(_rounded(whole.inv_cdf(p)), self.least, self.most)
-
-    def level(self, n: int) -> Value:
-        """It has none."""
-        raise NotImplementedError
 
 
 def _share(u: float, count: int) -> int:

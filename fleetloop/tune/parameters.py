@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from configs.errors import KeyValueError
 from configs.parameters import parameter
-from fleetloop.sweep.draws import Value
+from fleetloop.sweep.draws import Value, level
 from fleetloop.sweep.factors import FactorSection
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class ParameterSection(FactorSection):
         """The value that stands for what was drawn."""
         if (bounds := self.bounds) is not None:
             return min(max(float(f"{drawn:.{DIGITS}g}"), bounds[0]), bounds[1])
-        return self.draw(()).level(int(drawn)) if self.range is not None else drawn
+        return level(self.draw(()), int(drawn)) if self.range is not None else drawn
 
     def drawn(self, value: Value) -> Value:
         """What has to be drawn for a value."""
@@ -96,7 +96,7 @@ class ParameterSection(FactorSection):
 
     def _levels(self) -> tuple[Value, ...]:
         draw = self.draw(())
-        return tuple(draw.level(n) for n in range(draw.count or 0))
+        return tuple(level(draw, n) for n in range(draw.count or 0))
 
     def _has(self, value: Value) -> bool:
         if (bounds := self.bounds or self.integers) is not None:

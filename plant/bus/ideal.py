@@ -50,7 +50,8 @@ class IdealBus:
         self._port = port
         self._schedule = schedule
         self._substeps = substeps
-        self._zero_ns = schedule.bus_time_ns(0)
+        self._ticks = Ticks(schedule)
+        self._zero_ns = self._ticks.bus_time_ns(0)
         self._step_ns = schedule.period_ns // substeps
         self._begin = begin
         self._drives = [drive for robot in robots for drive in robot.drives]
@@ -67,8 +68,7 @@ class IdealBus:
     def steps(self) -> Steps:
         """The ticks from the first of the countdown to the closing one."""
         schedule, begin, substeps = self._schedule, self._begin, self._substeps
-        ticks = Ticks(schedule)
-        tap, port = self._tap, self._port
+        tap, port, ticks = self._tap, self._port, self._ticks
         period_s, period_ns, last = schedule.period_s, schedule.period_ns, schedule.ticks
         robots, begin_faults, interference = self.robots, self.faults.begin, self._interference
         (single,) = robots if len(robots) == 1 else (None,)

@@ -65,7 +65,8 @@ class TimedBus:
         self.wire = Wire(model.bitrate_bit_s)
         self._model = model
         self._schedule = schedule
-        self._zero_ns = schedule.bus_time_ns(0)
+        self._ticks = Ticks(schedule)
+        self._zero_ns = self._ticks.bus_time_ns(0)
         self._step_ns = schedule.period_ns // substeps
         self._begin = begin
         self._random = random
@@ -115,7 +116,7 @@ class TimedBus:
 
     def steps(self) -> Steps:
         """The ticks from the first of the countdown to the closing one."""
-        schedule, ticks = self._schedule, Ticks(self._schedule)
+        schedule, ticks = self._schedule, self._ticks
         for tick in range(-schedule.countdown_ticks, schedule.ticks + 1):
             start_ns = ticks.bus_time_ns(tick)
             end_ns = start_ns + schedule.period_ns

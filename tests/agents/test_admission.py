@@ -16,6 +16,7 @@ from bridge.network.messages import LeaderSpeed, PathState, PoseFix
 from configs.brief import LEAD_TICKS
 from configs.leader_speed import SpeedChange
 from configs.loading import load
+from configs.reach import beyond
 from configs.resolve import agent_brief
 
 BRIEF = agent_brief(SCENARIO, "r2", network=NOWHERE, bus=())
@@ -214,4 +215,4 @@ def test_whatever_peers_say_the_controller_goes_on_with_numbers(brief, said) -> 
         bench.tick()
         shared = agent.share(n + 1)
         assert isfinite(shared.s)
-        assert BRIEF.reach.beyond(shared.t_ns * 1e-9, shared.s, shared.v_hat) is None
+        assert beyond(BRIEF.reach, shared.t_ns * 1e-9, shared.s, shared.v_hat) is None

@@ -13,6 +13,7 @@ from bridge.network.telemetry import RowBuffer, row_of
 from configs.errors import InfrastructureError
 from configs.leader_speed import SpeedChange
 from configs.resolve import agent_brief
+from configs.ticks import Ticks
 
 
 def test_a_controller_arms_in_the_countdown_and_drives_from_tick_0() -> None:
@@ -49,7 +50,7 @@ def test_a_drive_that_drops_out_stops_both_wheels_and_sharing_goes_on() -> None:
     bench.run(bench.schedule.countdown_ticks)
     bench.tick()
     stop = Frame(identifier(1, Command.ESTOP), b"")
-    bench.axes[1].on_frame(stop, bench.schedule.bus_time_ns(0))
+    bench.axes[1].on_frame(stop, Ticks(bench.schedule).bus_time_ns(0))
     bench.run(119)
     assert bench.agent.phase is Phase.STOPPED
     assert "left drive (node 1) dropped out: ESTOP_REQUESTED" in bench.agent.guard.stop_reason

@@ -24,6 +24,7 @@ from bridge.process.lifecycle import Stop
 from configs.edges import InEdge
 from configs.errors import InfrastructureError, PeerLostError
 from configs.events import KINDS
+from configs.ticks import Ticks
 
 S = 1_000_000_000
 DOWN = can.CanOperationError("Failed to transmit: [Errno 100] Network is down", errno.ENETDOWN)
@@ -137,7 +138,7 @@ class PoseLink:
 
     def receive(self, _timeout_s: float) -> None:
         period_ns, tick = self.bench.schedule.period_ns, self.tick
-        if self.bench.schedule.localises(tick) and self.bench.pose is not None:
+        if Ticks(self.bench.schedule).localises(tick) and self.bench.pose is not None:
             self.bench.agent.receive_pose(PoseFix(tick, tick * period_ns, *self.bench.pose))
 
 
@@ -154,7 +155,7 @@ class Rig:
             self.bench = Bench("r1", *overrides, f"until_s={duration_s}", **changes)
         schedule = self.bench.schedule
         epoch_ns = self.clock.now_ns + schedule.countdown_ticks * schedule.period_ns
-        self.wire = Wire(self.bench, self.clock, epoch_ns - schedule.bus_time_ns(0))
+        self.wire = Wire(self.bench, self.clock, epoch_ns - Ticks(schedule).bus_time_ns(0))
         self.link = PoseLink(self.bench, self.clock, epoch_ns)
         nowhere = SimpleNamespace(put=lambda _: None)
         self.loop = RealtimeLoop(

@@ -5,6 +5,7 @@ from support.robot_bench import Bench
 from bridge.network.messages import LeaderSpeed, PathState
 from configs.edges import FOREVER, LEADER, InEdge
 from configs.leader_speed import SpeedChange
+from configs.ticks import Ticks
 
 GAPS = ((0, 20), (40, 60), (81, FOREVER))
 
@@ -23,7 +24,7 @@ def test_a_neighbour_counts_from_its_first_path_state_in_a_window_until_the_wind
     one = bench()
     counted = []
     for tick in range(100):
-        if one.schedule.shares(tick):
+        if Ticks(one.schedule).shares(tick):
             say(one, tick)
         one.tick()
         counted.append(one.agent._neighbours.sums(tick * one.schedule.period_ns, 0.0).neighbours)

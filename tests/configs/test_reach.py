@@ -5,7 +5,7 @@ from math import inf, nan
 import pytest
 
 from configs.loading import load
-from configs.reach import MOST_AMPLIFIED, Reach, reach_of, within_world
+from configs.reach import MOST_AMPLIFIED, Reach, beyond, reach_of, within_world
 
 PAPER = load("paper").reach
 
@@ -22,21 +22,21 @@ def test_the_bounds_of_the_paper_s_scenario_are_the_documented_ones() -> None:
 
 def test_the_bound_moves_with_the_fastest_speed() -> None:
     top = PAPER.s_max_m + 0.6 * 30.0
-    assert PAPER.beyond(30.0, top - 1e-9, 0.6) is None
-    assert "where this scenario has" in str(PAPER.beyond(30.0, top + 1e-6, 0.6))
-    assert PAPER.beyond(0.0, top, 0.6) is not None
+    assert beyond(PAPER, 30.0, top - 1e-9, 0.6) is None
+    assert "where this scenario has" in str(beyond(PAPER, 30.0, top + 1e-6, 0.6))
+    assert beyond(PAPER, 0.0, top, 0.6) is not None
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf, 1e308])
 def test_what_is_no_number_is_beyond(value: float) -> None:
-    assert PAPER.beyond(1.0, value, 0.6) is not None
-    assert PAPER.beyond(1.0, 0.0, value) is not None
+    assert beyond(PAPER, 1.0, value, 0.6) is not None
+    assert beyond(PAPER, 1.0, 0.0, value) is not None
     assert not within_world(value, 0.0, 0.0)
     assert not within_world(0.0, 0.0, value)
 
 
 def test_a_path_variable_may_stand_still_for_ever() -> None:
-    assert PAPER.beyond(1e6, 0.0, 0.0) is None
+    assert beyond(PAPER, 1e6, 0.0, 0.0) is None
 
 
 def test_a_chain_that_amplifies_has_room_for_it() -> None:
@@ -53,5 +53,5 @@ def test_a_chain_that_amplifies_has_room_for_it() -> None:
 @pytest.mark.parametrize("q", [1e-308, 1e308])
 def test_absurd_gains_give_bounds_that_are_numbers(p: float, q: float) -> None:
     bounds: Reach = reach_of([0.0, 1.0], [0.0, 0.6], mu_0=1.0, p=p, q=q, max_in_degree=1.0)
-    assert bounds.beyond(0.0, 0.5, 0.3) is None
-    assert bounds.beyond(0.0, 1e12, 0.3) is not None
+    assert beyond(bounds, 0.0, 0.5, 0.3) is None
+    assert beyond(bounds, 0.0, 1e12, 0.3) is not None

@@ -17,8 +17,8 @@ def test_due_is_what_was_shared_or_taken_its_delay_ago(
     ticks = Ticks(schedule)
     shared = {k for k in range(401) if k % share_every == 0}
     taken = {k for k in range(401) if k % localise_every == 0}
-    assert ticks.shares(tick) == schedule.shares(tick) == (tick in shared)
-    assert ticks.localises(tick) == schedule.localises(tick) == (tick in taken)
-    assert ticks.bus_time_ns(tick) == schedule.bus_time_ns(tick) == (tick + 60) * 1_000_000
+    assert ticks.shares(tick) == (tick in shared)
+    assert ticks.localises(tick) == (tick in taken)
+    assert ticks.bus_time_ns(tick) == (tick + 60) * 1_000_000
     posed, placed = tick - delay in taken, tick - max(delay, 1) in taken
     assert ticks.owes(tick) == (tick in shared or posed or placed)

@@ -21,6 +21,7 @@ from configs.events import Event
 from configs.faults.kinds import KINDS
 from configs.loading import load
 from configs.resolve import plant_brief
+from configs.ticks import Ticks
 from plant.absent import AbsentControllers
 from plant.lockstep import ANSWER_SHARE, LockstepLoop
 from plant.orders import PlantOrders
@@ -110,7 +111,7 @@ class Bench:
     def at(self, robot: str, tick: int, act: Callable[[], object]) -> None:
         """Do something once, when a controller was asked at a tick, before anybody answers."""
         before, done = self.hub.script, []
-        asked_ns = self.schedule.bus_time_ns(tick - 1)
+        asked_ns = Ticks(self.schedule).bus_time_ns(tick - 1)
 
         def script() -> None:
             before()
@@ -147,7 +148,7 @@ def test_without_anybody_late_every_policy_is_the_same(benches) -> None:
     for policy in ("abort", "hold", "drop"):
         bench = benches(policy)
         bench.run()
-        stamps = [bench.schedule.bus_time_ns(tick) for tick in range(-COUNTDOWN, TICKS + 1)]
+        stamps = [Ticks(bench.schedule).bus_time_ns(tick) for tick in range(-COUNTDOWN, TICKS + 1)]
         assert bench.controller("r1").stamps_ns == bench.controller("r2").stamps_ns == stamps
         assert (bench.events, bench.silent) == ([], {"r1": [], "r2": []})
         bench.hub.end()
@@ -266,7 +267,7 @@ def test_time_stands_still_until_a_killed_controller_has_come_again(benches) -> 
     said = [(40, "dropped"), (90, "awaited"), (90, "back")]
     assert bench.told() == [(tick, "r2", kind) for tick, kind in said]
     assert bench.silent["r2"] == [50, 60, 70, 80, 90]
-    stamps = [bench.schedule.bus_time_ns(tick) for tick in range(90, TICKS + 1)]
+    stamps = [Ticks(bench.schedule).bus_time_ns(tick) for tick in range(90, TICKS + 1)]
     assert bench.controller("r2").stamps_ns == stamps
     assert bench.ticks[-1] >= 90
 
@@ -362,7 +363,7 @@ def test_a_run_is_paused_stepped_and_sped_and_computes_the_same_ticks(benches) -
         if Pace.PAUSE in reached_ns and now_ns - reached_ns[Pace.PAUSE][0] > 3 * 10**9:
             stamps = {bench.controller(robot).stamps_ns[-1] for robot in ("r1", "r2")}
             assert Pace.STEP in asked or stamps == {
-                bench.schedule.bus_time_ns(reached_ns[Pace.PAUSE][1])
+                Ticks(bench.schedule).bus_time_ns(reached_ns[Pace.PAUSE][1])
             }
             ask(Pace.STEP, 10.0)
         if Pace.STEP in reached_ns:
@@ -372,7 +373,7 @@ def test_a_run_is_paused_stepped_and_sped_and_computes_the_same_ticks(benches) -
     bench.hub.script = script
     began_ns = bench.clock.now_ns
     bench.run()
-    stamps = [bench.schedule.bus_time_ns(tick) for tick in range(-COUNTDOWN, TICKS + 1)]
+    stamps = [Ticks(bench.schedule).bus_time_ns(tick) for tick in range(-COUNTDOWN, TICKS + 1)]
     assert bench.controller("r1").stamps_ns == bench.controller("r2").stamps_ns == stamps
     paused = reached_ns[Pace.PAUSE][1]
     assert 40 <= paused <= 40 + LEAD_TICKS

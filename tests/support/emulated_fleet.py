@@ -10,6 +10,7 @@ from bridge.drives.odrive.frames import AxisError, AxisState
 from bridge.network.telemetry import FRAME_ROW
 from configs.loading import load
 from configs.resolve import agent_brief, leader_brief, plant_brief
+from configs.ticks import Ticks
 from fleetloop.in_process.run import InProcessRun
 from fleetloop.record.writer import Source
 from plant.bus.timed import TimedBus
@@ -111,7 +112,7 @@ class Fleet:
         """What passed on a bus from tick 0 on, of one identifier or all."""
         for log in self.run._logs.values():
             log._flush(final=False)
-        zero_ns = self.plant.schedule.bus_time_ns(0)
+        zero_ns = Ticks(self.plant.schedule).bus_time_ns(0)
         rows = FRAME_ROW.iter_unpack(b"".join(self._frames.get(bus, [])))
         return [
             Passed((end_ns - zero_ns) * 1e-9, found, data[:length], bool(flags))

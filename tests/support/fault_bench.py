@@ -11,6 +11,7 @@ from bridge.fault_schedule import FaultSchedule
 from bridge.frame import Frame
 from configs.loading import load
 from configs.resolve import plant_brief
+from configs.ticks import Ticks
 from plant.faults import BusFaults
 from plant.robot import emulated_robot
 
@@ -101,7 +102,7 @@ class FaultBench:
 
     @property
     def bus_ns(self) -> int:
-        return self.ticks.bus_time_ns(self.now)
+        return Ticks(self.ticks).bus_time_ns(self.now)
 
     def run(self, ticks: int) -> None:
         for _ in range(ticks):

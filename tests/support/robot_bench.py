@@ -17,6 +17,7 @@ from configs.connections import NetworkLink
 from configs.loading import load
 from configs.resolve import agent_brief, plant_brief
 from configs.signals import controller_signals
+from configs.ticks import Ticks
 
 NOWHERE = NetworkLink("test", "", "", "")
 AT_ONCE = "drive.boot_s=0.0"  # a reboot takes no time
@@ -58,7 +59,7 @@ class Bench:
     @property
     def now_ns(self) -> int:
         """Bus time of the tick that comes next."""
-        return self.schedule.bus_time_ns(self.tick_now)
+        return Ticks(self.schedule).bus_time_ns(self.tick_now)
 
     @property
     def phase(self) -> Phase:
@@ -86,7 +87,7 @@ class Bench:
                 node = axis.node_id
                 if node not in self.silent and (node, command) not in self.mute:
                     self.agent.on_frame(frame.can_id, frame.data, now_ns)
-        if self.pose is not None and self.schedule.localises(tick):
+        if self.pose is not None and Ticks(self.schedule).localises(tick):
             self.agent.receive_pose(PoseFix(tick, tick * self.schedule.period_ns, *self.pose))
 
     def answer(self, frames: list[Frame]) -> None:

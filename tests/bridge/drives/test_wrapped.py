@@ -132,6 +132,19 @@ def test_what_a_client_raises_or_answers_wrongly_is_named(
     assert wrong in said
 
 
+def test_a_torque_that_is_not_finite_is_named() -> None:
+    made: Any = OwnNode()
+    made.torque_demand_shaft = lambda _: float("inf")
+    with pytest.raises(InfrastructureError, match="torque_demand_shaft gave inf: must be finite"):
+        node(made).torque_demand_shaft(0.001)
+
+
+def test_an_error_of_a_shipped_protocol_stays_what_it_is() -> None:
+    shipped = Own(Plugin("drive protocol", "odrive", "bridge.drives.odrive:ROW"), "client of r1")
+    with pytest.raises(KeyError, match="nothing there"):
+        shipped.ask("motion", _raise, float)
+
+
 def test_an_attribute_that_is_none_is_named() -> None:
     made: Any = OwnNode()
     made.setpoint_id = None

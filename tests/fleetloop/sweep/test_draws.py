@@ -2,6 +2,7 @@
 
 import math
 from statistics import NormalDist
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from fleetloop.sweep.draws import (
     NormalDraw,
     Spaced,
     Uniform,
+    level,
 )
 
 U = st.floats(0.0, 1.0, exclude_max=True)
@@ -42,21 +44,31 @@ def test_a_greater_sample_never_has_a_lesser_value(draw: Draw, one: float, other
     assert ranks == sorted(ranks)
 
 
+def levels(draw: Draw) -> list[Any]:
+    count = draw.count
+    assert count is not None
+    return [level(draw, n) for n in range(count)]
+
+
 @pytest.mark.parametrize("draw", [one for one in DRAWS if one.count is not None])
 def test_each_level_has_an_equal_share_of_the_samples(draw: Draw) -> None:
-    count = draw.count
-    middles = [(n + 0.5) / count for n in range(count)]
-    assert [draw.at(u) for u in middles] == [draw.level(n) for n in range(count)]
-    assert draw.at(0.0) == draw.level(0)
-    assert draw.at(math.nextafter(1.0, 0.0)) == draw.level(count - 1)
+    every = levels(draw)
+    assert len(set(every)) == len(every)
+    for n, value in enumerate(every):
+        assert draw.at(math.nextafter((n + 1.0) / len(every), 0.0)) == value
+    assert draw.at(0.0) == every[0]
+
+
+def test_levels_are_the_values_themselves_in_their_order() -> None:
+    assert levels(Levels(("b", "a", "c"))) == ["b", "a", "c"]
+    assert levels(Integers(3, 7)) == [3, 4, 5, 6, 7]
+    assert levels(Graphs(2, 4, 2, ("r1", "r2"))) == [2, 3, 4]
+    assert levels(Integers(0, 9_999)) == list(range(10_000))
 
 
 def test_a_range_includes_both_ends_and_is_even_in_its_logarithm() -> None:
-    even = [Spaced(0.0, 0.3, 4).level(n) for n in range(4)]
-    assert even == [0.0, 0.1, 0.2, 0.3]
-    assert [Spaced(0.01, 100.0, 5, log=True).level(n) for n in range(5)] == [
-        0.01, 0.1, 1.0, 10.0, 100.0,
-    ]  # fmt: skip
+    assert levels(Spaced(0.0, 0.3, 4)) == [0.0, 0.1, 0.2, 0.3]
+    assert levels(Spaced(0.01, 100.0, 5, log=True)) == [0.01, 0.1, 1.0, 10.0, 100.0]
 
 
 @given(U)

@@ -14,6 +14,7 @@ from bridge.wire.node import NodeState
 from configs.faults.kinds import KINDS
 from configs.loading import load
 from configs.resolve import plant_brief
+from configs.ticks import Ticks
 from plant.bus.build import timed_bus
 from plant.bus.ideal import IdealBus
 from plant.disturbance import BUS_EFFECTS
@@ -120,7 +121,7 @@ def test_delayed_set_points_reach_the_drive_late_and_its_watchdog_counts_from_th
     fleet = Fleet(late).until(0.3)
     torques = [round(frame.t_s / H) for frame in fleet.passed(can_id=TORQUE)]
     assert torques == [*range(20), *range(24, 60)]
-    assert fleet.robot().drives[0].fed_ns == fleet.plant.schedule.bus_time_ns(59)
+    assert fleet.robot().drives[0].fed_ns == Ticks(fleet.plant.schedule).bus_time_ns(59)
     assert fleet.states() == [CLOSED, CLOSED]
 
 
@@ -354,7 +355,7 @@ class Wall:
 
     def tick(self) -> list[int]:
         """A tick: identifiers that clients hear."""
-        bus_ns = self.schedule.bus_time_ns(self.tick_number)
+        bus_ns = Ticks(self.schedule).bus_time_ns(self.tick_number)
         self.port.questions.clear()
         self.bus.move(bus_ns)
         self.bus.faults.begin(self.tick_number)
@@ -366,7 +367,7 @@ class Wall:
         """Clients send frames so long after the tick: identifiers that they hear at once."""
         self.port.questions.clear()
         self.port.frames = list(frames)
-        self.bus.react(self.schedule.bus_time_ns(self.tick_number - 1) + after_ns)
+        self.bus.react(Ticks(self.schedule).bus_time_ns(self.tick_number - 1) + after_ns)
         return self._heard()
 
     def _heard(self) -> list[int]:
@@ -413,10 +414,10 @@ def test_in_real_time_a_client_on_a_cut_wire_is_not_acknowledged_and_its_queue_f
     bus = timed_bus(plant, "r1", [robot], port, lambda _: None, no_tap)
     freed = []
     for tick in range(3):
-        bus.advance(plant.schedule.bus_time_ns(tick))
+        bus.advance(Ticks(plant.schedule).bus_time_ns(tick))
         bus.faults.begin(tick)
         bus.submit([Submitted(1, REQUEST)] * 12)
-        bus.advance(plant.schedule.bus_time_ns(tick) + 8 * MS)
+        bus.advance(Ticks(plant.schedule).bus_time_ns(tick) + 8 * MS)
         told = [*port._freed, *(one for given in port.questions for one in given.freed)]
         freed.append(sum(count for _, count in told) - sum(freed))
         counts = bus.node_counts()["1"]

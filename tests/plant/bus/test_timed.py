@@ -17,6 +17,7 @@ from configs.brief import PlantBrief
 from configs.connections import NetworkLink
 from configs.loading import load, loads
 from configs.resolve import plant_brief
+from configs.ticks import Ticks
 from plant.bus.build import timed_bus
 from plant.bus.timed import TimedBus
 from plant.robot import emulated_robot
@@ -76,7 +77,7 @@ class Driven:
 def test_the_controller_is_asked_when_the_last_frame_of_its_drives_has_ended() -> None:
     driven = Driven(lambda _: [])
     driven.tick()
-    start_ns = driven.schedule.bus_time_ns(driven.tick_number)
+    start_ns = Ticks(driven.schedule).bus_time_ns(driven.tick_number)
     (ask,) = driven.tick()
     assert [passed.frame.can_id for passed in ask.transmitted] == [0x009, 0x029]
     first, second = (passed.end_ns for passed in ask.transmitted)
@@ -93,8 +94,8 @@ def test_a_torque_acts_within_the_tick_when_its_frame_has_ended() -> None:
     assert driven.robot.state.v == 0.0  # held during the countdown
     driven.tick()  # tick 0: torques of this tick arrive after about 0.4 ms
     mbar, r, share = driven.robot._body.mbar_1, 0.04, 0.001 - 0.00041
-    assert driven.robot.moved_ns < driven.schedule.bus_time_ns(1)
-    driven.bus.advance(driven.schedule.bus_time_ns(1))
+    assert driven.robot.moved_ns < Ticks(driven.schedule).bus_time_ns(1)
+    driven.bus.advance(Ticks(driven.schedule).bus_time_ns(1))
     expected = r / 2 * 0.2 / mbar * share
     assert driven.robot.state.v == pytest.approx(expected, rel=0.1)
 
@@ -128,7 +129,7 @@ def test_on_a_starved_bus_the_controller_is_asked_at_the_end_of_each_tick() -> N
     driven.ticks(3)
     driven.bus.wire.attach("babbler", queue=Endless(Frame(0x000, bytes(8))))
     asks = driven.ticks(3)
-    ends = [driven.schedule.bus_time_ns(driven.tick_number - n) - 1 for n in (2, 1, 0)]
+    ends = [Ticks(driven.schedule).bus_time_ns(driven.tick_number - n) - 1 for n in (2, 1, 0)]
     assert [ask.stamp_ns for ask in asks] == ends
 
 
