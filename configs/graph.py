@@ -16,12 +16,15 @@ import itertools
 import random
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
 from configs.edges import FOREVER, LEADER, Edge, InEdge, Windows, next_change
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 Matrix = NDArray[np.float64]
 
@@ -158,21 +161,28 @@ class Graph:
         return np.diag(adjacency.sum(axis=1)) - adjacency
 
     def roots(self) -> tuple[str, ...]:
-        """Robots that reach all others: the strong component that none leads to, if it is one."""
-        strong = nx.condensation(self.digraph().subgraph(self.robots))
-        first = [strong.nodes[n]["members"] for n, degree in strong.in_degree() if not degree]
-        return tuple(r for r in self.robots if r in first[0]) if len(first) == 1 else ()
+        """Robots that reach all others."""
+        everybody = self._reached().all(axis=0).tolist()
+        return tuple(itertools.compress(self.robots, everybody))
 
     def unreached_from(self, speakers: Iterable[str]) -> tuple[str, ...]:
-        """Robots that none of the speakers reaches, directly or through others."""
-        reached = set(speakers)
-        digraph = self.digraph()
-        for speaker in tuple(reached):
-            reached |= nx.descendants(digraph, speaker)
-        return tuple(robot for robot in self.robots if robot not in reached)
+        """Robots that none of these robots reaches, directly or through others."""
+        speaking = set(speakers)
+        columns = [robot in speaking for robot in self.robots]
+        unreached = ~self._reached()[:, columns].any(axis=1)
+        return tuple(itertools.compress(self.robots, unreached.tolist()))
+
+    def _reached(self) -> NDArray[np.bool_]:
+        """N × N: whether robot i is reached by robot j, itself included: (I + A)^N > 0."""
+        reached = self.adjacency() + np.eye(len(self.robots)) > 0.0
+        for _ in range(len(self.robots).bit_length()):
+            reached = reached.astype(np.float32) @ reached > 0.0
+        return reached
 
     def digraph(self) -> "nx.DiGraph":
         """The graph as networkx has it, weights on its edges, the leader a node like the robots."""
+        import networkx as nx  # runs do without: it takes as long to import as a run to start
+
         digraph = nx.DiGraph()
         digraph.add_nodes_from((LEADER, *self.robots))
         for robot in self.robots:

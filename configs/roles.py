@@ -52,12 +52,12 @@ class Role:
 
     name: str
     module: str = ""
-    """Runs it with `python -m`; empty for a role that no run starts."""
+    """Has its `main`, and runs it with `python -m`; empty for a role that no run starts."""
     brief: type | None = None
     """The type of its brief, given on standard input."""
     per_robot: bool = False
-    forked: bool = False
-    """Forked from a process that imported it; others get an interpreter of their own."""
+    in_step: bool = False
+    """Has work at every tick: such processes are forked from one, with the same memory layout."""
     beside_launcher: bool = False
     """Can't be placed on another machine."""
     observer: bool = False
@@ -83,9 +83,9 @@ class Role:
 LAUNCHER = Role(name="launcher")
 PLANT = Role(
     name="plant",
-    module="plant",
+    module="plant.__main__",
     brief=PlantBrief,
-    forked=True,
+    in_step=True,
     takes_orders=True,
     puts=(
         Topic.EMULATED_POSES,
@@ -99,10 +99,10 @@ PLANT = Role(
 )
 AGENT = Role(
     name="agent",
-    module="agents",
+    module="agents.__main__",
     brief=AgentBrief,
     per_robot=True,
-    forked=True,
+    in_step=True,
     takes_orders=True,
     puts=(Topic.OWN_PATH, Topic.OWN_TELEMETRY, Topic.OWN_INPUTS),
     hears=(
@@ -125,7 +125,7 @@ RECORDER = Role(
 )
 VIEWER = Role(
     name="viewer",
-    module="fleetloop.live",
+    module="fleetloop.live.__main__",
     brief=ViewerBrief,
     beside_launcher=True,
     observer=True,

@@ -19,7 +19,7 @@ from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.kernel_stat import kernel_stat
 from configs.errors import InfrastructureError
 from fleetloop.doctor.judgement import WakeUps
-from fleetloop.launch.child import refuse_shadowed_roles
+from fleetloop.launch.fork_server import refuse_shadowed_roles
 
 PRIORITY = 40
 """As a controller's."""
@@ -164,7 +164,7 @@ def versions() -> list[tuple[str, str]]:
 def package_problem() -> str:
     """Why processes would load what isn't ours, "" if they wouldn't."""
     try:
-        refuse_shadowed_roles(("agents", "plant", "fleetloop"))
+        refuse_shadowed_roles()
     except InfrastructureError as error:
         return str(error)
     return ""

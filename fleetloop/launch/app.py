@@ -103,30 +103,34 @@ def run(
     ] = False,
 ) -> None:
     """Run a scenario, record everything, check its expectations, print and save the results."""
+    from fleetloop.launch.fork_server import imports_begun
     from fleetloop.signals import deferred
 
-    with deferred() as came:
-        from fleetloop.launch.run import RunOptions, run_scenario
-
     refuse_both(as_json, json_lines)
-    options = RunOptions(
-        in_process=in_process,
-        speed=speed,
-        live=live,
-        overrides=overrides_of(
-            overrides, clock=clock, seed=seed, duration=duration, record_inputs=record_inputs
-        ),
-        out=out,
-        as_json=as_json,
-        json_lines=json_lines,
-        figures=figures,
-        profile=profile,
-        deployment=deployment,
-        allow_unchecked=allow_unchecked,
-        force=force,
-        junit=junit,
+    chosen = overrides_of(
+        overrides, clock=clock, seed=seed, duration=duration, record_inputs=record_inputs
     )
-    raise typer.Exit(run_scenario(scenario, options, interrupted=bool(came)))
+    with imports_begun(wanted=not in_process) as fork_server:
+        with deferred() as came:
+            from fleetloop.launch.run import RunOptions, run_scenario
+
+        options = RunOptions(
+            in_process=in_process,
+            speed=speed,
+            live=live,
+            overrides=chosen,
+            out=out,
+            as_json=as_json,
+            json_lines=json_lines,
+            figures=figures,
+            profile=profile,
+            deployment=deployment,
+            allow_unchecked=allow_unchecked,
+            force=force,
+            junit=junit,
+        )
+        status = run_scenario(scenario, options, interrupted=bool(came), fork_server=fork_server)
+    raise typer.Exit(status)
 
 
 def agent(

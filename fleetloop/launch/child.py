@@ -10,7 +10,6 @@ import select
 import signal
 import threading
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 
 from bridge.process.clock import SYSTEM_CLOCK
 from bridge.process.kernel_stat import kernel_stat
@@ -197,22 +196,3 @@ def end(children: Sequence[Child], *, grace_s: float = TERM_GRACE_S) -> None:
         child.kill()
     for child in children:
         child.close()
-
-
-def refuse_shadowed_roles(modules: Iterable[str]) -> None:
-    """Refuse to start roles that aren't this installation's own.
-
-    Raises:
-        InfrastructureError: another package named `agents` or `plant` would be started.
-    """
-    import importlib.util
-
-    home = Path(__file__).resolve().parents[2]
-    for module in modules:
-        spec = importlib.util.find_spec(module)
-        origin = Path(spec.origin).resolve() if spec is not None and spec.origin else None
-        if origin is None or origin.parent.parent != home:
-            raise InfrastructureError(
-                f"the package {module!r} found at {origin} is not Fleetloop's own (expected in"
-                f" {home}): install Fleetloop in an environment of its own"
-            )

@@ -31,6 +31,7 @@ from fleetloop.launch import placement, wall_time
 from fleetloop.launch.accounts import stats_of
 from fleetloop.launch.drawn import drawing
 from fleetloop.launch.fault_ledger import FaultLedger
+from fleetloop.launch.fork_server import ForkServer
 from fleetloop.launch.process_run import ProcessRun
 from fleetloop.launch.viewer import NO_VIEWER
 from fleetloop.record.background import BackgroundWriter
@@ -199,11 +200,12 @@ def carry_out(
     deployment: Deployment,
     listener: Listener,
     stop: Stop,
+    fork_server: ForkServer | None = None,
 ) -> Carried:
     """Run a scenario that was prepared, into a folder `out` or one of its own.
 
     A run of which nothing could be recorded leaves no folder: its statistics say that it did not
-    begin.
+    begin. A fork server that was started before takes part; else one is started.
 
     Raises:
         ScenarioError: `out` exists and isn't empty.
@@ -218,7 +220,9 @@ def carry_out(
         if manner.in_process:
             carried = Carried(folder, run_in_process(scenario, folder, listener, stop))
         else:
-            carried = _run_over_processes(scenario, folder, manner, deployment, listener, stop)
+            carried = _run_over_processes(
+                scenario, folder, manner, deployment, listener, stop, fork_server
+            )
     except InfrastructureError:
         run_folder.discard(created)
         raise
@@ -236,6 +240,7 @@ def _run_over_processes(
     deployment: Deployment,
     listener: Listener,
     stop: Stop,
+    fork_server: ForkServer | None,
 ) -> Carried:
     name = f"{folder.name}-{SYSTEM_CLOCK.monotonic_ns() % 1_000_000:06d}"
     run = ProcessRun(
@@ -249,6 +254,7 @@ def _run_over_processes(
         on_notice=listener.on_notice,
         deployment=deployment,
         live=manner.live,
+        fork_server=fork_server,
     )
     listener.on_start(Start(folder, run.name, run.processes, run.robots))
     stats = stats_of(

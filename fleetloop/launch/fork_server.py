@@ -1,27 +1,32 @@
-"""The fork server: a process that imports the roles once and forks the processes of a run.
+"""Fork servers: processes that import the roles once and fork the processes of a run.
 
-    launcher ──role, pipes──► fork server ──fork──► plant, agents   and fork + exec ──► recorder
+    launcher ──role, pipes──► fork server ──fork──► plant, agents
+             ──role, pipes──► fork server ──fork──► recorder
 
-It has no thread and no network session, so forking is safe; it ends as soon as all are started, and
-the launcher adopts them. So a controller is ready without importing anything, and all processes
-have the same memory layout: on a core that they share, caches and branch predictors filled by one
-serve the next, which is worth a third of a lockstep tick.
+They have no thread and no network session, so forking is safe; they end as soon as all are started,
+and the launcher adopts the roles. So a controller is ready without importing anything, and all
+processes of a tick have the same memory layout: on a core that they share, caches and branch
+predictors filled by one serve the next, which is worth a third of a lockstep tick.
 
-If the launcher is killed before all are started, the fork server removes the run's folder of
+They import while the launcher still does: `ForkServer` needs nothing of the run, `serve` says it.
+
+If the launcher is killed before all are started, the fork servers remove the run's folder of
 sockets; later the recorder does.
 """
 
 import array
 import ctypes
 import gc
+import importlib
+import importlib.util
 import json
 import os
 import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
@@ -35,11 +40,11 @@ _PR_SET_CHILD_SUBREAPER = 36
 _MAX_FDS = 200
 """Descriptors that travel with one message; the kernel takes 253 and drops the rest silently."""
 _MORE, _ALL_STARTED = "+", "."
-_BATCH = "--batch"
-"""Processes start as batch work: one that is woken waits for its turn and interrupts none, which
-is worth a seventh of a lockstep tick."""
-_FORKED = tuple(role.module for role in STARTED if role.forked)
-"""Forked; any other module gets an interpreter of its own."""
+_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+"""Of numpy, which would start others when it is imported: then a process can't be forked."""
+IN_STEP = tuple(role.module for role in STARTED if role.in_step)
+"""Modules of one fork server; any other module has one of its own."""
+_GROUPS = (IN_STEP, *((role.module,) for role in STARTED if not role.in_step))
 
 
 class Forked(NamedTuple):
@@ -50,33 +55,43 @@ class Forked(NamedTuple):
 
 
 class ForkServer:
-    """The launcher's end; a context manager that returns when the fork server has ended.
+    """The launcher's end; a context manager that returns when the fork servers have ended.
 
     Args:
-        folder: the run's folder of sockets, which may not exist yet.
-        batch: processes care for throughput, not for the moment at which they are woken.
+        groups: the modules that each fork server imports; default: those of all roles of a run.
+
+    Raises:
+        InfrastructureError: other packages have the names of ours, or the system refuses.
     """
 
-    def __init__(self, folder: Path, *, batch: bool) -> None:
+    def __init__(self, *groups: Sequence[str]) -> None:
+        refuse_shadowed_roles()
         _adopt_orphans()
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._socket = ours
-        self._socket.settimeout(START_S)
-        options = [str(folder), *([_BATCH] if batch else [])]
-        # Ctrl-C is the launcher's business: fork server and roles start with it blocked.
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        self._servers: list[_Server] = []
+        self._of: dict[str, _Server] = {}
+        self._serving = False
         try:
-            with theirs:
-                # -P: a folder here that is named like one of our packages must not shadow it.
-                self._process = subprocess.Popen(
-                    [sys.executable, "-P", "-m", "fleetloop.launch.fork_server", *options],
-                    stdin=theirs.fileno(),
-                    stdout=subprocess.DEVNULL,
-                    start_new_session=True,
-                    env=packages.environment(),
-                )
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+            for modules in groups or _GROUPS:
+                server = _Server(modules)
+                self._servers.append(server)
+                self._of.update(dict.fromkeys(modules, server))
+        except OSError as error:
+            self.close()
+            raise InfrastructureError(f"can't start a fork server: {error.strerror}") from error
+
+    def serve(self, folder: Path, *, batch: bool) -> None:
+        """Say for which run they are.
+
+        Args:
+            folder: the run's folder of sockets, which may not exist yet.
+            batch: processes care for throughput, not for the moment at which they are woken: one
+                that is woken waits for its turn and interrupts none, which is worth a seventh of a
+                lockstep tick.
+        """
+        self._serving = True
+        for server in self._servers:
+            with suppress(OSError):  # its end is seen with the first process
+                server.socket.send(json.dumps([str(folder), batch]).encode())
 
     def fork(self, module: str, stdin: int, stdout: int, fds: Sequence[int] = ()) -> Forked:
         """Start a process of a role with these descriptors.
@@ -84,13 +99,13 @@ class ForkServer:
         Raises:
             InfrastructureError: the fork server is gone, doesn't answer, or the system refuses.
         """
-        passed = [stdin, stdout, *fds]
+        passed, end = [stdin, stdout, *fds], self._of[module].socket
         try:
             while len(passed) > _MAX_FDS:
-                socket.send_fds(self._socket, [_MORE.encode()], passed[:_MAX_FDS])
+                socket.send_fds(end, [_MORE.encode()], passed[:_MAX_FDS])
                 passed = passed[_MAX_FDS:]
-            socket.send_fds(self._socket, [module.encode()], passed)
-            answer = self._socket.recv(65536)
+            socket.send_fds(end, [module.encode()], passed)
+            answer = end.recv(65536)
         except OSError as error:
             raise InfrastructureError(f"can't start {module}: the fork server: {error}") from error
         if not answer:
@@ -109,14 +124,78 @@ class ForkServer:
         value: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        with suppress(OSError):
-            self._socket.send(_ALL_STARTED.encode())
-        self._socket.close()
+        self.close()
+
+    def close(self) -> None:
+        """End them; what they have forked goes on. Idempotent."""
+        for server in self._servers:
+            if self._serving:
+                with suppress(OSError):
+                    server.socket.send(_ALL_STARTED.encode())
+            else:  # it has forked nothing, and may import for a while
+                server.process.kill()
+            server.socket.close()
+        for server in self._servers:
+            try:
+                server.process.wait(START_S)
+            except subprocess.TimeoutExpired:
+                server.process.kill()
+                server.process.wait()
+
+
+class _Server:
+    """One fork server, as the launcher has it."""
+
+    def __init__(self, modules: Sequence[str]) -> None:
+        self.socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.socket.settimeout(START_S)
+        # Ctrl-C is the launcher's business: fork server and roles start with it blocked.
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            self._process.wait(START_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+            with theirs:
+                # -P: a folder here that is named like one of our packages must not shadow it.
+                self.process = subprocess.Popen(
+                    [sys.executable, "-P", "-m", "fleetloop.launch.fork_server", *modules],
+                    stdin=theirs.fileno(),
+                    stdout=subprocess.DEVNULL,
+                    start_new_session=True,
+                    env=packages.environment() | _ONE_THREAD,
+                )
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+@contextmanager
+def imports_begun(*, wanted: bool) -> Iterator[ForkServer | None]:
+    """Fork servers that import while this program does; what keeps them is told when they are used.
+
+    Those that no run has used by then are ended at once.
+    """
+    fork_server = None
+    if wanted:
+        with suppress(InfrastructureError):
+            fork_server = ForkServer()
+    try:
+        yield fork_server
+    finally:
+        if fork_server is not None:
+            fork_server.close()
+
+
+def refuse_shadowed_roles() -> None:
+    """Refuse to start roles that aren't this installation's own.
+
+    Raises:
+        InfrastructureError: another package named `agents` or `plant` would be started.
+    """
+    for name in ("agents", "plant", "fleetloop"):
+        spec = importlib.util.find_spec(name)
+        origin = Path(spec.origin).resolve() if spec is not None and spec.origin else None
+        if origin is None or origin.parent.parent != packages.HOME:
+            raise InfrastructureError(
+                f"the package {name!r} found at {origin} is not Fleetloop's own (expected in"
+                f" {packages.HOME}): install Fleetloop in an environment of its own"
+            )
 
 
 def _adopt_orphans() -> None:
@@ -127,16 +206,19 @@ def _adopt_orphans() -> None:
 # --- the server's own process ---------------------------------------------------------------------
 
 
-def _serve(folder: Path) -> None:
+def _serve(modules: Sequence[str]) -> None:
     from bridge.can_bus import sockets
 
-    if _BATCH in sys.argv:
-        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
-    for role in _FORKED:
-        __import__(f"{role}.__main__")
+    for module in modules:
+        importlib.import_module(module)
     gc.collect()
     gc.freeze()
     orders = socket.socket(fileno=os.dup(0))
+    if not (said := orders.recv(65536)):
+        return
+    folder, batch = json.loads(said)
+    if batch:
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
     while True:
         try:
             module, fds = _receive(orders)
@@ -146,7 +228,7 @@ def _serve(folder: Path) -> None:
         if module == _ALL_STARTED:
             return
         if not module:  # the launcher was killed
-            sockets.remove_run_folder(folder)
+            sockets.remove_run_folder(Path(folder))
             return
         try:
             child = os.fork()
@@ -190,7 +272,7 @@ def _receive(orders: socket.socket) -> tuple[str, list[int]]:
     return order, list(fds)
 
 
-def _be(module: str, stdin: int, stdout: int, *given: int) -> None:
+def _be(module: str, stdin: int, stdout: int, *_: int) -> None:
     """In the child: become the process, its other descriptors as they came. Never returns."""
     status = 1
     try:
@@ -198,12 +280,7 @@ def _be(module: str, stdin: int, stdout: int, *given: int) -> None:
         for fd, standard in ((stdin, 0), (stdout, 1)):
             os.dup2(fd, standard)
             os.close(fd)
-        if module not in _FORKED:
-            for fd in given:
-                os.set_inheritable(fd, True)
-            os.execv(sys.executable, [sys.executable, "-P", "-m", module])
-        role = sys.modules[f"{module}.__main__"]
-        status = role.main()
+        status = sys.modules[module].main()
     except BaseException:
         sys.excepthook(*sys.exc_info())
     finally:
@@ -214,4 +291,5 @@ def _be(module: str, stdin: int, stdout: int, *given: int) -> None:
 
 
 if __name__ == "__main__":
-    _serve(Path(sys.argv[1]))
+    _serve(sys.argv[1:])
+    os._exit(0)  # the launcher waits for it, and there is nothing to clean up

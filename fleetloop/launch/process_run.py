@@ -36,7 +36,7 @@ from configs.scenario import Scenario
 from fleetloop.door.server import Door
 from fleetloop.launch import open_files, placement
 from fleetloop.launch.accounts import complete
-from fleetloop.launch.child import GAVE_UP, Child, Failure, end, refuse_shadowed_roles
+from fleetloop.launch.child import GAVE_UP, Child, Failure, end
 from fleetloop.launch.clock_gate import ClockGate
 from fleetloop.launch.clock_offsets import EVERY_S, START_EVERY_S
 from fleetloop.launch.control_plane import ControlPlane
@@ -81,9 +81,11 @@ class ProcessRun:
         on_notice: Callable[[str, str], None] = lambda *_: None,
         deployment: Deployment | None = None,
         live: bool = False,
+        fork_server: ForkServer | None = None,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         self._clock = clock
+        self._fork_server = fork_server
         self._live = live
         self._scenario = scenario
         self._deployment = deployment or Deployment()
@@ -159,7 +161,6 @@ class ProcessRun:
         Raises:
             InfrastructureError: the run could not start.
         """
-        refuse_shadowed_roles(("agents", "plant", "fleetloop"))
         open_files.ensure(len(self._processes))
         began = self._clock.monotonic_s()
         try:
@@ -200,9 +201,9 @@ class ProcessRun:
         """Router and processes."""
         scenario, run = self._scenario, self._run
         with contextlib.ExitStack() as open_:
-            # It imports while the router opens, and knows the folder before there is one.
-            batch = not self._schedule.realtime
-            with ForkServer(sockets.folder_of(run), batch=batch) as fork_server:
+            with self._fork_server or ForkServer() as fork_server:
+                # Before there is a folder: a launcher that is killed leaves none.
+                fork_server.serve(sockets.folder_of(run), batch=not self._schedule.realtime)
                 folder = open_.enter_context(sockets.run_folder(run))
                 self._lines = open_.enter_context(RowLines())
                 link = open_.enter_context(self._router(folder, stop))

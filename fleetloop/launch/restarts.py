@@ -16,7 +16,7 @@ from configs.events import EventLog
 from configs.roles import AGENT
 from fleetloop.launch.child import Child, Failure
 from fleetloop.launch.control_plane import ControlPlane
-from fleetloop.launch.fork_server import ForkServer
+from fleetloop.launch.fork_server import IN_STEP, ForkServer
 
 
 class Restarts:
@@ -26,7 +26,7 @@ class Restarts:
         plane: of the run; its children are replaced.
         most: how often, all robots together.
         folder: of the run's sockets.
-        batch: see `ForkServer`.
+        batch: see `ForkServer.serve`.
         resume: told after a start, in which the launcher did nothing else.
         respawn: starts the controller of a robot again, by a fork server, in lockstep at a tick.
 
@@ -58,7 +58,12 @@ class Restarts:
     def _prepare(self) -> None:
         """Start the fork server of the next restart, if there may be one."""
         again = self._left > 0 or self._planned > 0
-        self._fork_server = ForkServer(self._folder, batch=self._batch) if again else None
+        self._fork_server = self._new() if again else None
+
+    def _new(self) -> ForkServer:
+        fork_server = ForkServer(IN_STEP)
+        fork_server.serve(self._folder, batch=self._batch)
+        return fork_server
 
     def plan(self, restarts: int) -> None:
         """Be prepared for so many besides, by faults."""
@@ -71,7 +76,7 @@ class Restarts:
 
     def __exit__(self, *_: object) -> None:
         if self._fork_server is not None:
-            self._fork_server.__exit__(None, None, None)
+            self._fork_server.close()
 
     def replace(self, failure: Failure, link: Link) -> bool:
         """Start the process that failed again; False if that isn't to be done.
@@ -103,7 +108,7 @@ class Restarts:
 
     def _start(self, robot: str, link: Link, tick: int) -> None:
         plane, process = self._plane, AGENT.process(robot)
-        fork_server = self._fork_server or ForkServer(self._folder, batch=self._batch)
+        fork_server = self._fork_server or self._new()
         with fork_server:  # has to end, so that the launcher is the parent
             plane.children.append(self._respawn(robot, fork_server, tick))
         self._prepare()

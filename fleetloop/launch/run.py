@@ -22,6 +22,7 @@ from fleetloop.launch.conduct import (
     carry_out,
     prepare,
 )
+from fleetloop.launch.fork_server import ForkServer
 from fleetloop.launch.run_lines import RunLines
 from fleetloop.record.scan import RecordError
 from fleetloop.results.junit import write_junit
@@ -119,7 +120,13 @@ class _Teller:
 
 
 @interruptible
-def run_scenario(source: str, options: RunOptions, *, interrupted: bool = False) -> int:
+def run_scenario(
+    source: str,
+    options: RunOptions,
+    *,
+    interrupted: bool = False,
+    fork_server: ForkServer | None = None,
+) -> int:
     """Run a scenario, save and print its results; return the exit status.
 
     Where standard output is JSON an error is told as an outcome, too, and not raised; so is Ctrl-C
@@ -129,6 +136,7 @@ def run_scenario(source: str, options: RunOptions, *, interrupted: bool = False)
         source: name or file of the scenario.
         options: of the command line.
         interrupted: Ctrl-C came before this.
+        fork_server: one that was started before; default: one is started.
 
     Raises:
         ScenarioError: the scenario or an option is wrong; nothing was started.
@@ -136,7 +144,7 @@ def run_scenario(source: str, options: RunOptions, *, interrupted: bool = False)
     """
     teller = _Teller(source, options)
     try:
-        return _run(source, options, teller, interrupted=interrupted)
+        return _run(source, options, teller, fork_server, interrupted=interrupted)
     except FleetloopError as error:
         if teller.told:
             raise
@@ -152,7 +160,14 @@ def run_scenario(source: str, options: RunOptions, *, interrupted: bool = False)
         return teller.tell(unbegun(source, "interrupted", reason, ExitStatus.INTERRUPTED))
 
 
-def _run(source: str, options: RunOptions, teller: _Teller, *, interrupted: bool) -> int:
+def _run(
+    source: str,
+    options: RunOptions,
+    teller: _Teller,
+    fork_server: ForkServer | None,
+    *,
+    interrupted: bool,
+) -> int:
     if interrupted:
         raise KeyboardInterrupt
     scenario = load(source, options.overrides)
@@ -176,7 +191,7 @@ def _run(source: str, options: RunOptions, teller: _Teller, *, interrupted: bool
         live = _Live(progress, schedule(scenario).period_ns)
         listener = live.listener if told is None else told.listener
         teller.begun = True
-        carried = carry_out(scenario, options.out, manner, deployment, listener, stop)
+        carried = carry_out(scenario, options.out, manner, deployment, listener, stop, fork_server)
     ended, reason = carried.stats.ended, carried.stats.reason
     if not carried.stats.began:
         note(f"{ended}: {reason}; the run did not begin")

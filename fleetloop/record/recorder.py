@@ -347,5 +347,10 @@ def _tidy(brief: RecorderBrief) -> None:
     sockets.remove_run_folder(Path(brief.runtime_folder))
 
 
+def main() -> int:
+    """Serve as the recorder; return the exit status."""
+    return serve(RecorderBrief, run, name=RECORDER.name, orphaned=_tidy)
+
+
 if __name__ == "__main__":
-    raise SystemExit(serve(RecorderBrief, run, name=RECORDER.name, orphaned=_tidy))
+    raise SystemExit(main())

@@ -8,8 +8,7 @@ from fleetloop.launch.spawn import BRIEFS
 
 def test_every_role_that_a_run_starts_has_a_module_a_brief_and_what_fills_it() -> None:
     for role in STARTED:
-        name = role.module if role.module.count(".") else f"{role.module}.__main__"
-        assert importlib.util.find_spec(name) is not None, role
+        assert importlib.util.find_spec(role.module) is not None, role
         assert role.brief is not None, role
     assert BRIEFS.keys() == {role.name for role in STARTED}
 
