@@ -162,15 +162,15 @@ class Graph:
 
     def roots(self) -> tuple[str, ...]:
         """Robots that reach all others."""
-        everybody = self._reached().all(axis=0).tolist()
+        everybody = np.all(self._reached(), axis=0)
         return tuple(itertools.compress(self.robots, everybody))
 
     def unreached_from(self, speakers: Iterable[str]) -> tuple[str, ...]:
         """Robots that none of these robots reaches, directly or through others."""
         speaking = set(speakers)
         columns = [robot in speaking for robot in self.robots]
-        unreached = ~self._reached()[:, columns].any(axis=1)
-        return tuple(itertools.compress(self.robots, unreached.tolist()))
+        unreached = ~np.any(self._reached()[:, columns], axis=1)
+        return tuple(itertools.compress(self.robots, unreached))
 
     def _reached(self) -> NDArray[np.bool_]:
         """N × N: whether robot i is reached by robot j, itself included: (I + A)^N > 0."""

@@ -20,9 +20,11 @@ WHERE = "fault"
 
 
 class _Order(BaseModel):
-    """A file of one fault."""
+    """A file of one fault; its validators are built with the first order."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, defer_build=True
+    )
     fault: AnyFault
 
 
