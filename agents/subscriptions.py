@@ -13,13 +13,15 @@ the gap is discarded by the agent, or lost on the emulated edge.
 """
 
 from collections.abc import Mapping
+from typing import Final
 
 from bridge.network import keys
 from bridge.network.link import Link
 from configs.brief import AgentBrief
 from configs.edges import InEdge, next_change
 
-LEAVES, RETURNS = 1.1, 1.05
+LEAVES: Final = 1.1
+RETURNS: Final = 1.05
 
 
 class Subscriptions:

@@ -22,17 +22,17 @@ hull.
 
 from collections.abc import Sequence
 from math import exp, log, pi, sqrt, tanh
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-MOST_AMPLIFIED = 250.0
-LONGEST_S = 1e6
-POSITION_LIMIT_M = 1e7
+MOST_AMPLIFIED: Final = 250.0
+LONGEST_S: Final = 1e6
+POSITION_LIMIT_M: Final = 1e7
 """No pose is farther from the world's origin: a quarter of the Earth's circumference."""
-HEADING_LIMIT_RAD = 1e6
+HEADING_LIMIT_RAD: Final = 1e6
 """No heading, which need not be wrapped, is beyond this."""
-_LEAST_DAMPING = 1e-3
-_LEAST_PULL_1_S2 = 1e-300  # what can be divided by
-_LEAST_SPEED_MARGIN_M_S = 0.1
+_LEAST_DAMPING: Final = 1e-3
+_LEAST_PULL_1_S2: Final = 1e-300  # what can be divided by
+_LEAST_SPEED_MARGIN_M_S: Final = 0.1
 
 
 def within_world(x_m: float, y_m: float, theta_rad: float) -> bool:

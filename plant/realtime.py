@@ -10,6 +10,7 @@ cyclically, as always.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Final
 
 from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
@@ -28,7 +29,7 @@ from plant.lockstep import REPORT_EVERY_NS
 from plant.orders import PlantOrders
 from plant.robot import EmulatedRobot
 
-FAREWELL_S = 0.5
+FAREWELL_S: Final = 0.5
 """Time for which the plant outlasts its last tick, for controllers that act later."""
 
 

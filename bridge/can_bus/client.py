@@ -13,6 +13,7 @@ import logging
 import socket
 from collections import deque
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 import can
 
@@ -38,13 +39,13 @@ from bridge.can_bus.transport import connect
 from bridge.frame import Frame, flaw
 from bridge.process.clock import SYSTEM_CLOCK
 
-FLUSH_S = 10.0
+FLUSH_S: Final = 10.0
 """How long a batched client waits for a hub that doesn't read."""
-PATIENCE_S = 1.0
+PATIENCE_S: Final = 1.0
 """How long a sender without a timeout waits for a hub that doesn't read."""
 TimedFrame = tuple[int, Frame]
 """A frame and the bus time of its end [ns]."""
-_LOG = logging.getLogger("can.fleetloop")  # as python-can's own interfaces name theirs
+_LOG: Final = logging.getLogger("can.fleetloop")  # as python-can's own interfaces name theirs
 
 
 class BusClient:

@@ -8,7 +8,7 @@ import contextlib
 import socket
 from collections import deque
 from collections.abc import Iterable, Mapping
-from typing import Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 from bridge.can_bus.packet import (
     FRAMES,
@@ -20,8 +20,8 @@ from bridge.can_bus.packet import (
 )
 from bridge.frame import Frame
 
-BACKLOG = 100_000
-TURN = 1024
+BACKLOG: Final = 100_000
+TURN: Final = 1024
 """Frames that others than controllers get onto a bus at a time."""
 
 _Item = TypeVar("_Item")

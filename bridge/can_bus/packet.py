@@ -34,8 +34,17 @@ from librt.strings import BytesWriter, read_i32_le, read_i64_le, write_i64_le
 from bridge.frame import ERR, ID_MASK_11, MAX_DATA, RTR, Frame, flaw, write_frame
 
 VERSION: Final = 3
-HELLO, WELCOME, REFUSED, FRAMES, BYE, LOST = 1, 2, 3, 4, 5, 6
-SYNCHRONOUS, OWN, DONE, BATCHED, MORE = 1, 2, 4, 8, 16
+HELLO: Final = 1
+WELCOME: Final = 2
+REFUSED: Final = 3
+FRAMES: Final = 4
+BYE: Final = 5
+LOST: Final = 6
+SYNCHRONOUS: Final = 1
+OWN: Final = 2
+DONE: Final = 4
+BATCHED: Final = 8
+MORE: Final = 16
 MAX_FRAMES: Final = 1024
 MAX_BYTES: Final = 16 + 20 * MAX_FRAMES
 LONGEST_BEFORE_NS: Final = 2**32 - 1

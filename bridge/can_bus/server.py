@@ -18,6 +18,7 @@ import hmac
 import os
 import select
 from collections.abc import Callable, Sequence
+from typing import Final
 
 from bridge.can_bus.connection import Bus, Connection
 from bridge.can_bus.packet import (
@@ -37,13 +38,14 @@ from bridge.can_bus.packet import (
 )
 from bridge.process.clock import SYSTEM_CLOCK
 
-MAX_CLIENTS = 64
-MAX_UNIDENTIFIED = 64
+MAX_CLIENTS: Final = 64
+MAX_UNIDENTIFIED: Final = 64
 """Connections to a bus without a HELLO; one more closes the oldest."""
-GOODBYE_S = 1.5
-STANDSTILL_S = 0.5
-_LOOK_MS = 20
-_READ, _WRITE = select.EPOLLIN, select.EPOLLOUT
+GOODBYE_S: Final = 1.5
+STANDSTILL_S: Final = 0.5
+_LOOK_MS: Final = 20
+_READ: Final = select.EPOLLIN
+_WRITE: Final = select.EPOLLOUT
 
 
 class ClientServer:

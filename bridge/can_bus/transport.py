@@ -10,16 +10,16 @@ import socket
 import struct
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Protocol
+from typing import Final, Protocol
 
 from bridge.can_bus import sockets
 from bridge.can_bus.packet import MAX_BYTES, WELCOME, Packet, decode
 from bridge.process.waiting import readable
 from configs.errors import InfrastructureError, ScenarioError
 
-FINE_S = 0.03
+FINE_S: Final = 0.03
 """Waits below this are kept to the microsecond; the kernel's own bound counts in its ticks."""
-_TIMEVAL = struct.Struct("ll")
+_TIMEVAL: Final = struct.Struct("ll")
 
 
 class Transport(Protocol):

@@ -6,11 +6,12 @@ the torque that the wrapped client would have sent.
 """
 
 from collections.abc import Sequence
+from typing import Final
 
 from bridge.drives.interface import DriveClient, Motion
 from bridge.frame import Frame
 
-_NOTHING: tuple[Frame, ...] = ()
+_NOTHING: Final[tuple[Frame, ...]] = ()
 
 
 class DryRun(DriveClient):

@@ -12,15 +12,15 @@ import threading
 from collections.abc import Callable, Iterator
 from queue import Empty, SimpleQueue
 from types import TracebackType
-from typing import NamedTuple, Protocol, Self
+from typing import Final, NamedTuple, Protocol, Self
 
-MOST_AT_ONCE = 10_000
+MOST_AT_ONCE: Final = 10_000
 """Messages taken at a time: draining ends, however fast new messages arrive."""
-ROOM_BYTES = 1 << 18
+ROOM_BYTES: Final = 1 << 18
 """Of one subscription, if the subscriber asks for no other."""
-MOST_WAITING = 1 << 14
+MOST_WAITING: Final = 1 << 14
 """Messages of one subscription, however small: many small ones cost time to read."""
-_OVERHEAD_BYTES = 256
+_OVERHEAD_BYTES: Final = 256
 """What a message takes besides its payload."""
 
 

@@ -10,7 +10,7 @@ import os
 import threading
 from collections.abc import Callable
 from types import TracebackType
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Final, Self
 
 import zenoh
 from mypy_extensions import mypyc_attr
@@ -20,12 +20,14 @@ from bridge.network.link import ROOM_BYTES, Arrival, Dropped, Inbox, Publisher
 from bridge.network.session import keep
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 
-CLOSE_S = 1.0
-POLLED_DEPTH = 1 << 15
+CLOSE_S: Final = 1.0
+POLLED_DEPTH: Final = 1 << 15
 """Newest messages kept on a key of a polled link: many times more than any schedule lets be under
 way (`configs.brief.LEAD_TICKS`), so that a flood doesn't displace due messages."""
-_YIELDS = 20
-_PAUSE_S, _LONGEST_PAUSE_S, _PAUSE_SHARE = 50e-6, 2e-3, 0.05
+_YIELDS: Final = 20
+_PAUSE_S: Final = 50e-6
+_LONGEST_PAUSE_S: Final = 2e-3
+_PAUSE_SHARE: Final = 0.05
 """Between two looks; where nothing has come for long, up to this part of that time: a fleet that
 waits for its last robots leaves them the processor."""
 

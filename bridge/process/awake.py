@@ -8,18 +8,18 @@ all messages.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 
-LOOK_S = 0.1
-STALL_S = 0.25
+LOOK_S: Final = 0.1
+STALL_S: Final = 0.25
 """Beyond what a wait was to last: this much later is no lateness any more."""
-LATE_S = 0.04
+LATE_S: Final = 0.04
 """For who keeps absolute deadlines: who is so late may be taken for silent by others."""
-AFTERMATH_S = 0.5
+AFTERMATH_S: Final = 0.5
 """What happens so soon after a stall may be its doing."""
-MAX_STALLS = 32
+MAX_STALLS: Final = 32
 
 
 def _never() -> bool:

@@ -8,7 +8,7 @@ nothing of what happens on the bus.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Sequence
-from typing import Protocol
+from typing import Final, Protocol
 
 from mypy_extensions import mypyc_attr
 
@@ -17,7 +17,7 @@ from bridge.frame import Frame
 from plant.faults import BusFaults
 from plant.robot import EmulatedRobot
 
-ALL = ""
+ALL: Final = ""
 """A bus waits for every controller on it; otherwise for the robot of a name."""
 Steps = Generator[str | None, None, None]
 Begin = Callable[[int], None]
