@@ -27,7 +27,7 @@ The data of remote frames is zero.
 
 import struct
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 from librt.strings import BytesWriter, read_i32_le, read_i64_le, write_i64_le
 
@@ -49,32 +49,50 @@ Key = str | int
 _NOBODY: Final[Mapping[Key, Frame]] = {}
 
 
-class Stamped(NamedTuple):
+class Stamped:
     """A frame and the bus time at which it ended."""
 
-    end_ns: int
-    frame: Frame
+    __slots__ = ("end_ns", "frame")
+
+    def __init__(self, end_ns: int, frame: Frame) -> None:
+        self.end_ns: Final = end_ns
+        self.frame: Final = frame
+
+    def __repr__(self) -> str:
+        return f"{self.frame} at {self.end_ns} ns"
 
 
-class Submitted(NamedTuple):
+class Submitted:
     """A frame that a client wants to send."""
 
-    key: Key
-    frame: Frame
+    __slots__ = ("frame", "key")
+
+    def __init__(self, key: Key, frame: Frame) -> None:
+        self.key: Final = key
+        self.frame: Final = frame
 
 
-class Transmitted(NamedTuple):
+class Transmitted(Stamped):
     """A frame that ended on the bus; the key of the client that had sent it, None for a drive.
 
     An error frame is what a client's node tells it: `apart` has those of the nodes, `frame` is for
     clients without one. With `to` it concerns one client only.
     """
 
-    end_ns: int
-    frame: Frame
-    key: Key | None = None
-    to: Key | None = None
-    apart: Mapping[Key, Frame] = _NOBODY
+    __slots__ = ("apart", "key", "to")
+
+    def __init__(
+        self,
+        end_ns: int,
+        frame: Frame,
+        key: Key | None = None,
+        to: Key | None = None,
+        apart: Mapping[Key, Frame] = _NOBODY,
+    ) -> None:
+        super().__init__(end_ns, frame)
+        self.key: Final = key
+        self.to: Final = to
+        self.apart: Final = apart
 
     @property
     def of_drive(self) -> bool:
@@ -83,11 +101,15 @@ class Transmitted(NamedTuple):
 
     def heard_by(self, key: Key) -> bool:
         """Whether a client hears it from the bus; its own frames it doesn't."""
-        return key != self.key and self.to in (None, key)
+        if self.key is not None and self.key == key:
+            return False
+        return self.to is None or self.to == key
 
     def as_heard_by(self, key: Key) -> Stamped:
         """What it hears, and when that ended."""
-        return Stamped(self.end_ns, self.apart.get(key, self.frame) if self.apart else self.frame)
+        if not self.apart:
+            return self
+        return Stamped(self.end_ns, self.apart.get(key, self.frame))
 
 
 class Packet:
@@ -135,7 +157,7 @@ def encode_stamped(flags: int, stamp_ns: int, frames: Sequence[Stamped], credit:
     packet.write(_HEADER.pack(FRAMES, flags, count, credit & 0xFFFF_FFFF, stamp_ns))
     for stamped in frames:
         write_frame(packet, stamped.frame)
-    before = [min(stamp_ns - end_ns, LONGEST_BEFORE_NS) for end_ns, _ in frames]
+    before = [min(stamp_ns - stamped.end_ns, LONGEST_BEFORE_NS) for stamped in frames]
     packet.write(struct.pack(f"<{count}I", *before))
     return packet.getvalue()
 
