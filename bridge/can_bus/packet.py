@@ -31,7 +31,7 @@ from typing import Final
 
 from librt.strings import BytesWriter, read_i32_le, read_i64_le, write_i64_le
 
-from bridge.frame import ERR, ID_MASK_11, MAX_DATA, RTR, Frame, flaw, write_frame
+from bridge.frame import ERR, ID_MASK_11, MAX_DATA, RTR, Frame, flaw, write_frame, write_u32
 
 VERSION: Final = 3
 HELLO, WELCOME, REFUSED, FRAMES, BYE, LOST = 1, 2, 3, 4, 5, 6
@@ -152,13 +152,14 @@ def encode_frames(flags: int, stamp_ns: int, frames: Sequence[Frame]) -> bytes:
 
 def encode_stamped(flags: int, stamp_ns: int, frames: Sequence[Stamped], credit: int) -> bytes:
     """A FRAMES packet of frames that ended at or before `stamp_ns`, each at its own time."""
-    count = len(frames)
     packet = BytesWriter()
-    packet.write(_HEADER.pack(FRAMES, flags, count, credit & 0xFFFF_FFFF, stamp_ns))
+    write_u32(packet, FRAMES | flags << 8 | len(frames) << 16)
+    write_u32(packet, credit & 0xFFFF_FFFF)
+    write_i64_le(packet, stamp_ns)
     for stamped in frames:
         write_frame(packet, stamped.frame)
-    before = [min(stamp_ns - stamped.end_ns, LONGEST_BEFORE_NS) for stamped in frames]
-    packet.write(struct.pack(f"<{count}I", *before))
+    for stamped in frames:
+        write_u32(packet, min(stamp_ns - stamped.end_ns, LONGEST_BEFORE_NS))
     return packet.getvalue()
 
 
@@ -218,7 +219,8 @@ def _decode_frames(found: Packet, packet: bytes) -> bool:
     stamped = len(packet) != end
     if count > MAX_FRAMES or (stamped and len(packet) != end + 4 * count):
         return False
-    frames, kept = [], []
+    frames: list[Frame] = []
+    before: list[int] = []
     for n in range(count):
         at = _HEADER_SIZE + n * _FRAME_SIZE
         can_id, length = int(read_i32_le(packet, at)) & 0xFFFF_FFFF, packet[at + 4]
@@ -226,9 +228,8 @@ def _decode_frames(found: Packet, packet: bytes) -> bool:
             continue
         data = bytes(length) if can_id & RTR else packet[at + 8 : at + 8 + length]
         frames.append(Frame(can_id, data))
-        kept.append(n)
-    found.frames, found.flawed = tuple(frames), count - len(kept)
-    if stamped:
-        before = struct.unpack(f"<{count}I", packet[end:])
-        found.before_ns = tuple([before[n] for n in kept])
+        if stamped:
+            before.append(int(read_i32_le(packet, end + 4 * n)) & 0xFFFF_FFFF)
+    found.frames, found.flawed = tuple(frames), count - len(frames)
+    found.before_ns = tuple(before)
     return True

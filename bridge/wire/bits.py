@@ -52,22 +52,21 @@ def frame_bits(frame: Frame) -> int:
         ValueError: an error frame, or no frame of classic CAN.
     """
     head, size, data = _fields(frame)
-    content = head.to_bytes(size + 7 >> 3, "big") + data
+    width = size + 7 >> 3
     crc = 0
-    for byte in content:
+    for byte in head.to_bytes(width, "big") + data:
         crc = (crc << 8 & 0x7FFF) ^ _CRC_TABLE[crc >> 7 ^ byte]
     # What fills the first byte up must add no stuff bit: bits in turn, the last one recessive like
-    # the idle bus before a start of frame.
-    bits = size + 8 * len(data) + _CRC_BITS
-    padding = -bits & 7
-    stream = (0x55 & (1 << padding) - 1) << bits | int.from_bytes(content, "big") << _CRC_BITS | crc
-    state = _IDLE
-    stuffed = 0
-    for byte in stream.to_bytes(bits + padding >> 3, "big"):
-        after = _STUFF_TABLE[state << 8 | byte]
+    # the idle bus before a start of frame. The CRC leaves one bit of the last byte, so all are
+    # looked at one bit late.
+    filled = (0xAA >> (size & 7) << size) | head
+    state, left, stuffed = _IDLE, 0, 0
+    for byte in filled.to_bytes(width, "big") + data + (crc << 1).to_bytes(2, "big"):
+        after = _STUFF_TABLE[state << 8 | left << 7 | byte >> 1]
+        left = byte & 1
         state = after >> 2
         stuffed += after & 3
-    return bits + stuffed + TRAILER_BITS + INTERMISSION_BITS
+    return size + 8 * len(data) + _CRC_BITS + stuffed + TRAILER_BITS + INTERMISSION_BITS
 
 
 def stuffed_bits(frame: Frame) -> str:
