@@ -10,7 +10,7 @@ plain number.
 
 from typing import Final
 
-from librt.strings import BytesWriter, write_i64_le
+from librt.strings import BytesWriter, write_i32_le, write_i64_le
 
 EFF: Final = 0x8000_0000
 RTR: Final = 0x4000_0000
@@ -46,6 +46,11 @@ class Frame:
 
     def __repr__(self) -> str:
         return f"Frame({self.can_id:#x}, {self.data!r})"
+
+
+def write_u32(out: BytesWriter, value: int) -> None:
+    """Add a number below 2³² in 4 bytes, little endian."""
+    write_i32_le(out, value - (value >> 31 << 32))  # the signed number of the same bits
 
 
 def write_frame(out: BytesWriter, frame: Frame, flags: int = 0) -> None:

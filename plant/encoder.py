@@ -50,6 +50,7 @@ class Encoder:
     __slots__ = (
         "_angle",
         "_counted",
+        "_counts_per_rev",
         "_flipped",
         "_frozen",
         "_gain_p",
@@ -62,6 +63,7 @@ class Encoder:
         "_plain",
         "_position",
         "_random",
+        "_rate_Hz",
         "_since",
         "_velocity",
     )
@@ -70,6 +72,8 @@ class Encoder:
         self._model = model
         self._random = random
         self._phase = random.random()
+        self._counts_per_rev = float(model.counts_per_shaft_rev)
+        self._rate_Hz = model.pll_rate_Hz
         bandwidth = model.pll_bandwidth_rad_s / model.pll_rate_Hz
         self._gain_p = 2.0 * bandwidth  # T k_p
         self._gain_v = bandwidth * bandwidth  # T² k_i: velocities are counts per loop period
@@ -94,12 +98,12 @@ class Encoder:
 
     def step(self, angle_shaft_rad: float, dt_s: float) -> tuple[float, float]:
         """(position [rev], velocity [rev/s]) as the drive estimates them after `dt_s`."""
-        model = self._model
+        counts, rate_Hz = self._counts_per_rev, self._rate_Hz
         start = self._angle
-        end = angle_shaft_rad * model.counts_per_shaft_rev * PER_RADIAN + self._phase
+        end = angle_shaft_rad * counts * PER_RADIAN + self._phase
         if not -_LARGEST_COUNT <= end <= _LARGEST_COUNT:
             end = copysign(_LARGEST_COUNT, end) if isfinite(end) else start
-        periods = dt_s * model.pll_rate_Hz
+        periods = dt_s * rate_Hz
         since = self._since
         samples = int(since + periods + _EARLY)
         if samples:
@@ -111,8 +115,7 @@ class Encoder:
                 self._track(first + self._offset, slope, samples)
         self._since = since + periods - samples
         self._angle = end
-        counts = model.counts_per_shaft_rev
-        return self._position / counts, self._velocity * model.pll_rate_Hz / counts
+        return self._position / counts, self._velocity * rate_Hz / counts
 
     def apply(self, effects: WheelEffects) -> None:
         """Let these effects act from now on, and no others; what was lost stays lost."""
@@ -139,9 +142,14 @@ class Encoder:
         position, velocity = self._position, self._velocity
         gain_p, gain_v = self._gain_p, self._gain_v
         snap = 0.5 * gain_v
+        count, estimate = at // 1.0, position // 1.0  # taken anew only where they change
         for _ in range(samples):
             position += velocity
-            error = at // 1.0 - position // 1.0
+            if not count <= at < count + 1.0:
+                count = at // 1.0
+            if not estimate <= position < estimate + 1.0:
+                estimate = position // 1.0
+            error = count - estimate
             if error:
                 position += gain_p * error
                 velocity += gain_v * error

@@ -38,6 +38,7 @@ from typing import Final
 
 from configs.brief import MotorModel
 from plant.effects import WheelEffects
+from plant.noise import Normal
 from plant.supply import Supply
 
 _MODULATION: Final = sqrt(3.0) / 2.0
@@ -54,7 +55,9 @@ class Motor:
     __slots__ = (
         "_acting_A",
         "_asked_A",
+        "_assumed_constant",
         "_constant",
+        "_coulomb",
         "_decay",
         "_dt_s",
         "_fet_K",
@@ -63,19 +66,23 @@ class Motor:
         "_fet_zero_C",
         "_inertia",
         "_inertia_rate",
+        "_limit_A",
+        "_loop_s",
         "_mean",
         "_mean_square",
         "_model",
         "_motor_zero_C",
+        "_noise",
         "_override_A",
         "_pending",
-        "_random",
         "_resistance",
         "_stuck_A",
         "_supply",
+        "_viscous",
         "_winding_K",
         "_winding_K_A2",
         "_winding_keep",
+        "_winding_ohm",
         "current_A",
         "fet_C",
         "motor_C",
@@ -89,7 +96,13 @@ class Motor:
         self._model = model
         self._inertia = inertia_shaft_kg_m2
         self._supply = supply
-        self._random = random
+        self._noise = Normal(random)
+        self._assumed_constant = model.assumed_torque_constant_N_m_A
+        self._limit_A = model.current_limit_A
+        self._loop_s = model.current_loop_s
+        self._coulomb = model.coulomb_friction_shaft_N_m
+        self._viscous = model.viscous_friction_shaft_N_m_s
+        self._winding_ohm = model.winding_resistance_ohm
         self._constant = model.torque_constant_N_m_A
         self._resistance = model.winding_resistance_ohm + model.fet_resistance_ohm
         self._override_A: float | None = None  # of i*, by a fault
@@ -132,13 +145,12 @@ class Motor:
         self.motor_C = windings + self._motor_zero_C
         self.fet_C = fets + self._fet_zero_C
 
-        coulomb = self._model.coulomb_friction_shaft_N_m
+        coulomb, viscous = self._coulomb, self._viscous
         push = self._inertia_rate * speed_shaft_rad_s + torque
         if -coulomb <= push <= coulomb:
             return torque - push
         if push < 0.0:
             coulomb = -coulomb
-        viscous = self._model.viscous_friction_shaft_N_m_s
         return torque - coulomb - viscous * (push - coulomb) / (self._inertia_rate + viscous)
 
     def measure(self) -> tuple[float, float]:
@@ -149,9 +161,9 @@ class Motor:
         """
         model = self._model
         current = self.current_A
-        torque = model.assumed_torque_constant_N_m_A * current
+        torque = self._assumed_constant * current
         if model.torque_noise_shaft_N_m:
-            torque += self._random.gauss(0.0, model.torque_noise_shaft_N_m)
+            torque += self._noise.draw(model.torque_noise_shaft_N_m)
         quantum = model.current_quantum_A
         return torque, quantum * round(current / quantum) if quantum else current
 
@@ -177,16 +189,14 @@ class Motor:
 
     def _discretise(self, dt_s: float) -> None:
         model = self._model
-        x = dt_s / model.current_loop_s
+        x = dt_s / self._loop_s
         self._dt_s = dt_s
         self._decay = exp(-x)
         self._mean = -expm1(-x) / x
         self._mean_square = -expm1(-2.0 * x) / (2.0 * x)
         gain = -expm1(-dt_s / model.motor_thermal_time_s)
         self._winding_keep = 1.0 - gain
-        self._winding_K_A2 = (
-            gain * model.motor_thermal_resistance_K_W * model.winding_resistance_ohm
-        )
+        self._winding_K_A2 = gain * model.motor_thermal_resistance_K_W * self._winding_ohm
         gain = -expm1(-dt_s / model.fet_thermal_time_s)
         self._fet_keep = 1.0 - gain
         self._fet_K_A2 = gain * model.fet_thermal_resistance_K_W * model.fet_resistance_ohm
@@ -194,14 +204,13 @@ class Motor:
 
     def _current_for(self, demand_shaft_N_m: float, speed_shaft_rad_s: float) -> float:
         """i* of (1) and (4)."""
-        model = self._model
-        limit = model.current_limit_A
-        current = demand_shaft_N_m / model.assumed_torque_constant_N_m_A
+        limit = self._limit_A
+        current = demand_shaft_N_m / self._assumed_constant
         if not -limit <= current <= limit:
             current = _clamped(current, limit)
         if self._override_A is not None:
             current = self._override_A
-        resistance, back = model.winding_resistance_ohm, self._constant * speed_shaft_rad_s
+        resistance, back = self._winding_ohm, self._constant * speed_shaft_rad_s
         most = _MODULATION * self._supply.bus_V
         if -most <= resistance * current + back <= most:
             return current
@@ -221,7 +230,7 @@ class Motor:
             if at > dt_s:
                 later.append((at - dt_s, following))
                 continue
-            x = (at - now) / self._model.current_loop_s
+            x = (at - now) / self._loop_s
             off, once, twice = current - acting, -expm1(-x), -0.5 * expm1(-2.0 * x)
             charge += acting * x + off * once
             heat += acting * acting * x + off * (2.0 * acting * once + off * twice)
@@ -229,7 +238,7 @@ class Motor:
             if following != inf:
                 acting = following
         self.current_A, self._acting_A, self._pending = current, acting, later
-        periods = dt_s / self._model.current_loop_s
+        periods = dt_s / self._loop_s
         return charge / periods, heat / periods
 
 

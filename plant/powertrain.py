@@ -9,7 +9,6 @@ place, so none depends on how often another one is asked.
 """
 
 from random import Random
-from typing import NamedTuple
 
 from configs.brief import PowertrainModel
 from plant.encoder import Encoder
@@ -17,14 +16,24 @@ from plant.motor import Motor
 from plant.supply import Supply
 
 
-class Powertrain(NamedTuple):
+class Powertrain:
     """The parts of one robot."""
 
-    supply: Supply
-    right_motor: Motor
-    left_motor: Motor
-    right_encoder: Encoder
-    left_encoder: Encoder
+    __slots__ = ("left_encoder", "left_motor", "right_encoder", "right_motor", "supply")
+
+    def __init__(
+        self,
+        supply: Supply,
+        right_motor: Motor,
+        left_motor: Motor,
+        right_encoder: Encoder,
+        left_encoder: Encoder,
+    ) -> None:
+        self.supply = supply
+        self.right_motor = right_motor
+        self.left_motor = left_motor
+        self.right_encoder = right_encoder
+        self.left_encoder = left_encoder
 
     def step(
         self,

@@ -31,6 +31,7 @@ from plant.encoder import PER_RADIAN, Encoder
 from plant.exact import ExactEncoder, ExactPowertrain, shaft_motion
 from plant.integrate import Motion, moved
 from plant.localisation import FaultyLocalisation
+from plant.motor import Motor
 from plant.powertrain import powertrain
 
 MEASURE_EVERY_S: Final = 0.001
@@ -341,15 +342,14 @@ class RealisticRobot(EmulatedRobot):
     def _measure(self) -> None:
         """Tell both drives what they measure of their motors and of the supply."""
         train = self._train
-        supply = train.supply
-        for drive, motor, amps in (
-            (self._right, train.right_motor, supply.right_A),
-            (self._left, train.left_motor, supply.left_A),
-        ):
-            torque, current = motor.measure()
-            drive.update_measurements(
-                DriveMeasurements(torque, current, motor.fet_C, motor.motor_C, supply.bus_V, amps)
-            )
+        bus_V, right_A, left_A = train.supply.bus_V, train.supply.right_A, train.supply.left_A
+        self._right.update_measurements(_measured(train.right_motor, bus_V, right_A))
+        self._left.update_measurements(_measured(train.left_motor, bus_V, left_A))
+
+
+def _measured(motor: Motor, bus_V: float, bus_A: float) -> DriveMeasurements:
+    torque, current = motor.measure()
+    return DriveMeasurements(torque, current, motor.fet_C, motor.motor_C, bus_V, bus_A)
 
 
 def _nobody(_first: int, _count: int, _rows: bytes, _final: bool) -> None:

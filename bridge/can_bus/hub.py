@@ -127,7 +127,7 @@ class Hub:
         for client in bus.clients.copy():
             heard = [p.as_heard_by(client.key) for p in frames if p.heard_by(client.key)]
             if client.own:
-                for mine in (Stamped(p.end_ns, p.frame) for p in frames if p.key == client.key):
+                for mine in [p for p in frames if p.key == client.key]:
                     own = encode_stamped(OWN, stamp_ns, [mine], client.released)
                     self._send(client, own)
             if client.synchronous:

@@ -27,11 +27,11 @@ The data of remote frames is zero.
 
 import struct
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 from librt.strings import BytesWriter, read_i32_le, read_i64_le, write_i64_le
 
-from bridge.frame import ERR, ID_MASK_11, MAX_DATA, RTR, Frame, flaw, write_frame
+from bridge.frame import ERR, ID_MASK_11, MAX_DATA, RTR, Frame, flaw, write_frame, write_u32
 
 VERSION: Final = 3
 HELLO: Final = 1
@@ -58,32 +58,50 @@ Key = str | int
 _NOBODY: Final[Mapping[Key, Frame]] = {}
 
 
-class Stamped(NamedTuple):
+class Stamped:
     """A frame and the bus time at which it ended."""
 
-    end_ns: int
-    frame: Frame
+    __slots__ = ("end_ns", "frame")
+
+    def __init__(self, end_ns: int, frame: Frame) -> None:
+        self.end_ns: Final = end_ns
+        self.frame: Final = frame
+
+    def __repr__(self) -> str:
+        return f"{self.frame} at {self.end_ns} ns"
 
 
-class Submitted(NamedTuple):
+class Submitted:
     """A frame that a client wants to send."""
 
-    key: Key
-    frame: Frame
+    __slots__ = ("frame", "key")
+
+    def __init__(self, key: Key, frame: Frame) -> None:
+        self.key: Final = key
+        self.frame: Final = frame
 
 
-class Transmitted(NamedTuple):
+class Transmitted(Stamped):
     """A frame that ended on the bus; the key of the client that had sent it, None for a drive.
 
     An error frame is what a client's node tells it: `apart` has those of the nodes, `frame` is for
     clients without one. With `to` it concerns one client only.
     """
 
-    end_ns: int
-    frame: Frame
-    key: Key | None = None
-    to: Key | None = None
-    apart: Mapping[Key, Frame] = _NOBODY
+    __slots__ = ("apart", "key", "to")
+
+    def __init__(
+        self,
+        end_ns: int,
+        frame: Frame,
+        key: Key | None = None,
+        to: Key | None = None,
+        apart: Mapping[Key, Frame] = _NOBODY,
+    ) -> None:
+        super().__init__(end_ns, frame)
+        self.key: Final = key
+        self.to: Final = to
+        self.apart: Final = apart
 
     @property
     def of_drive(self) -> bool:
@@ -92,11 +110,15 @@ class Transmitted(NamedTuple):
 
     def heard_by(self, key: Key) -> bool:
         """Whether a client hears it from the bus; its own frames it doesn't."""
-        return key != self.key and self.to in (None, key)
+        if self.key is not None and self.key == key:
+            return False
+        return self.to is None or self.to == key
 
     def as_heard_by(self, key: Key) -> Stamped:
         """What it hears, and when that ended."""
-        return Stamped(self.end_ns, self.apart.get(key, self.frame) if self.apart else self.frame)
+        if not self.apart:
+            return self
+        return Stamped(self.end_ns, self.apart.get(key, self.frame))
 
 
 class Packet:
@@ -139,13 +161,14 @@ def encode_frames(flags: int, stamp_ns: int, frames: Sequence[Frame]) -> bytes:
 
 def encode_stamped(flags: int, stamp_ns: int, frames: Sequence[Stamped], credit: int) -> bytes:
     """A FRAMES packet of frames that ended at or before `stamp_ns`, each at its own time."""
-    count = len(frames)
     packet = BytesWriter()
-    packet.write(_HEADER.pack(FRAMES, flags, count, credit & 0xFFFF_FFFF, stamp_ns))
+    write_u32(packet, FRAMES | flags << 8 | len(frames) << 16)
+    write_u32(packet, credit & 0xFFFF_FFFF)
+    write_i64_le(packet, stamp_ns)
     for stamped in frames:
         write_frame(packet, stamped.frame)
-    before = [min(stamp_ns - end_ns, LONGEST_BEFORE_NS) for end_ns, _ in frames]
-    packet.write(struct.pack(f"<{count}I", *before))
+    for stamped in frames:
+        write_u32(packet, min(stamp_ns - stamped.end_ns, LONGEST_BEFORE_NS))
     return packet.getvalue()
 
 
@@ -205,7 +228,8 @@ def _decode_frames(found: Packet, packet: bytes) -> bool:
     stamped = len(packet) != end
     if count > MAX_FRAMES or (stamped and len(packet) != end + 4 * count):
         return False
-    frames, kept = [], []
+    frames: list[Frame] = []
+    before: list[int] = []
     for n in range(count):
         at = _HEADER_SIZE + n * _FRAME_SIZE
         can_id, length = int(read_i32_le(packet, at)) & 0xFFFF_FFFF, packet[at + 4]
@@ -213,9 +237,8 @@ def _decode_frames(found: Packet, packet: bytes) -> bool:
             continue
         data = bytes(length) if can_id & RTR else packet[at + 8 : at + 8 + length]
         frames.append(Frame(can_id, data))
-        kept.append(n)
-    found.frames, found.flawed = tuple(frames), count - len(kept)
-    if stamped:
-        before = struct.unpack(f"<{count}I", packet[end:])
-        found.before_ns = tuple([before[n] for n in kept])
+        if stamped:
+            before.append(int(read_i32_le(packet, end + 4 * n)) & 0xFFFF_FFFF)
+    found.frames, found.flawed = tuple(frames), count - len(frames)
+    found.before_ns = tuple(before)
     return True

@@ -7,7 +7,7 @@ at the motor's shaft. Both are pure: frames in, frames out, told the time.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from math import pi
-from typing import NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
 
 from mypy_extensions import mypyc_attr
 
@@ -29,15 +29,26 @@ def torque_factors(sign: int, gear_ratio: float) -> tuple[float, float]:
     return sign / gear_ratio, sign * gear_ratio
 
 
-class DriveMeasurements(NamedTuple):
+class DriveMeasurements:
     """A drive's measurements of its motor and of the supply."""
 
-    torque_shaft_N_m: float  # the motor's, estimated
-    current_A: float  # q axis
-    fet_C: float
-    motor_C: float  # NaN: no thermistor
-    bus_V: float
-    bus_A: float
+    __slots__ = ("bus_A", "bus_V", "current_A", "fet_C", "motor_C", "torque_shaft_N_m")
+
+    def __init__(
+        self,
+        torque_shaft_N_m: float,
+        current_A: float,
+        fet_C: float,
+        motor_C: float,
+        bus_V: float,
+        bus_A: float,
+    ) -> None:
+        self.torque_shaft_N_m: Final = torque_shaft_N_m  # the motor's, estimated
+        self.current_A: Final = current_A  # q axis
+        self.fet_C: Final = fet_C
+        self.motor_C: Final = motor_C  # NaN: no thermistor
+        self.bus_V: Final = bus_V
+        self.bus_A: Final = bus_A
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)

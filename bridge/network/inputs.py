@@ -31,23 +31,26 @@ reach a controller is a kind more: here, where the controller takes it
 import struct
 from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-from bridge.frame import Frame
+from librt.strings import BytesWriter, write_f64_le, write_i64_le
 
-BLOCK_BYTES = 8192
+from bridge.frame import Frame, write_u32
+
+BLOCK_BYTES: Final = 8192
 """Bytes that are gathered before they are handed on."""
 
-_HEAD = struct.Struct("<IBq")
-_IDENTIFIER = struct.Struct("<I")
-_FULL_FRAME = struct.Struct("<IBqI8s")
-_FULL_DATA = 8
-_FULL_PAYLOAD = _IDENTIFIER.size + _FULL_DATA
-_TICK = struct.Struct("<q")
-_BEGIN = struct.Struct("<?q")
-_CLOCK = struct.Struct("<qdd")
-_SENT = struct.Struct("<IB")
-_NUL = b"\0"
+_HEAD: Final = struct.Struct("<IBq")
+_IDENTIFIER: Final = struct.Struct("<I")
+_IDENTIFIER_BYTES: Final = 4
+_TICK: Final = struct.Struct("<q")
+_TICK_BYTES: Final = 8
+_BEGIN: Final = struct.Struct("<?q")
+_CLOCK: Final = struct.Struct("<qdd")
+_CLOCK_BYTES: Final = 24
+_SENT: Final = struct.Struct("<IB")
+_SENT_BYTES: Final = 5  # of a frame sent, before its data
+_NUL: Final = b"\0"
 
 
 class Kind(IntEnum):
@@ -67,6 +70,12 @@ class Kind(IntEnum):
     STOP = 11
     ORDER = 12
     LEADER_ORDER = 13
+
+
+_FRAME: Final = int(Kind.FRAME)
+_OF_CLOCK: Final = int(Kind.CLOCK)
+_OF_TICK: Final = int(Kind.TICK)
+_STOP: Final = int(Kind.STOP)
 
 
 class Input(NamedTuple):
@@ -147,7 +156,7 @@ class InputBuffer:
 
     def __init__(self, hand_on: Callable[[int, bytes, bool], None]) -> None:
         self._hand_on = hand_on
-        self._block = bytearray()
+        self._block = BytesWriter()
         self._first = 0
         self._now_ns = 0
 
@@ -157,12 +166,9 @@ class InputBuffer:
 
     def frame(self, can_id: int, data: bytes | bytearray, at_ns: int) -> None:
         """A frame was received."""
-        length = len(data)
-        if length == _FULL_DATA:
-            self._block += _FULL_FRAME.pack(_FULL_PAYLOAD, Kind.FRAME, at_ns, can_id, data)
-        else:
-            self._block += _HEAD.pack(_IDENTIFIER.size + length, Kind.FRAME, at_ns)
-            self._block += _IDENTIFIER.pack(can_id) + data
+        self._head(_IDENTIFIER_BYTES + len(data), _FRAME, at_ns)
+        write_u32(self._block, can_id)
+        self._block.write(data)
 
     def named(self, kind: Kind, source: str, content: bytes) -> None:
         """A message was received, or a trouble noted."""
@@ -170,7 +176,10 @@ class InputBuffer:
 
     def clock(self, now_ns: int, late_s: float, round_trip_s: float) -> None:
         """The wall clock before a tick."""
-        self._add(Kind.CLOCK, _CLOCK.pack(now_ns, late_s, round_trip_s))
+        self._head(_CLOCK_BYTES, _OF_CLOCK, self._now_ns)
+        write_i64_le(self._block, now_ns)
+        write_f64_le(self._block, late_s)
+        write_f64_le(self._block, round_trip_s)
 
     def about(self, kind: Kind, tick: int) -> None:
         """A CLOSING or UNSENT tick."""
@@ -179,17 +188,20 @@ class InputBuffer:
     def tick(self, tick: int, now_ns: int, sent: Sequence[Frame]) -> None:
         """A tick of this bus time was computed."""
         self._now_ns = now_ns
-        self._add(Kind.TICK, _TICK.pack(tick) + _packed(sent))
+        self._head(_TICK_BYTES + _size(sent), _OF_TICK, now_ns)
+        write_i64_le(self._block, tick)
+        self._sent(sent)
         if len(self._block) >= BLOCK_BYTES:
             self._flush(final=False)
 
     def stop(self, sent: Sequence[Frame]) -> None:
         """The controller was told to stop."""
-        self._add(Kind.STOP, _packed(sent))
+        self._head(_size(sent), _STOP, self._now_ns)
+        self._sent(sent)
 
     def hand_on(self) -> None:
         """Hand on what is there."""
-        if self._block:
+        if len(self._block):
             self._flush(final=False)
 
     def finish(self) -> None:
@@ -197,11 +209,25 @@ class InputBuffer:
         self._flush(final=True)
 
     def _add(self, kind: Kind, payload: bytes) -> None:
-        self._block += _HEAD.pack(len(payload), kind, self._now_ns) + payload
+        self._head(len(payload), kind, self._now_ns)
+        self._block.write(payload)
+
+    def _head(self, length: int, kind: int, at_ns: int) -> None:
+        block = self._block
+        write_u32(block, length)
+        block.append(kind)
+        write_i64_le(block, at_ns)
+
+    def _sent(self, frames: Sequence[Frame]) -> None:
+        block = self._block
+        for frame in frames:
+            write_u32(block, frame.can_id)
+            block.append(len(frame.data))
+            block.write(frame.data)
 
     def _flush(self, *, final: bool) -> None:
-        block = bytes(self._block)
-        self._block.clear()
+        block = self._block.getvalue()
+        self._block.truncate(0)
         whole = range(0, len(block) - BLOCK_BYTES, BLOCK_BYTES)
         for begin in whole:  # a start message may be long
             self._pass_on(block[begin : begin + BLOCK_BYTES], final=False)
@@ -212,5 +238,6 @@ class InputBuffer:
         self._first += len(block)
 
 
-def _packed(frames: Sequence[Frame]) -> bytes:
-    return b"".join([_SENT.pack(it.can_id, len(it.data)) + it.data for it in frames])
+def _size(frames: Sequence[Frame]) -> int:
+    """Bytes of frames that were sent."""
+    return sum([_SENT_BYTES + len(frame.data) for frame in frames])

@@ -17,22 +17,21 @@ with its intermission; n is 0 for remote frames. The upper bound is the one of r
 analysis (Davis, Burns, Bril, Lukkien 2007, equation 1); no real frame is longer.
 """
 
-from functools import lru_cache
+from typing import Final
 
 from bridge.frame import EFF, ERR, ID_MASK_11, ID_MASK_29, RTR, Frame, flaw
 
-INTERMISSION_BITS = 3
-END_BITS = 7  # end of frame
-TRAILER_BITS = 10  # delimiter, acknowledge, delimiter, end of frame
-ERROR_FLAG_BITS = 6
-LONGEST_ERROR_FLAG_BITS = 12  # of nodes that notice one after the other
-ERROR_DELIMITER_BITS = 8
-ERROR_FRAME_BITS = LONGEST_ERROR_FLAG_BITS + ERROR_DELIMITER_BITS + INTERMISSION_BITS
+INTERMISSION_BITS: Final = 3
+END_BITS: Final = 7  # end of frame
+TRAILER_BITS: Final = 10  # delimiter, acknowledge, delimiter, end of frame
+ERROR_FLAG_BITS: Final = 6
+LONGEST_ERROR_FLAG_BITS: Final = 12  # of nodes that notice one after the other
+ERROR_DELIMITER_BITS: Final = 8
+ERROR_FRAME_BITS: Final = LONGEST_ERROR_FLAG_BITS + ERROR_DELIMITER_BITS + INTERMISSION_BITS
 """Of a flag that all others notice by its six dominant bits in a row, intermission included."""
-SUSPEND_BITS = 8  # an error passive transmitter's pause after its frame
-CRC_POLYNOMIAL = 0x4599
-_CRC_BITS = 15
-_CACHED = 4096
+SUSPEND_BITS: Final = 8  # an error passive transmitter's pause after its frame
+CRC_POLYNOMIAL: Final = 0x4599
+_CRC_BITS: Final = 15
 
 
 def least_bits(length: int, *, extended: bool = False) -> int:
@@ -46,7 +45,6 @@ def most_bits(length: int, *, extended: bool = False) -> int:
     return bits + (bits - 14) // 4
 
 
-@lru_cache(_CACHED)
 def frame_bits(frame: Frame) -> int:
     """Exact number of bits of a frame on the wire, from its start through its intermission.
 
@@ -54,22 +52,21 @@ def frame_bits(frame: Frame) -> int:
         ValueError: an error frame, or no frame of classic CAN.
     """
     head, size, data = _fields(frame)
-    content = head.to_bytes(size + 7 >> 3, "big") + data
+    width = size + 7 >> 3
     crc = 0
-    for byte in content:
+    for byte in head.to_bytes(width, "big") + data:
         crc = (crc << 8 & 0x7FFF) ^ _CRC_TABLE[crc >> 7 ^ byte]
     # What fills the first byte up must add no stuff bit: bits in turn, the last one recessive like
-    # the idle bus before a start of frame.
-    bits = size + 8 * len(data) + _CRC_BITS
-    padding = -bits & 7
-    stream = (0x55 & (1 << padding) - 1) << bits | int.from_bytes(content, "big") << _CRC_BITS | crc
-    state = _IDLE
-    stuffed = 0
-    step = _STUFF_TABLE
-    for byte in stream.to_bytes(bits + padding >> 3, "big"):
-        state, more = step[state | byte]
-        stuffed += more
-    return bits + stuffed + TRAILER_BITS + INTERMISSION_BITS
+    # the idle bus before a start of frame. The CRC leaves one bit of the last byte, so all are
+    # looked at one bit late.
+    filled = (0xAA >> (size & 7) << size) | head
+    state, left, stuffed = _IDLE, 0, 0
+    for byte in filled.to_bytes(width, "big") + data + (crc << 1).to_bytes(2, "big"):
+        after = _STUFF_TABLE[state << 8 | left << 7 | byte >> 1]
+        left = byte & 1
+        state = after >> 2
+        stuffed += after & 3
+    return size + 8 * len(data) + _CRC_BITS + stuffed + TRAILER_BITS + INTERMISSION_BITS
 
 
 def stuffed_bits(frame: Frame) -> str:
@@ -132,8 +129,8 @@ def _crc_of(byte: int) -> int:
     return crc & 0x7FFF
 
 
-def _stuffed(last: int, run: int, byte: int) -> tuple[int, int]:
-    """State 256 (4 last + run − 1) after a byte, and how many stuff bits the byte brought."""
+def _stuffed(last: int, run: int, byte: int) -> int:
+    """State 4 last + run − 1 after a byte; in 2 bits below the stuff bits that it brought."""
     stuffed = 0
     for n in range(7, -1, -1):
         bit = byte >> n & 1
@@ -142,11 +139,11 @@ def _stuffed(last: int, run: int, byte: int) -> tuple[int, int]:
         if run == 5:
             last, run = 1 - bit, 1
             stuffed += 1
-    return (4 * last + run - 1) << 8, stuffed
+    return (4 * last + run - 1) << 2 | stuffed
 
 
-_CRC_TABLE = tuple(_crc_of(byte) for byte in range(256))
-_STUFF_TABLE = tuple(
-    _stuffed(last, run, byte) for last in (0, 1) for run in (1, 2, 3, 4) for byte in range(256)
+_CRC_TABLE: Final = [_crc_of(byte) for byte in range(256)]
+_STUFF_TABLE: Final = bytes(
+    [_stuffed(last, run, byte) for last in (0, 1) for run in (1, 2, 3, 4) for byte in range(256)]
 )
-_IDLE = 4 << 8  # after a single recessive bit
+_IDLE: Final = 4  # after a single recessive bit

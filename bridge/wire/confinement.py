@@ -22,11 +22,14 @@ return to any value from 119 to 127; 120 is the value of bxCAN (ST RM0008, CAN_E
 """
 
 from enum import IntEnum
+from typing import Final
 
-WARNING, PASSIVE, OFF = 96, 128, 256
-RECOVERY_SEQUENCES = 128
-RECESSIVE_BITS = 11
-_REC_AFTER_PASSIVE = 120
+WARNING: Final = 96
+PASSIVE: Final = 128
+OFF: Final = 256
+RECOVERY_SEQUENCES: Final = 128
+RECESSIVE_BITS: Final = 11
+_REC_AFTER_PASSIVE: Final = 120
 
 
 class NodeState(IntEnum):
@@ -36,6 +39,11 @@ class NodeState(IntEnum):
     ERROR_WARNING = 1
     ERROR_PASSIVE = 2
     BUS_OFF = 3
+
+
+ERROR_ACTIVE: Final = NodeState.ERROR_ACTIVE
+ERROR_PASSIVE: Final = NodeState.ERROR_PASSIVE
+BUS_OFF: Final = NodeState.BUS_OFF
 
 
 class Confinement:

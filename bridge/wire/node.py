@@ -10,10 +10,11 @@ So recovery takes 1408 bits on an idle wire and 128 frames on a full one.
 """
 
 from enum import Enum
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from bridge.frame import Frame
 from bridge.wire.confinement import (
+    ERROR_ACTIVE,
     RECESSIVE_BITS,
     RECOVERY_SEQUENCES,
     Confinement,
@@ -21,7 +22,9 @@ from bridge.wire.confinement import (
 )
 from bridge.wire.queues import Queue
 
-_SECOND_NS = 1_000_000_000
+NEVER: Final = 1 << 61
+"""Bus time at which nothing happens any more."""
+_SECOND_NS: Final = 1_000_000_000
 
 
 class ErrorKind(Enum):
@@ -47,7 +50,13 @@ class NodeCounters:
 
     def as_dict(self) -> dict[str, int]:
         """By name."""
-        return {name: getattr(self, name) for name in self.__slots__}
+        return {
+            "accepted": self.accepted,
+            "dropped": self.dropped,
+            "errors": self.errors,
+            "refused": self.refused,
+            "sent": self.sent,
+        }
 
 
 class Node:
@@ -83,7 +92,7 @@ class Node:
         self.restart_ns = restart_ns
         self.wrong_bit_rate = wrong_bit_rate
         self.confinement = Confinement()
-        self.state = NodeState.ERROR_ACTIVE
+        self.state: NodeState = ERROR_ACTIVE
         self.counters = NodeCounters()
         self.attached = True
         self.not_before_ns = 0  # end of its suspended transmission
@@ -125,12 +134,12 @@ class Recovery:
         """When a node is back if the wire stays idle."""
         return node.recessive_from_ns + self._span(node.sequences_left * RECESSIVE_BITS)
 
-    def next(self, before_ns: int | None) -> Node | None:
+    def next(self, before_ns: int) -> Node | None:
         """The node that is back first, if that is before the next frame begins."""
         if not self.nodes:
             return None
         node = min(self.nodes, key=self.back_ns)
-        return node if before_ns is None or self.back_ns(node) <= before_ns else None
+        return node if self.back_ns(node) <= before_ns else None
 
     def finish(self, node: Node) -> int:
         """A node is back; return when."""
@@ -151,15 +160,30 @@ class Recovery:
         return bits * _SECOND_NS // self._bit_rate
 
 
-class Delivered(NamedTuple):
+class Delivered:
     """A frame was transmitted: the last bit of its end of frame was at `end_ns`."""
 
-    end_ns: int
-    start_ns: int
-    sender: Node
-    frame: Frame
-    heard_by: tuple[Node, ...]  # in order of attachment, the senders not among them
-    merged: tuple[Node, ...] = ()  # others that sent the same bits at the same time
+    __slots__ = ("end_ns", "frame", "heard_by", "merged", "sender", "start_ns")
+
+    def __init__(
+        self,
+        end_ns: int,
+        start_ns: int,
+        sender: Node,
+        frame: Frame,
+        heard_by: tuple[Node, ...],
+        merged: tuple[Node, ...] = (),
+    ) -> None:
+        self.end_ns = end_ns
+        self.start_ns = start_ns
+        self.sender = sender
+        self.frame = frame
+        self.heard_by = heard_by  # in order of attachment, the senders not among them
+        self.merged = merged  # others that sent the same bits at the same time
+
+    def __repr__(self) -> str:
+        heard = f"{self.sender} from {self.start_ns} to {self.end_ns} ns, heard by {self.heard_by}"
+        return f"{self.frame} of {heard}, the same as that of {self.merged}"
 
 
 class ErrorFrame(NamedTuple):
@@ -187,3 +211,8 @@ class StateChanged(NamedTuple):
 
 
 Event = Delivered | ErrorFrame | StateChanged
+
+
+def time_of(event: Event) -> int:
+    """The bus time at which it happened."""
+    return event.end_ns if isinstance(event, Delivered) else event.at_ns

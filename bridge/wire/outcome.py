@@ -22,7 +22,7 @@ dominant bits in a row and then send their own: 12 at most), and a delimiter of 
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from bridge.frame import EFF
 from bridge.frame_faults import ActingFrameFault, FrameFaults
@@ -39,9 +39,10 @@ from bridge.wire.confinement import NodeState
 from bridge.wire.node import ErrorKind, Node
 from bridge.wire.queues import ERROR_KEY, Entry
 
-_SECOND_NS = 1_000_000_000
-_ARBITRATION_BITS, _ARBITRATION_BITS_EXTENDED = 13, 33
-_AFTER_ACKNOWLEDGE = 1 + END_BITS + INTERMISSION_BITS
+_SECOND_NS: Final = 1_000_000_000
+_ARBITRATION_BITS: Final = 13
+_ARBITRATION_BITS_EXTENDED: Final = 33
+_AFTER_ACKNOWLEDGE: Final = 1 + END_BITS + INTERMISSION_BITS
 
 
 class Sending(NamedTuple):

@@ -14,23 +14,31 @@ frame that is on the wire keeps its place until it was sent, for it may have to 
 
 from abc import ABC, abstractmethod
 from bisect import insort
-from typing import NamedTuple
+from typing import Final
 
 from bridge.frame import Frame
 
-HOST_QUEUE = 10
-DRIVE_MAILBOXES = 3
-ERROR_KEY = -1
+HOST_QUEUE: Final = 10
+DRIVE_MAILBOXES: Final = 3
+ERROR_KEY: Final = -1
 """Key of an injected error flag: it takes part in no arbitration, it ends one."""
 
 
-class Entry(NamedTuple):
+class Entry:
     """A pending frame; entries compare as the bus and then the queue would choose."""
 
-    key: int  # of arbitration, see `bits.arbitration_key`
-    number: int  # in order of submission, unique on the wire
-    frame: Frame
-    bits: int  # on the wire, see `bits.frame_bits`
+    __slots__ = ("bits", "frame", "key", "number")
+
+    def __init__(self, key: int, number: int, frame: Frame, bits: int) -> None:
+        self.key = key  # of arbitration, see `bits.arbitration_key`
+        self.number = number  # in order of submission, unique on the wire
+        self.frame = frame
+        self.bits = bits  # on the wire, see `bits.frame_bits`
+
+    def __lt__(self, other: "Entry") -> bool:
+        if self.key != other.key:
+            return self.key < other.key
+        return self.number < other.number
 
 
 class Queue(ABC):

@@ -8,15 +8,25 @@ arbitration before or at that instant voids it. So the segment needs no clock, a
 events however often it is asked.
 """
 
+from typing import Final
+
 from bridge.frame_faults import FrameFaults
 from bridge.wire.bits import SUSPEND_BITS
-from bridge.wire.confinement import OFF, NodeState
-from bridge.wire.node import Delivered, ErrorFrame, ErrorKind, Event, Node, Recovery, StateChanged
+from bridge.wire.confinement import BUS_OFF, ERROR_PASSIVE, OFF
+from bridge.wire.node import (
+    NEVER,
+    Delivered,
+    ErrorFrame,
+    ErrorKind,
+    Event,
+    Node,
+    Recovery,
+    StateChanged,
+)
 from bridge.wire.outcome import Outcome, Plan, Sending, cut_short, ordered, outcome, tied
 from bridge.wire.queues import ERROR_KEY, Entry
 
-_SECOND_NS = 1_000_000_000
-_PASSIVE, _OFF = NodeState.ERROR_PASSIVE, NodeState.BUS_OFF
+_SECOND_NS: Final = 1_000_000_000
 
 
 class Segment:
@@ -52,7 +62,7 @@ class Segment:
         self.busy_ns = 0
         self.errors = 0
         self._ready: list[Node] = []  # have something to send
-        self._first_ns: int | None = None  # earliest start of what is ready
+        self._first_ns = NEVER  # earliest start of what is ready
         self._plan: Plan | None = None
         self.recovery = Recovery(bit_rate)
         self._moves: list[tuple[Node, Segment]] = []
@@ -131,8 +141,7 @@ class Segment:
         if node not in self._ready:
             self._ready.append(node)
         start = max(at_ns, self.free_ns)
-        if self._first_ns is None or start < self._first_ns:
-            self._first_ns = start
+        self._first_ns = min(self._first_ns, start)
         if self._plan is not None and self._plan.start_ns >= at_ns:
             self._plan = None
 
@@ -153,7 +162,7 @@ class Segment:
     def revise(self, at_ns: int) -> None:
         """The nodes or their states have changed, or a fault was injected."""
         self._listeners = tuple(
-            node for node in self.nodes if node.state is not _OFF and not node.wrong_bit_rate
+            node for node in self.nodes if node.state is not BUS_OFF and not node.wrong_bit_rate
         )
         rough = any(node.wrong_bit_rate for node in self.nodes)
         self._plain = len(self._listeners) > 1 and not rough
@@ -163,24 +172,25 @@ class Segment:
 
     # --- transmissions ---------------------------------------------------------------------------
 
-    def next_ns(self) -> int | None:
-        """Time of the next event, without further input; None: no event is due."""
+    def next_ns(self) -> int:
+        """Time of the next event, without further input."""
         plan = self._plan
-        if plan is None and self._first_ns is not None:
+        if plan is None and self._first_ns != NEVER:
             plan = self._plan = self._arbitrate(self._first_ns)
-        node = self.recovery.next(plan.start_ns if plan else None)
-        if node is not None:
-            return self.recovery.back_ns(node)
-        return None if plan is None else plan.done_ns
+        if self.recovery.nodes:
+            node = self.recovery.next(NEVER if plan is None else plan.start_ns)
+            if node is not None:
+                return self.recovery.back_ns(node)
+        return NEVER if plan is None else plan.done_ns
 
     def run(self, to_ns: int, events: list[Event]) -> None:
         """Append the events through `to_ns`; a frame submitted at `to_ns` still takes part."""
         while True:
             plan = self._plan
-            if plan is None and self._first_ns is not None and self._first_ns < to_ns:
+            if plan is None and self._first_ns < to_ns:
                 plan = self._plan = self._arbitrate(self._first_ns)
             if self.recovery.nodes:
-                node = self.recovery.next(plan.start_ns if plan else None)
+                node = self.recovery.next(NEVER if plan is None else plan.start_ns)
                 if node is not None and self.recovery.back_ns(node) <= to_ns:
                     self._report_state(node, self.recovery.finish(node), events)
                     continue
@@ -196,15 +206,16 @@ class Segment:
         return busy
 
     def _arbitrate(self, start_ns: int) -> Plan:
-        best = entry = None
+        best: Node | None = None
+        entry: Entry | None = None
         several = False
         for node in self._ready:
             if node.not_before_ns > start_ns:
                 continue
             head = node.queue.entries[0]
-            if entry is None or head[0] < entry[0]:
+            if entry is None or head.key < entry.key:
                 best, entry, several = node, head, False
-            elif head[0] == entry[0]:
+            elif head.key == entry.key:
                 several = True
         if best is None or entry is None:
             self._first_ns = min(node.not_before_ns for node in self._ready)
@@ -226,7 +237,8 @@ class Segment:
             what = ordered(waiting)
         else:
             what = outcome(tied(waiting, entry), self.nodes, self._faults)
-        plan = Plan(*(what.senders or what.orders)[0], start_ns, what, self._bit_rate)
+        first = (what.senders or what.orders)[0]
+        plan = Plan(first.node, first.entry, start_ns, what, self._bit_rate)
         plan.heard_by = tuple(node for node in self._listeners if not plan.involves(node))
         return plan
 
@@ -246,7 +258,7 @@ class Segment:
             self._transmitted(plan, what, events)
         else:
             self._failed(plan, what, what.error, events)
-        self._first_ns = free_ns if self._ready else None
+        self._first_ns = free_ns if self._ready else NEVER
         if self.recovery.nodes:
             self.recovery.count(plan.start_ns, free_ns)
         if self._failing:
@@ -269,7 +281,7 @@ class Segment:
 
     def _rest(self, node: Node, plan: Plan) -> None:
         """A node has sent, well or not: it may have to pause, or have nothing more to send."""
-        if node.state is _PASSIVE:
+        if node.state is ERROR_PASSIVE:
             node.not_before_ns = plan.free_ns + SUSPEND_BITS * _SECOND_NS // self._bit_rate
         if not node.queue.entries and node in self._ready:
             self._ready.remove(node)
@@ -279,7 +291,7 @@ class Segment:
         if node in self._ready:
             self._ready.remove(node)
         if not self._ready:
-            self._first_ns = None
+            self._first_ns = NEVER
 
     def _received(self, plan: Plan, events: list[Event]) -> None:
         """All others have received a frame."""
@@ -343,7 +355,7 @@ class Segment:
             return
         node.state = state
         events.append(StateChanged(at_ns, node, state))
-        if state is _OFF:
+        if state is BUS_OFF:
             node.counters.dropped += node.queue.clear()
             if node.restart_ns is not None:
                 self.recovery.start(node, at_ns + node.restart_ns)

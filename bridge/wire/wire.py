@@ -24,17 +24,18 @@ propagation, clock tolerance, and that a node which drops out of a clash is back
 """
 
 from heapq import heappop, heappush
+from typing import Final
 
 from bridge.frame import ERR, Frame
 from bridge.frame_faults import ActingFrameFault, FrameFaults
 from bridge.wire.bits import ERROR_FRAME_BITS, arbitration_key, frame_bits
-from bridge.wire.confinement import NodeState
-from bridge.wire.node import Babbler, Event, Node
+from bridge.wire.confinement import BUS_OFF
+from bridge.wire.node import Babbler, Event, Node, time_of
 from bridge.wire.queues import ERROR_KEY, Entry, Fifo, Queue
 from bridge.wire.segment import Segment
 
-MAX_BIT_RATE = 1_000_000
-MOST_BABBLES = 2
+MAX_BIT_RATE: Final = 1_000_000
+MOST_BABBLES: Final = 2
 """Frames of a babbler that are queued: the one on the wire, and the next."""
 
 
@@ -100,12 +101,12 @@ class Wire:
 
     def restart(self, node: Node) -> None:
         """Tell a node that is bus-off to come back: after 128 times 11 recessive bits it is."""
-        if node.state is NodeState.BUS_OFF and node.attached:
+        if node.state is BUS_OFF and node.attached:
             self._segment(node).recovery.start(node, self.now_ns)
 
     def fail(self, node: Node) -> None:
         """Take a node off the bus as its error counters would, at the end of its frame if any."""
-        if node.attached and node.state is not NodeState.BUS_OFF:
+        if node.attached and node.state is not BUS_OFF:
             self._segment(node).fail(node, self.now_ns, self._events)
 
     def discard(self, node: Node) -> None:
@@ -178,10 +179,10 @@ class Wire:
             self._events = []
         return events
 
-    def next_ns(self) -> int | None:
-        """Time of the next event, unless a node submits a frame; None: no event is due."""
+    def next_ns(self) -> int:
+        """Time of the next event, unless a node submits a frame; `NEVER`: no event is due."""
         if self._events:
-            return self._events[0][0]
+            return time_of(self._events[0])
         return self._next_ns()
 
     # --- faults and figures ----------------------------------------------------------------------
@@ -223,7 +224,7 @@ class Wire:
         ]
 
     def _queue(self, node: Node, entry: Entry) -> bool:
-        if node.state is NodeState.BUS_OFF or not node.queue.push(entry):
+        if node.state is BUS_OFF or not node.queue.push(entry):
             node.counters.refused += 1
             return False
         node.counters.accepted += 1
@@ -255,7 +256,7 @@ class Wire:
             case "can_duplicate":
                 taken = self._queue(node, entry)
                 self._number += 1
-                self._queue(node, entry._replace(number=self._number))
+                self._queue(node, Entry(entry.key, self._number, entry.frame, entry.bits))
                 return taken
             case _:
                 raise ValueError(f"{found.kind} has no effect before a controller")
@@ -272,7 +273,7 @@ class Wire:
     def _say_again(self, node: Node, frame: Frame) -> None:
         """A node that babbles sends its frame."""
         waiting = sum(entry.frame is frame for entry in node.queue.entries)
-        if node.state is NodeState.BUS_OFF or waiting >= MOST_BABBLES:
+        if node.state is BUS_OFF or waiting >= MOST_BABBLES:
             node.counters.refused += 1
             return
         node.counters.accepted += 1
@@ -281,21 +282,21 @@ class Wire:
         node.queue.put(entry)
         self._segment(node).wake(node, self.now_ns)
 
-    def _next_ns(self) -> int | None:
+    def _next_ns(self) -> int:
         if not (self._apart or self._withheld or self._babblers):
             return self._main.next_ns()
         times = [self._main.next_ns(), *(segment.next_ns() for segment in self._apart)]
         times += [babbler.next_ns for babbler in self._babblers.values()]
         if self._withheld:
             times.append(self._withheld[0][0])
-        return min((time for time in times if time is not None), default=None)
+        return min(times)
 
     def _run(self, to_ns: int) -> None:
         if to_ns < self.now_ns:
             raise ValueError(f"bus time {to_ns} ns is in the past; it is {self.now_ns} ns already")
         while self._withheld or self._apart or self._babblers:
             next_ns = self._next_ns()
-            if next_ns is None or next_ns > to_ns:
+            if next_ns > to_ns:
                 break
             self._step(next_ns)
         self.now_ns = to_ns

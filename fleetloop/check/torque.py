@@ -64,11 +64,11 @@ def needed(scenario: Scenario, course: Course) -> Need:
         rest = gear * motor.coulomb_friction_shaft_N_m * np.sign(nu)
     motion = nu * viscous
     push = (course.robot.disturbance or scenario.disturbance).amplitude_wheel_N_m
-    whole = motion + rest + _inertial(body, course)
+    whole = motion + rest + _inertial(body, course, nu)
     return Need(np.abs(whole) + push, motion, rest, nu)
 
 
-def _inertial(body: RigidBody, course: Course) -> Series:
+def _inertial(body: RigidBody, course: Course, nu: Series) -> Series:
     """M̄ ξ' + C̄ ξ of (4) at both wheels."""
     if len(course.t_s) < 3:
         return np.zeros((len(course.t_s), 2))
@@ -78,7 +78,7 @@ def _inertial(body: RigidBody, course: Course) -> Series:
     rate_v[starting] = rate_omega[starting] = 0.0
     moments = zip(v, omega, rate_v, rate_omega, strict=True)
     torques = np.array([body.wheel_torques(*moment) for moment in moments])
-    friction = _wheel_speeds(body, course) * np.array(body.damping_wheel_N_m_s)
+    friction = nu * np.array(body.damping_wheel_N_m_s)
     inertial: Series = torques - friction
     return inertial
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from agents.agent import Agent
 from agents.bus_clock import BusClock
-from bridge.can_bus.packet import Key, Submitted, Transmitted
+from bridge.can_bus.packet import Key, Stamped, Submitted, Transmitted
 from bridge.frame import Frame
 from plant.bus.port import Port
 
@@ -35,11 +35,12 @@ class Controller:
                 said = agent.step(tick)
         return said
 
-    def react(self, received: Sequence[tuple[int, Frame]], asked_ns: int) -> list[Frame]:
-        """The answer to a question of a bus time: frames with their bus times."""
+    def react(self, received: Sequence[Stamped], asked_ns: int) -> list[Frame]:
+        """The answer to a question of a bus time."""
         agent, clock = self._agent, self._clock
         said: list[Frame] = []
-        for at_ns, frame in received:
+        for heard in received:
+            frame, at_ns = heard.frame, heard.end_ns
             agent.on_frame(frame.can_id, frame.data, at_ns)
             tick = clock.due(at_ns)
             if tick is not None:
@@ -60,7 +61,7 @@ class ControllerPort(Port):
         self._in_order = list(controllers.values())
         self._stamp_ns = 0
         self._frames: Sequence[Frame] = ()
-        self._pending: dict[str, list[tuple[int, Frame]]] = {robot: [] for robot in controllers}
+        self._pending: dict[str, list[Stamped]] = {robot: [] for robot in controllers}
         self._asked = ""
 
     def deliver(self, stamp_ns: int, frames: Sequence[Frame]) -> None:
@@ -77,7 +78,9 @@ class ControllerPort(Port):
     def forward(self, stamp_ns: int, ended: Sequence[Transmitted], asked: str | None) -> None:
         """Keep what each controller hears of frames that ended, and which one is asked."""
         for robot, pending in self._pending.items():
-            pending += [p.as_heard_by(robot) for p in ended if p.heard_by(robot)]
+            for passed in ended:
+                if passed.heard_by(robot):
+                    pending.append(passed.as_heard_by(robot))
         self._stamp_ns, self._asked = stamp_ns, asked or ""
 
     def submitted(self) -> list[Submitted]:

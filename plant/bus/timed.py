@@ -25,7 +25,7 @@ from random import Random
 from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.frame import Frame
 from bridge.network.telemetry import FROM_DRIVE, Tap
-from bridge.wire.confinement import NodeState
+from bridge.wire.confinement import BUS_OFF, ERROR_ACTIVE, NodeState
 from bridge.wire.error_frames import of_error, of_state
 from bridge.wire.node import Delivered, ErrorFrame, Node, StateChanged
 from bridge.wire.queues import Fifo, Mailboxes
@@ -36,9 +36,8 @@ from plant.bus.port import Begin, Port, Steps
 from plant.bus.wire_nodes import WireDrive, WireHost, disturb, has_to_send
 from plant.disturbance import Disturbance
 from plant.faults import BusFaults
+from plant.noise import whole_between
 from plant.robot import EmulatedRobot
-
-_NEVER = 1 << 61
 
 
 class TimedBus:
@@ -178,7 +177,8 @@ class TimedBus:
 
     def submit(self, submitted: Sequence[Submitted]) -> None:
         """Put frames of clients into their transmit queues now."""
-        for key, frame in submitted:
+        for one in submitted:
+            key, frame = one.key, one.frame
             host = self._hosts.get(key) or self._host(key)
             host.submitted += 1
             self.wire.submit(host.node, frame, self._now_ns)
@@ -206,10 +206,13 @@ class TimedBus:
         """Run until the drives of a robot have sent all of the tick; None at its end."""
         while True:
             for robot in waiting:
-                if not any(map(has_to_send, self._of_robot[robot])):
+                if not self._has_to_send(robot):
                     return robot
             if not self._event(end_ns):
                 return None
+
+    def _has_to_send(self, robot: str) -> bool:
+        return any(has_to_send(drive) for drive in self._of_robot[robot])
 
     def _run(self, end_ns: int) -> None:
         while self._event(end_ns):
@@ -227,8 +230,7 @@ class TimedBus:
     # --- events ----------------------------------------------------------------------------------
 
     def _next_ns(self) -> int:
-        next_ns = self.wire.next_ns()
-        at_ns = _NEVER if next_ns is None else next_ns
+        at_ns = self.wire.next_ns()
         if self._mail and self._mail[0][0] < at_ns:
             at_ns = self._mail[0][0]
         for drive in self._drives:
@@ -278,10 +280,9 @@ class TimedBus:
         concerned = [d for d in self._drives if d.drive.setpoint_id == can_id] or self._drives
         for target in concerned:
             if target.node in event.heard_by and not target.apart:
-                soonest_ns, latest_ns = target.robot.brief.drive.command_latency_ns
-                latency_ns = soonest_ns
-                if latest_ns > soonest_ns:
-                    latency_ns = self._random.randint(soonest_ns, latest_ns)
+                latency_ns = target.soonest_ns
+                if target.latest_ns > latency_ns:
+                    latency_ns = whole_between(self._random, latency_ns, target.latest_ns)
                 # In order: firmware reads its mailbox from the front.
                 target.looks_ns = max(target.looks_ns, end_ns + latency_ns)
                 self._number += 1
@@ -299,11 +300,11 @@ class TimedBus:
         node = event.node
         key = self._key_of.get(node)
         if key is not None:
-            before = self._states.get(node, NodeState.ERROR_ACTIVE)
+            before = self._states.get(node, ERROR_ACTIVE)
             self._states[node] = event.state
             self._transmitted.append(Transmitted(event.at_ns, of_state(event, before), to=key))
             self._stirred[key] = None
-        elif node in self._of_node and event.state is not NodeState.BUS_OFF:
+        elif node in self._of_node and event.state is not BUS_OFF:
             self._submit_backlog(self._of_node[node])
 
     def _submit_backlog(self, drive: WireDrive) -> None:

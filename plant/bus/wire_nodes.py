@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from bridge.drives.interface import DriveNode
 from bridge.frame import Frame
-from bridge.wire.confinement import NodeState
+from bridge.wire.confinement import BUS_OFF
 from bridge.wire.node import Node
 from bridge.wire.wire import Wire
 from plant.disturbance import Disturbance
@@ -22,12 +22,17 @@ from plant.robot import EmulatedRobot
 class WireDrive:
     """A drive at its node of the wire."""
 
-    __slots__ = ("apart", "backlog", "drive", "due_ns", "looks_ns", "node", "robot", "silent")
+    __slots__ = (
+        *("apart", "backlog", "drive", "due_ns", "latest_ns", "looks_ns", "node", "robot"),
+        *("silent", "soonest_ns"),
+    )
 
     def __init__(self, robot: EmulatedRobot, drive: DriveNode, node: Node) -> None:
         self.robot = robot
         self.drive = drive
         self.node = node
+        # Firmware looks at a frame that late after its end at the soonest, and at the latest.
+        self.soonest_ns, self.latest_ns = robot.brief.drive.command_latency_ns
         self.due_ns = 0
         self.looks_ns = 0  # when firmware looks at the last frame that came for it
         self.backlog: dict[int, Frame] = {}  # by identifier, waiting for a mailbox
@@ -57,7 +62,7 @@ class WireHost:
 def has_to_send(drive: WireDrive) -> bool:
     """Whether frames of a drive are waiting that it can send."""
     node = drive.node
-    return bool(node.queue.entries or drive.backlog) and node.state is not NodeState.BUS_OFF
+    return bool(node.queue.entries or drive.backlog) and node.state is not BUS_OFF
 
 
 def disturb(wire: Wire, drives: Sequence[WireDrive], disturbance: Disturbance) -> None:

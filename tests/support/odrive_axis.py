@@ -28,9 +28,19 @@ MODEL = AxisModel(
     watchdog_ns=100 * MS,
     zero_torque_on_disarm=False,
 )
-HEALTHY = DriveMeasurements(
-    torque_shaft_N_m=0.0, current_A=0.0, fet_C=30.0, motor_C=float("nan"), bus_V=24.0, bus_A=0.0
-)
+_HEALTHY = {
+    "torque_shaft_N_m": 0.0,
+    "current_A": 0.0,
+    "fet_C": 30.0,
+    "motor_C": float("nan"),
+    "bus_V": 24.0,
+    "bus_A": 0.0,
+}
+HEALTHY = DriveMeasurements(**_HEALTHY)
+
+
+def healthy(**changes: float) -> DriveMeasurements:
+    return DriveMeasurements(**_HEALTHY | changes)
 
 
 def axis(**changes) -> OdriveNode:

@@ -9,11 +9,13 @@
 Each takes the same time. What it finds out is a parameter: saved by Reboot 1, else gone on reboot.
 """
 
+from typing import Final
+
 from bridge.drives.odrive.frames import AxisState
 from bridge.drives.odrive.parameters import Parameters
 
-NEVER = 1 << 61
-_PROCEDURES = {
+NEVER: Final = 1 << 61
+_PROCEDURES: Final = {
     AxisState.FULL_CALIBRATION_SEQUENCE: (
         AxisState.MOTOR_CALIBRATION,
         AxisState.ENCODER_OFFSET_CALIBRATION,

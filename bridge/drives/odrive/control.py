@@ -28,6 +28,9 @@ from bridge.drives.odrive.frames import ControlMode, InputMode
 from bridge.drives.odrive.parameters import Parameters
 from bridge.drives.odrive.trapezoid import Trapezoid, plan
 
+_TORQUE: Final = int(ControlMode.TORQUE)
+_POSITION: Final = int(ControlMode.POSITION)
+_PASSTHROUGH: Final = int(InputMode.PASSTHROUGH)
 _LOOP_HZ: Final = 8000.0
 _INTEGRATOR_KEEP: Final = 0.99
 """Factor on z per loop period while τ is limited."""
@@ -95,9 +98,9 @@ class Controller:
         velocity = motion[1]
         limited = torque_limit is not None
         error = 0.0
-        if mode != ControlMode.TORQUE:
+        if mode != _TORQUE:
             wanted = self.velocity_setpoint
-            if mode == ControlMode.POSITION:
+            if mode == _POSITION:
                 wanted += p.position_gain * (self.position_setpoint - motion[0])
             if limited:
                 wanted = min(max(wanted, -p.velocity_limit), p.velocity_limit)
@@ -109,7 +112,7 @@ class Controller:
         unlimited = torque
         if torque_limit is not None:
             torque = min(max(torque, -torque_limit), torque_limit)
-        if mode == ControlMode.TORQUE:
+        if mode == _TORQUE:
             self._integral = 0.0
         elif torque != unlimited:
             self._decay(dt_s, self._integral + torque - unlimited)
@@ -128,7 +131,7 @@ class Controller:
     def _follow_inputs(self, dt_s: float, input_torque: float) -> None:
         p = self._parameters
         mode = p.input_mode
-        if mode == InputMode.PASSTHROUGH:
+        if mode == _PASSTHROUGH:
             self.position_setpoint = self.input_position
             self.velocity_setpoint = self.input_velocity
             self.torque_setpoint = input_torque

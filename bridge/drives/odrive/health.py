@@ -24,25 +24,43 @@ TRIP_K: Final = 5.0
 _POWER_BANDWIDTH_RAD_S: Final = 20.0
 
 
-def derating(celsius: float, model: AxisModel) -> float:
+class Thresholds:
+    """What measurements are compared with: numbers of a drive's model."""
+
+    __slots__ = (
+        *("current_margin_A", "derate_from_C", "derate_to_C", "over_voltage_V"),
+        *("under_voltage_V",),
+    )
+
+    def __init__(self, model: AxisModel) -> None:
+        self.derate_from_C = model.derate_from_C
+        self.derate_to_C = model.derate_to_C
+        self.under_voltage_V = model.under_voltage_V
+        self.over_voltage_V = model.over_voltage_V
+        self.current_margin_A = model.current_margin_A
+
+
+def derating(celsius: float, thresholds: Thresholds) -> float:
     """The factor on the current limit by (1), in [0, 1]; 0 for NaN."""
-    span = model.derate_to_C - model.derate_from_C
-    if not celsius < model.derate_to_C:
+    from_C, to_C = thresholds.derate_from_C, thresholds.derate_to_C
+    if not celsius < to_C:
         return 0.0
-    return 1.0 if celsius <= model.derate_from_C else (model.derate_to_C - celsius) / span
+    return 1.0 if celsius <= from_C else (to_C - celsius) / (to_C - from_C)
 
 
-def current_limit(measurements: DriveMeasurements, limit_A: float, model: AxisModel) -> float:
+def current_limit(measurements: DriveMeasurements, limit_A: float, thresholds: Thresholds) -> float:
     """The current limit in force [A]."""
-    factor = derating(measurements.fet_C, model)
+    factor = derating(measurements.fet_C, thresholds)
     if measurements.motor_C == measurements.motor_C:
-        factor = min(factor, derating(measurements.motor_C, model))
+        factor = min(factor, derating(measurements.motor_C, thresholds))
     return limit_A * factor
 
 
-def conditions(measurements: DriveMeasurements, limit_in_force_A: float, model: AxisModel) -> int:
+def conditions(
+    measurements: DriveMeasurements, limit_in_force_A: float, thresholds: Thresholds
+) -> int:
     """The conditions that disarm the drive now, as bits of `AxisError`."""
-    hottest_C = model.derate_to_C + TRIP_K
+    hottest_C = thresholds.derate_to_C + TRIP_K
     bits = 0
     if measurements.fet_C != measurements.fet_C:
         bits |= AxisError.THERMISTOR_DISCONNECTED.value
@@ -50,11 +68,11 @@ def conditions(measurements: DriveMeasurements, limit_in_force_A: float, model: 
         bits |= AxisError.INVERTER_OVER_TEMP.value
     if measurements.motor_C >= hottest_C:
         bits |= AxisError.MOTOR_OVER_TEMP.value
-    if not measurements.bus_V >= model.under_voltage_V:
+    if not measurements.bus_V >= thresholds.under_voltage_V:
         bits |= AxisError.DC_BUS_UNDER_VOLTAGE.value
-    elif measurements.bus_V > model.over_voltage_V:
+    elif measurements.bus_V > thresholds.over_voltage_V:
         bits |= AxisError.DC_BUS_OVER_VOLTAGE.value
-    if not abs(measurements.current_A) <= limit_in_force_A + model.current_margin_A:
+    if not abs(measurements.current_A) <= limit_in_force_A + thresholds.current_margin_A:
         bits |= AxisError.CURRENT_LIMIT_VIOLATION.value
     return bits
 

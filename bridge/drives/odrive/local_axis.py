@@ -23,7 +23,8 @@ are stored and act on arming (position inputs don't: arming begins where the axi
 documentation is silent, 0.5.6's source.
 """
 
-from math import isfinite
+from math import inf, isfinite
+from typing import Final
 
 from bridge.drives.interface import DriveMeasurements, DriveNode
 from bridge.drives.odrive import calibration, control, health
@@ -34,17 +35,21 @@ from bridge.drives.odrive.frames import ProcedureResult as Result
 from bridge.drives.odrive.model import AxisModel
 from bridge.drives.odrive.parameters import FLOAT32_MAX, Parameters
 
+_CLOSED_LOOP: Final = AxisState.CLOSED_LOOP_CONTROL
+
 
 class LocalAxis(DriveNode):
     """One axis. Pure: the time is an argument."""
 
     __slots__ = (
         "_conditions",
+        "_fastest_rev_s",
         "_lasting",
         "_offset",
         "_plain",
         "_silence_ns",
         "_spinout",
+        "_thresholds",
         "_torque_limit",
         "_unmeasured_s",
         "calibration",
@@ -67,6 +72,7 @@ class LocalAxis(DriveNode):
     def __init__(self, model: AxisModel, serial: int) -> None:
         self.model = model
         self.serial = serial
+        self._thresholds = health.Thresholds(model)
         self._lasting = AxisError(0)  # never cleared
 
     def power_up(self, parameters: Parameters) -> None:
@@ -89,7 +95,7 @@ class LocalAxis(DriveNode):
     def apply(self) -> None:
         """Apply changed parameters."""
         p = self.parameters
-        armed = self.state is AxisState.CLOSED_LOOP_CONTROL
+        armed = self.state is _CLOSED_LOOP
         limiters = self.model.torque_limiters
         watched = armed and p.watchdog_enabled
         self._silence_ns = min(round(p.watchdog_s * 1e9), NEVER) if watched else NEVER
@@ -98,9 +104,10 @@ class LocalAxis(DriveNode):
             and p.control_mode == ControlMode.TORQUE
             and p.input_mode == InputMode.PASSTHROUGH
         )
+        self._fastest_rev_s = self.model.overspeed_ratio * p.velocity_limit if limiters else inf
         limit_A = p.current_limit
         if self.measurements is not None:
-            limit_A = health.current_limit(self.measurements, limit_A, self.model)
+            limit_A = health.current_limit(self.measurements, limit_A, self._thresholds)
         self._torque_limit = limit_A * self.model.torque_constant_N_m_A if limiters else None
         if armed and not control.exists(p.control_mode, p.input_mode):
             self.disarm(AxisError.BAD_CONFIG)
@@ -120,15 +127,15 @@ class LocalAxis(DriveNode):
     def update_measurements(self, measurements: DriveMeasurements) -> None:
         """Set the drive's measurements; derate, and disarm at a condition of `health`."""
         self.measurements = measurements
-        model = self.model
-        limit_A = health.current_limit(measurements, self.parameters.current_limit, model)
+        thresholds = self._thresholds
+        limit_A = health.current_limit(measurements, self.parameters.current_limit, thresholds)
         if self._torque_limit is not None:
-            self._torque_limit = limit_A * model.torque_constant_N_m_A
-        armed = self.state is AxisState.CLOSED_LOOP_CONTROL
+            self._torque_limit = limit_A * self.model.torque_constant_N_m_A
+        armed = self.state is _CLOSED_LOOP
         if armed and self._spinout.detects(measurements, self.velocity, self._unmeasured_s):
             self.disarm(AxisError.SPINOUT_DETECTED)
         self._unmeasured_s = 0.0
-        found = health.conditions(measurements, limit_A, model)
+        found = health.conditions(measurements, limit_A, thresholds)
         raised = found & ~self._conditions
         self._conditions = found
         if raised:
@@ -136,12 +143,12 @@ class LocalAxis(DriveNode):
 
     def torque_demand_shaft(self, dt_s: float = 0.0) -> float:
         """Torque asked of the motor for the next `dt_s` [N·m]; always finite, 0 unless armed."""
-        if self.state is not AxisState.CLOSED_LOOP_CONTROL:
+        if self.state is not _CLOSED_LOOP:
             return 0.0
         if self._plain:
             return self.input_torque_shaft
         self._check_motion()
-        if self.state is not AxisState.CLOSED_LOOP_CONTROL:
+        if self.state is not _CLOSED_LOOP:
             return 0.0
         self._unmeasured_s += dt_s
         motion = self.position, self.velocity
@@ -155,7 +162,7 @@ class LocalAxis(DriveNode):
     @property
     def effective_torque_shaft(self) -> float:
         """The present torque demand [N·m], without a step of the controller."""
-        if self._plain and self.state is AxisState.CLOSED_LOOP_CONTROL:
+        if self._plain and self.state is _CLOSED_LOOP:
             return self.input_torque_shaft
         return self.demand
 
@@ -170,7 +177,7 @@ class LocalAxis(DriveNode):
             self.state = self.calibration.state
             if self.state is AxisState.IDLE:
                 self.result = Result.SUCCESS
-        if self.state is AxisState.CLOSED_LOOP_CONTROL and not self._plain:
+        if self.state is _CLOSED_LOOP and not self._plain:
             self._check_motion()
 
     def disarm(self, error: AxisError) -> None:
@@ -204,11 +211,9 @@ class LocalAxis(DriveNode):
         self.disarm_reason = AxisError(0)
 
     def _check_motion(self) -> None:
-        model = self.model
-        fastest = model.overspeed_ratio * self.parameters.velocity_limit
         if not isfinite(self.position + self.velocity):
             self.disarm(AxisError.MISSING_ESTIMATE)
-        elif model.torque_limiters and abs(self.velocity) > fastest:
+        elif abs(self.velocity) > self._fastest_rev_s:
             self.disarm(AxisError.VELOCITY_LIMIT_VIOLATION)
 
     # --- commands ----------------------------------------------------------------------------

@@ -69,7 +69,8 @@ def test_a_full_transmit_queue_raises_enobufs_until_frames_have_left_it(timed) -
         assert caught.value.error_code == errno.ENOBUFS
         for _ in range(10):
             timed.hub.serve(0.5)
-        (key, _), *_ = said = timed.hub.submitted("r1")
+        said = timed.hub.submitted("r1")
+        key = said[0].key
         assert len(said) == 10
         timed.hub.return_credit("r1", key, 3)
         for _ in range(3):
@@ -83,7 +84,8 @@ def test_who_only_sends_finds_room_again_when_its_frames_have_left(timed) -> Non
         for n in range(50):  # of a queue of 10
             bus.send(can.Message(arbitration_id=0x123, is_extended_id=False, data=[n]))
             timed.hub.serve(0.5)
-            ((key, frame),) = timed.hub.submitted("r1")
+            (said,) = timed.hub.submitted("r1")
+            key, frame = said.key, said.frame
             assert frame.data == bytes([n])
             timed.hub.return_credit("r1", key, 1)
 
@@ -95,7 +97,8 @@ def test_with_bit_timing_what_a_client_says_reaches_nobody_before_the_wire_carri
         speaker.send(can.Message(arbitration_id=0x123, is_extended_id=False))
         timed.hub.serve(0.5)
         assert other.recv(0.05) is None
-        ((key, frame),) = timed.hub.submitted("r1")
+        (said,) = timed.hub.submitted("r1")
+        key, frame = said.key, said.frame
         timed.hub.forward("r1", 5_000_000, [Transmitted(5_000_000, frame, key)])
         assert other.recv(1.0).arbitration_id == 0x123
         assert speaker.recv(0.05) is None  # no echo of its own

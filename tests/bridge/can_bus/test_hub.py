@@ -127,7 +127,7 @@ def test_what_is_no_classic_frame_is_counted_and_goes_nowhere(
     serving.serve()
     good = [Frame(1, b"a"), Frame(3, b"c")]
     if queue:
-        assert [frame for _, frame in serving.hub.submitted("r1")] == good
+        assert [said.frame for said in serving.hub.submitted("r1")] == good
     else:
         assert serving.hub.receive("r1") == good
         assert other.hear().kind == WELCOME
@@ -140,5 +140,5 @@ def test_with_bit_timing_an_error_frame_is_for_the_wire(runtime_folder) -> None:
     serving = Serving(10)
     serving.join().frames(Frame(ERR | 4, bytes(8)))
     serving.serve()
-    assert [frame for _, frame in serving.hub.submitted("r1")] == [Frame(ERR | 4, bytes(8))]
+    assert [said.frame for said in serving.hub.submitted("r1")] == [Frame(ERR | 4, bytes(8))]
     serving.close()

@@ -124,7 +124,7 @@ def test_any_number_of_frames_travels_in_packets_that_all_decode(count: int) -> 
     sent = [Stamped(n, Frame(n % 0x800, b"")) for n in range(count)]
     packets = [decode(data) for data in split(0, count, sent, 7)]
     frames = [frame for packet in packets if packet is not None for frame in packet.frames]
-    assert frames == [frame for _, frame in sent]
+    assert frames == [stamped.frame for stamped in sent]
     flags = [packet.flags for packet in packets if packet is not None]
     assert flags == [MORE] * (len(packets) - 1) + [0]
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bridge.frame import EFF, RTR, Frame
 from bridge.wire.bits import arbitration_key, frame_bits, most_bits
-from bridge.wire.node import Delivered, Event, Node
+from bridge.wire.node import NEVER, Delivered, Event, Node
 from bridge.wire.queues import Fifo, Mailboxes
 from bridge.wire.response_time import Message, analyse
 from bridge.wire.wire import Wire
@@ -92,7 +92,7 @@ def test_who_submits_at_the_start_of_a_frame_takes_part_and_a_nanosecond_later_w
         wire = Wire(1_000_000)
         low, high = wire.attach("low"), wire.attach("high")
         wire.submit(low, Frame(0x700, b""), 5 * US)
-        assert wire.next_ns() is not None
+        assert wire.next_ns() != NEVER
         wire.submit(high, Frame(0x001, b""), 5 * US + late_ns)
         assert [event.frame.can_id for event in delivered(wire.advance(MS))] == order
 
@@ -126,7 +126,7 @@ def test_a_node_that_leaves_takes_its_queue_along_but_not_the_frame_on_the_wire(
     assert (client.counters.sent, client.counters.dropped) == (1, 4)
     with pytest.raises(ValueError, match="client has left"):
         wire.submit(client, Frame(0x100, b""), MS)
-    assert wire.next_ns() is None
+    assert wire.next_ns() == NEVER
     assert len(other.queue.entries) == 0
 
 
@@ -258,7 +258,7 @@ def played(
     for number, (n, low, data, later) in enumerate(schedule):
         now += later
         if ask:
-            while (due := wire.next_ns()) is not None and due <= now:
+            while (due := wire.next_ns()) <= now:
                 events += wire.advance(due)
             wire.advance(wire.now_ns)
         frame = Frame(low * 4 + n, data[:7] + bytes([number]))

@@ -12,6 +12,7 @@ from support.odrive_axis import (
     axis,
     beat,
     floats,
+    healthy,
     modes,
     tell,
     torque,
@@ -34,7 +35,7 @@ def driven(**changes) -> OdriveNode:
 @pytest.mark.parametrize("which", ["fet_C", "motor_C"])
 def test_the_current_limit_falls_linearly_with_temperature(which, celsius, factor) -> None:
     node = driven()
-    node.update_measurements(HEALTHY._replace(**{which: celsius}))
+    node.update_measurements(healthy(**{which: celsius}))
     assert node.torque_demand_shaft(0.001) == pytest.approx(0.5 * factor)
     assert node.state is AxisState.CLOSED_LOOP_CONTROL
     node.update_measurements(HEALTHY)
@@ -43,7 +44,7 @@ def test_the_current_limit_falls_linearly_with_temperature(which, celsius, facto
 
 def test_limits_set_while_hot_are_derated() -> None:
     node = driven()
-    node.update_measurements(HEALTHY._replace(fet_C=110.0))
+    node.update_measurements(healthy(fet_C=110.0))
     floats(node, Command.SET_LIMITS, 10.0, 4.0)
     assert node.torque_demand_shaft(0.001) == pytest.approx(4.0 * 0.5 * 0.05)
 
@@ -64,7 +65,7 @@ def test_limits_set_while_hot_are_derated() -> None:
 )
 def test_what_leaves_its_range_disarms_and_keeps_from_arming_while_it_lasts(changes, error) -> None:
     node = driven()
-    node.update_measurements(HEALTHY._replace(**changes))
+    node.update_measurements(healthy(**changes))
     assert node.torque_demand_shaft(0.001) == 0.0
     assert beat(node)[:3] == (error, AxisState.IDLE, ProcedureResult.DISARMED)
     tell(node, Command.CLEAR_ERRORS)
@@ -81,7 +82,7 @@ def test_what_leaves_its_range_disarms_and_keeps_from_arming_while_it_lasts(chan
 )
 def test_what_is_just_within_its_range_does_not_disarm(changes) -> None:
     node = driven()
-    node.update_measurements(HEALTHY._replace(**changes))
+    node.update_measurements(healthy(**changes))
     assert node.state is AxisState.CLOSED_LOOP_CONTROL
 
 
@@ -89,7 +90,7 @@ def test_measurements_are_told_on_the_bus() -> None:
     node = driven()
     node.update_encoder(0.0, 2.0)
     node.update_measurements(
-        HEALTHY._replace(torque_shaft_N_m=0.4, current_A=8.0, bus_V=23.5, bus_A=2.0, motor_C=41.0)
+        healthy(torque_shaft_N_m=0.4, current_A=8.0, bus_V=23.5, bus_A=2.0, motor_C=41.0)
     )
     node.torque_demand_shaft(0.001)
     assert asked(node, Command.GET_TEMPERATURE) == pytest.approx((30.0, 41.0))
@@ -111,9 +112,7 @@ def felt_for(node: OdriveNode, seconds: float, velocity: float, watts: float) ->
     for k in range(round(seconds * 1000)):
         node.update_encoder(velocity * k * 0.001, velocity)
         node.torque_demand_shaft(0.001)
-        node.update_measurements(
-            HEALTHY._replace(torque_shaft_N_m=0.5, current_A=10.0, bus_A=watts / 24.0)
-        )
+        node.update_measurements(healthy(torque_shaft_N_m=0.5, current_A=10.0, bus_A=watts / 24.0))
 
 
 def test_an_encoder_whose_sign_flips_is_found_by_spinout_detection() -> None:
