@@ -14,8 +14,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-SHORTEST_TURN_NS: Final = 100_000
-"""Of which a process may ask; the kernel's own turns are of 1 to 3 ms."""
+TURN_NS: Final = 300_000
+"""Longer than what a process computes at once, shorter than the kernel's turns of 1 to 3 ms."""
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 _SET_ATTR, _GET_ATTR = {"x86_64": (314, 315), "aarch64": (274, 275), "riscv64": (274, 275)}.get(
     platform.machine(), (-1, -1)
@@ -47,21 +47,21 @@ def go_realtime(priority: int) -> list[str]:
 
 
 def go_by_short_turns() -> None:
-    """Take the shortest turns that there are, from now on, and all that this process starts.
+    """Take turns of `TURN_NS` from now on, as does all that this process starts.
 
     Woken, it gets the processor at once from one whose turns are longer, but not from its like,
     and of the processor it gets no more than before. Where the kernel has only turns of its own
     (Linux before 6.12), this process is batch work.
     """
     nice = os.getpriority(os.PRIO_PROCESS, 0)
-    size, turn_ns = _ATTRIBUTES.size, SHORTEST_TURN_NS
-    asked = _ATTRIBUTES.pack(size, os.SCHED_OTHER, 0, nice, 0, turn_ns, 0, 0, 0, 0)
+    size = _ATTRIBUTES.size
+    asked = _ATTRIBUTES.pack(size, os.SCHED_OTHER, 0, nice, 0, TURN_NS, 0, 0, 0, 0)
     granted = ctypes.create_string_buffer(size)
     call = ctypes.CDLL(None, use_errno=True).syscall
     if (
         call(_SET_ATTR, 0, asked, 0) != 0
         or call(_GET_ATTR, 0, granted, size, 0) != 0
-        or _ATTRIBUTES.unpack(granted.raw)[5] != turn_ns  # an older kernel has 0
+        or _ATTRIBUTES.unpack(granted.raw)[5] != TURN_NS  # an older kernel has 0
     ):
         go_batch()
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from bridge.process.scheduling import SHORTEST_TURN_NS
+from bridge.process.scheduling import TURN_NS
 
 GO = """
 import os, sys
@@ -37,7 +37,7 @@ def test_short_turns_are_the_kernel_s_and_those_of_what_is_started_later() -> No
     (policy, _), table = after("go_by_short_turns()")
     assert int(policy) == os.SCHED_OTHER
     if "se.slice" in table:
-        assert int(table["se.slice"]) == SHORTEST_TURN_NS
+        assert int(table["se.slice"]) == TURN_NS
 
 
 def test_where_turns_are_the_kernel_s_own_it_is_batch_work() -> None:
