@@ -37,7 +37,6 @@ from bridge.process.awake import LOOK_S, AwakeClock
 from bridge.process.clock import process_cpu_ns
 from bridge.process.lifecycle import (
     Stop,
-    go_realtime,
     launcher_stopped,
     name_process,
     processor_wait_ns,
@@ -45,6 +44,7 @@ from bridge.process.lifecycle import (
     settle_memory,
 )
 from bridge.process.profile import Sampler
+from bridge.process.scheduling import go_realtime
 from configs.brief import AgentBrief
 from configs.errors import FleetloopError, InfrastructureError
 from configs.faults.absences import Absence

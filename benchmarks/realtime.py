@@ -23,7 +23,7 @@ from functools import partial
 
 from common import arguments, fleet, interleaved, machine, median_and_range, ratios, run, table
 
-from bridge.process.lifecycle import go_realtime
+from bridge.process.scheduling import go_realtime
 
 TORQUE, ENCODER, PATH_STATE = struct.Struct("<2d"), struct.Struct("<4d"), struct.Struct("<3d")
 RESULT = struct.Struct("<qd")  # misses, processor time [s]; round trips [s] follow

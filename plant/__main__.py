@@ -28,12 +28,12 @@ from bridge.process.awake import Stall
 from bridge.process.clock import SYSTEM_CLOCK, implausible_start, monotonic_of, process_cpu_ns
 from bridge.process.lifecycle import (
     Stop,
-    go_realtime,
     processor_wait_ns,
     serve,
     settle_memory,
 )
 from bridge.process.profile import Sampler
+from bridge.process.scheduling import go_realtime
 from configs.brief import PlantBrief
 from configs.connections import Settings
 from configs.errors import FleetloopError, InfrastructureError, PeerLostError

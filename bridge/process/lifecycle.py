@@ -39,7 +39,6 @@ LINGER_S = 2.0
 LAUNCHER_GONE = "the launcher is gone"
 _SAME_CAUSE_S = 0.1
 """A peer that left may have left for a reason that is on its way here too."""
-_MCL_CURRENT, _MCL_FUTURE = 1, 2
 _LENGTH_BYTES = 8
 _PR_SET_DUMPABLE = 4
 _Brief = TypeVar("_Brief")
@@ -191,27 +190,6 @@ def keep_to_itself() -> None:
     Debuggers and profilers from outside need root then.
     """
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
-
-
-def go_realtime(priority: int) -> list[str]:
-    """Ask the kernel for what real time needs; return the privileges that are missing, by name.
-
-    On a single processor a loop that is late would keep it from the network's own threads, so
-    there it shares.
-    """
-    missing = []
-    try:
-        if len(os.sched_getaffinity(0)) > 1:
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-        else:
-            missing.append("SCHED_FIFO (a single processor)")
-    except OSError:
-        missing.append("SCHED_FIFO")
-    if ctypes.CDLL(None, use_errno=True).mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
-        missing.append("memory locking")
-    with contextlib.suppress(OSError):
-        Path("/proc/self/timerslack_ns").write_text("1", "ascii")
-    return missing
 
 
 def launcher_stopped() -> bool:

@@ -31,6 +31,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
 
+from bridge.process.scheduling import go_batch, go_by_short_turns
 from configs.errors import InfrastructureError
 from configs.roles import STARTED
 from fleetloop import packages
@@ -79,19 +80,18 @@ class ForkServer:
             self.close()
             raise InfrastructureError(f"can't start a fork server: {error.strerror}") from error
 
-    def serve(self, folder: Path, *, batch: bool) -> None:
+    def serve(self, folder: Path, *, lockstep: bool) -> None:
         """Say for which run they are.
 
         Args:
             folder: the run's folder of sockets, which may not exist yet.
-            batch: processes care for throughput, not for the moment at which they are woken: one
-                that is woken waits for its turn and interrupts none, which is worth a seventh of a
-                lockstep tick.
+            lockstep: processes care for throughput, not for the moment at which they are woken:
+                those of a tick don't interrupt each other, all others wait for them.
         """
         self._serving = True
         for server in self._servers:
             with suppress(OSError):  # its end is seen with the first process
-                server.socket.send(json.dumps([str(folder), batch]).encode())
+                server.socket.send(json.dumps([str(folder), lockstep]).encode())
 
     def fork(self, module: str, stdin: int, stdout: int, fds: Sequence[int] = ()) -> Forked:
         """Start a process of a role with these descriptors.
@@ -216,9 +216,9 @@ def _serve(modules: Sequence[str]) -> None:
     orders = socket.socket(fileno=os.dup(0))
     if not (said := orders.recv(65536)):
         return
-    folder, batch = json.loads(said)
-    if batch:
-        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    folder, lockstep = json.loads(said)
+    if lockstep:
+        (go_by_short_turns if modules[0] in IN_STEP else go_batch)()
     while True:
         try:
             module, fds = _receive(orders)

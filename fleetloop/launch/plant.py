@@ -27,7 +27,8 @@ from bridge.can_bus.hub import Hub
 from bridge.network.messages import Progress
 from bridge.network.telemetry import PLANT_ROW, RowBuffer
 from bridge.process.clock import SYSTEM_CLOCK
-from bridge.process.lifecycle import Stop, go_realtime, keep_to_itself, name_process, settled_memory
+from bridge.process.lifecycle import Stop, keep_to_itself, name_process, settled_memory
+from bridge.process.scheduling import go_realtime
 from configs.brief import PlantBrief
 from configs.connections import NetworkLink, Settings
 from configs.deployment import Deployment, load_deployment

@@ -203,7 +203,7 @@ class ProcessRun:
         with contextlib.ExitStack() as open_:
             with self._fork_server or ForkServer() as fork_server:
                 # Before there is a folder: a launcher that is killed leaves none.
-                fork_server.serve(sockets.folder_of(run), batch=not self._schedule.realtime)
+                fork_server.serve(sockets.folder_of(run), lockstep=not self._schedule.realtime)
                 folder = open_.enter_context(sockets.run_folder(run))
                 self._lines = open_.enter_context(RowLines())
                 link = open_.enter_context(self._router(folder, stop))
@@ -291,7 +291,7 @@ class ProcessRun:
                 most,
                 folder,
                 self._respawned,
-                batch=not self._schedule.realtime,
+                lockstep=not self._schedule.realtime,
                 resume=self._machine.clock.resume,
             ) as restarts,
             Door(folder, requests, self._asked.controls) as door,

@@ -26,7 +26,7 @@ class Restarts:
         plane: of the run; its children are replaced.
         most: how often, all robots together.
         folder: of the run's sockets.
-        batch: see `ForkServer.serve`.
+        lockstep: see `ForkServer.serve`.
         resume: told after a start, in which the launcher did nothing else.
         respawn: starts the controller of a robot again, by a fork server, in lockstep at a tick.
 
@@ -41,13 +41,13 @@ class Restarts:
         folder: Path,
         respawn: Callable[[str, ForkServer, int], Child],
         *,
-        batch: bool,
+        lockstep: bool,
         resume: Callable[[], None],
     ) -> None:
         self._plane = plane
         self._most = self._left = most
         self._planned = 0
-        self._batch = batch
+        self._lockstep = lockstep
         self._resume = resume
         self._respawn = respawn
         self._since_s: dict[str, float] = {}
@@ -62,7 +62,7 @@ class Restarts:
 
     def _new(self) -> ForkServer:
         fork_server = ForkServer(IN_STEP)
-        fork_server.serve(self._folder, batch=self._batch)
+        fork_server.serve(self._folder, lockstep=self._lockstep)
         return fork_server
 
     def plan(self, restarts: int) -> None:
@@ -136,5 +136,5 @@ class Restarts:
         for process, since_s in list(self._since_s.items()):
             silence = self._plane.vitals.silence(process, now_s)
             heard = silence is not None and now_s - silence.lasted_s > since_s
-            if heard or (self._batch and process in self._plane.alive):
+            if heard or (self._lockstep and process in self._plane.alive):
                 del self._since_s[process]

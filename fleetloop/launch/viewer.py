@@ -22,6 +22,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from bridge.process.lifecycle import Status, pack_brief
+from bridge.process.scheduling import go_batch
 from configs.brief import ViewerBrief
 from configs.errors import InfrastructureError, ScenarioError
 from configs.roles import VIEWER
@@ -36,8 +37,8 @@ NO_VIEWER = (
 )
 NICE = 10
 """Of all its threads, which start after it is set: a tenth of the processor of what it competes
-with, which is about what a page needs. They are of SCHED_BATCH, too, as the processes of a lockstep
-run: when one wakes up, it takes the processor from none."""
+with, which is about what a page needs. They are batch work, too, as the
+recorder of a lockstep run: when one wakes up, it takes the processor from none."""
 PATIENCE = 3.0
 """Times the deadline of a start: it is waited for so long, as it yields the processor."""
 STOP_S = 2.0
@@ -244,7 +245,7 @@ def _yield_processor(pid: int) -> None:
     """
     with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, pid, NICE)
-        os.sched_setscheduler(pid, os.SCHED_BATCH, os.sched_param(0))
+        go_batch(pid)
         Path(f"/proc/{pid}/autogroup").write_text(str(NICE), "ascii")
 
 

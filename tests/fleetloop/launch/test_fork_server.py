@@ -23,7 +23,7 @@ given = [socket.socket(socket.AF_UNIX) for _ in range(300)]
 inodes = [os.fstat(sock.fileno()).st_ino for sock in given]
 brief, lifeline = os.pipe()
 with ForkServer() as server:
-    server.serve(Path(sys.argv[1]), batch=False)
+    server.serve(Path(sys.argv[1]), lockstep=False)
     forked = server.fork(sys.argv[2], brief, 1, [sock.fileno() for sock in given])
     blocked = Path(f"/proc/{forked.pid}/status").read_text().partition("SigBlk:")[2].split()[0]
     there = [os.stat(f"/proc/{forked.pid}/fd/{fd}").st_ino for fd in forked.fds]
@@ -39,7 +39,7 @@ from bridge.can_bus import sockets
 from fleetloop.launch.fork_server import ForkServer
 
 server = ForkServer()
-server.serve(sockets.folder_of("run"), batch=False)
+server.serve(sockets.folder_of("run"), lockstep=False)
 with sockets.run_folder("run") as folder:
     sockets.listen(folder, ("r1", "r2"))
     print(*(one.process.pid for one in server._servers), flush=True)
