@@ -20,6 +20,8 @@ from configs.errors import InfrastructureError, ScenarioError
 
 ANSWER_S = 20.0
 _DATE = "%Y-%m-%d %H:%M UTC"
+_OF_ANOTHER_KEY = ("KEY_VALUES_MISMATCH", "KEY_TYPE_MISMATCH", "NO_CERTIFICATE_ASSIGNED")
+"""What OpenSSL says of a key that doesn't belong to the certificate; the last of another kind."""
 _ADDRESS = re.compile(r"(tcp|tls)://(?P<host>\[[^]]+\]|[^:/]+):(?P<port>\d{1,5})")
 
 
@@ -195,7 +197,7 @@ def _check_files(ca: _Named, certificate: _Named, key: _Named) -> None:
     try:
         context.load_cert_chain(certificate.path, key.path or None, password=_no_password)
     except (OSError, ValueError) as error:
-        if getattr(error, "reason", None) == "KEY_VALUES_MISMATCH":
+        if getattr(error, "reason", None) in _OF_ANOTHER_KEY:
             (*_, holder) = given
             raise ScenarioError(
                 f"{holder.name}: the key in it is not that of the certificate {certificate.path}"
@@ -208,7 +210,7 @@ def _check_files(ca: _Named, certificate: _Named, key: _Named) -> None:
 
 
 def _check_dates(name: str, content: bytes, *, every: bool = False) -> None:
-    """Refuse a file whose certificate isn't good now: its first, or of `every` who lasts longest.
+    """Refuse a file whose first certificate isn't good now; of `every` one that is good is enough.
 
     Raises:
         ScenarioError: it names the date.
@@ -219,9 +221,11 @@ def _check_dates(name: str, content: bytes, *, every: bool = False) -> None:
         found = x509.load_pem_x509_certificates(content)
     except ValueError:
         return  # OpenSSL takes more than this package does
-    certificate = max(found, key=lambda one: one.not_valid_after_utc) if every else found[0]
     now_s = SYSTEM_CLOCK.wall_ns() / 1e9
-    first, last = certificate.not_valid_before_utc, certificate.not_valid_after_utc
+    spans = [(one.not_valid_before_utc, one.not_valid_after_utc) for one in found]
+    if every and any(first.timestamp() <= now_s <= last.timestamp() for first, last in spans):
+        return
+    first, last = max(spans, key=lambda span: span[1]) if every else spans[0]
     if now_s > last.timestamp():
         raise ScenarioError(f"{name}: the certificate expired on {last:{_DATE}}; renew it")
     if now_s < first.timestamp():
@@ -231,7 +235,10 @@ def _check_dates(name: str, content: bytes, *, every: bool = False) -> None:
 
 
 def _no_password() -> str:
-    raise ValueError("the key has a password; nobody is asked for it here")
+    raise ValueError(
+        "the key has a password, for which nobody is asked here; give one without"
+        " (openssl pkey -in KEY -out NEW)"
+    )
 
 
 def _knock(address: str, host: str, port: int) -> socket.socket:

@@ -167,15 +167,25 @@ def test_the_command_of_a_row_runs_its_case_from_any_folder(folder: Path, tmp_pa
     )
 
 
-def test_a_scheduler_whose_certificate_expired_is_named_so(folder: Path) -> None:
+@pytest.mark.parametrize(
+    ("begins", "ends", "said"),
+    [
+        (timedelta(days=-9), timedelta(days=-2), "certificate has expired"),
+        (timedelta(days=2), timedelta(days=9), "certificate is not yet valid"),
+    ],
+    ids=["expired", "not yet valid"],
+)
+def test_a_scheduler_whose_certificate_is_not_good_now_is_named_so(
+    folder: Path, begins: timedelta, ends: timedelta, said: str
+) -> None:
     certificates(folder, ("head", "me"))
-    sign_for(folder, "head", begins=timedelta(days=-9), ends=timedelta(days=-2))
+    sign_for(folder, "head", begins=begins, ends=ends)
     ours = ("--tls-ca", "ca.pem", "--tls-cert", "me.pem", "--tls-key", "me.key")
     with cluster(folder, workers=0, tls=("ca.pem", "head.pem", "head.key")) as dask:
         where = ("study.toml", "--scheduler", dask.address)
         with sweeping(folder, *where, *ours) as sweep:
             status, _ = sweep.end()
-    refusal = f"{dask.address}: its certificate can't be trusted: certificate has expired"
+    refusal = f"{dask.address}: its certificate can't be trusted: {said}"
     assert status == 3
     assert sweep.errors.read_text().splitlines()[-1] == f"fleetloop: --scheduler {refusal}"
     assert not sweep.out.exists()

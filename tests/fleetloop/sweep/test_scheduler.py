@@ -26,6 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / "me.pem").read_text() + (folder / "me.key").read_text()
     )
     openssl(folder, "ec", "-in", "me.key", "-aes256", "-passout", "pass:word", "-out", "locked.key")
+    openssl(folder, "genrsa", "-out", "rsa.key", "2048")
     (folder / "empty.pem").touch()
     (folder / "chain.pem").write_text(
         (folder / "me.pem").read_text() + (folder / "you.key").read_text()
@@ -54,6 +55,10 @@ def test_an_address_is_a_protocol_a_host_and_a_port(address: str) -> None:
         (
             ("ca.pem", "me.pem", "you.key"),
             "--tls-key {0}/you.key: the key in it is not that of the certificate {0}/me.pem",
+        ),
+        (
+            ("ca.pem", "me.pem", "rsa.key"),
+            "--tls-key {0}/rsa.key: the key in it is not that of the certificate {0}/me.pem",
         ),
         (
             ("ca.pem", "chain.pem", None),
@@ -98,6 +103,16 @@ def test_a_certificate_that_is_not_good_now_is_named_with_the_date(
     tls = Tls(tmp_path / "ca.pem", tmp_path / "me.pem", tmp_path / "me.key")
     name = f"--tls-cert {tmp_path / 'me.pem'}: "
     assert refusal(TLS, tls).startswith(name + said.format(**dates))
+
+
+def test_of_several_authorities_one_that_is_good_now_is_enough(tmp_path: Path) -> None:
+    certificates(tmp_path, ("me", "next"))
+    sign_for(tmp_path, "next", begins=timedelta(days=2), ends=timedelta(days=9))
+    bundle = (tmp_path / "ca.pem").read_text() + (tmp_path / "next.pem").read_text()
+    (tmp_path / "authorities.pem").write_text(bundle)
+    tls = Tls(tmp_path / "authorities.pem", tmp_path / "me.pem", tmp_path / "me.key")
+    with pytest.raises(InfrastructureError, match=re.escape(f"{TLS}: no scheduler there")):
+        client_of_scheduler(distributed, TLS, tls)
 
 
 def test_certificates_need_an_address_with_tls(folder: Path) -> None:
