@@ -1,16 +1,17 @@
 """A job as the process that does it gets it, and what it says meanwhile.
 
-A scenario travels as text: a process loads it, and its laws, as `fleetloop run` does.
+A scenario travels as text: a process loads it, and its laws, as `fleetloop run` does. What loads
+scenarios is imported by who does: it takes most of a second.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from bridge.process.lifecycle import Stop
-from configs.loading import loads, to_toml
-from configs.scenario import Scenario
-from fleetloop.results import run_folder
+
+if TYPE_CHECKING:
+    from configs.scenario import Scenario
 
 Tell = Callable[[object], None]
 """Says that a job goes on: a `Progress`, or part of the result."""
@@ -46,10 +47,15 @@ class Told:
     folder: str
 
     @classmethod
-    def of(cls, scenario: Scenario, folder: str) -> "Told":
+    def of(cls, scenario: "Scenario", folder: str) -> "Told":
         """Of a scenario whose own laws and shapes are in this folder."""
+        from configs.loading import to_toml
+
         return cls(to_toml(scenario), folder)
 
-    def scenario(self) -> Scenario:
+    def scenario(self) -> "Scenario":
         """The scenario again."""
+        from configs.loading import loads
+        from fleetloop.results import run_folder
+
         return loads(run_folder.SCENARIO, self.toml, folder=self.folder)

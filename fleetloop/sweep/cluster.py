@@ -9,6 +9,7 @@ Dask's own messages go to a file in the study's folder, never to the terminal.
 
 import logging
 import signal
+import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -23,6 +24,8 @@ from fleetloop.sweep.versions import mismatch, versions_here
 
 LOG = "dask.log"
 _LOGGERS = ("distributed", "tornado", "asyncio")
+_OF_A_KILL = "ignore:resource_tracker:UserWarning"
+"""What multiprocessing would say on the terminal of a command that was killed."""
 START_S, CLOSE_S = 60.0, 15.0
 _SETTINGS: dict[str, Any] = {
     # What a worker is killed for is said, and its cases are computed again; a worker that only
@@ -80,6 +83,7 @@ def client_of(place: Place, folder: Path) -> Iterator[Any]:
 
 def _here(distributed: Any, place: Place, folder: Path, stack: ExitStack) -> Any:
     security = distributed.Security.temporary()
+    sys.warnoptions.append(_OF_A_KILL)  # for the process that multiprocessing starts for itself
     scratch = folder / ".dask"
     try:
         with _without_ctrl_c():

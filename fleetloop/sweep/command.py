@@ -139,7 +139,12 @@ class _Work:
             with client_of(self.ways.place, self.folder) as client:
                 self.meter.begin()
                 engine = Engine(
-                    client, self.cases, self.take, self.meter.notice, kernel=self.ways.kernel
+                    client,
+                    self.cases,
+                    self.take,
+                    self.meter.notice,
+                    kernel=self.ways.kernel,
+                    scheduler=self.ways.place.scheduler,
                 )
                 began_s = SYSTEM_CLOCK.monotonic_s()
                 try:

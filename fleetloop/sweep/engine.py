@@ -31,7 +31,7 @@ CHUNK_S, LONGEST_S = 2.0, 10.0
 FEW_CASES, MOST_CASES, FASTEST_GROWTH = 16, 2000, 4
 MOST_DEATHS = 2
 LOOK_EVERY_S, COUNT_EVERY_S = 0.2, 2.0
-NO_WORKER_S = 60.0
+NO_WORKER_S, WAITING_EVERY_S = 60.0, 10.0
 FETCH_S = 30.0
 
 
@@ -90,6 +90,8 @@ class Engine:
     on_rows: Callable[[Any], bool]
     notice: Callable[[str], None]
     kernel: bool = True
+    scheduler: str | None = None
+    """Address of the user's own, whose workers the user starts."""
     clock: Clock = SYSTEM_CLOCK
     pace: Pace = field(default_factory=Pace)
     threads: int = 1
@@ -103,6 +105,7 @@ class Engine:
     _next_count_s: float = 0.0
     _seen_s: float = 0.0
     """When there was a worker at last."""
+    _next_waiting_s: float = 0.0
     _tasks: int = 0
 
     def compute(
@@ -251,8 +254,22 @@ class Engine:
         if threads:
             self.threads, self._seen_s = threads, now_s
             self.most_threads = max(self.most_threads, threads)
-        elif now_s - self._seen_s > NO_WORKER_S:
-            raise InfrastructureError(f"no worker for {NO_WORKER_S:g} s")
+            self._next_waiting_s = 0.0
+            return
+        left_s = self._seen_s + NO_WORKER_S - now_s
+        if left_s < 0.0:
+            raise InfrastructureError(self._without_worker())
+        if self.scheduler is not None and now_s >= self._next_waiting_s:
+            self._next_waiting_s = now_s + WAITING_EVERY_S
+            self.notice(f"waits for a worker at {self.scheduler}, {left_s:.0f} s more")
+
+    def _without_worker(self) -> str:
+        if self.scheduler is None:
+            return f"no worker for {NO_WORKER_S:g} s"
+        return (
+            f"--scheduler {self.scheduler}: no worker for {NO_WORKER_S:g} s; start one with"
+            f" dask worker {self.scheduler}"
+        )
 
     def _listen(self) -> None:
         """Hear what happens to workers; told by other threads."""

@@ -27,7 +27,7 @@ class Base:
     """The scenario that a study varies."""
 
     source: str
-    """Its file, or its name, as a command names it."""
+    """Its file, absolute, or its name, as a command in any folder names it."""
     name: str
     """Of its file, in messages."""
     text: str
@@ -41,10 +41,12 @@ class Base:
         Raises:
             ScenarioError: there is none.
         """
-        source = base
-        if base not in shipped() and study not in studies.shipped():
-            source = str(Path(study).parent / base)
-        name, text = read(source)
+        if base in shipped() or study in studies.shipped():
+            name, text = read(base)
+            return cls(base, name, text, folder_of(base))
+        path = Path(study).parent / base
+        name, text = read(str(path))
+        source = str(path.absolute())
         return cls(source, name, text, folder_of(source))
 
     @classmethod

@@ -66,9 +66,10 @@ class Workers:
         on_look: Callable[[], None],
         *,
         kernel: bool,
+        scheduler: str | None,
     ) -> None:
         self._client, self._notice, self._on_look = client, notice, on_look
-        self._kernel = kernel
+        self._kernel, self._scheduler = kernel, scheduler
         self._engine: Engine | None = None
 
     @property
@@ -85,7 +86,14 @@ class Workers:
             return False
 
         if self._engine is None:
-            self._engine = Engine(self._client, cases, take, self._notice, kernel=self._kernel)
+            self._engine = Engine(
+                self._client,
+                cases,
+                take,
+                self._notice,
+                kernel=self._kernel,
+                scheduler=self._scheduler,
+            )
         engine = self._engine
         engine.cases, engine.on_rows = cases, take
         total = cases.study.total
@@ -117,7 +125,7 @@ def evaluation_of(
         yield Here(on_look, kernel=kernel)
         return
     with client_of(place, folder) as client:
-        yield Workers(client, notice, on_look, kernel=kernel)
+        yield Workers(client, notice, on_look, kernel=kernel, scheduler=place.scheduler)
 
 
 def _table(batches: list[Any]) -> "pa.Table":

@@ -1,7 +1,13 @@
 """Certificates by openssl: an authority, and whom it vouches for."""
 
 import subprocess
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+
+from bridge.process.clock import SYSTEM_CLOCK
 
 CURVE = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")
 
@@ -31,3 +37,21 @@ def certificates(
         sign = ("-CA", f"{authority}.pem", "-CAkey", f"{authority}.key", "-CAcreateserial")
         what = ("-in", f"{name}.csr", "-out", f"{name}.pem", "-extfile", "ext", "-days", f"{days}")
         openssl(folder, "x509", "-req", *what, *sign)
+
+
+def sign_for(folder: Path, name: str, *, begins: timedelta, ends: timedelta) -> None:
+    """Sign the certificate of a name anew, valid between these times from now."""
+    now = datetime.fromtimestamp(SYSTEM_CLOCK.wall_ns() // 10**9, UTC)
+    old = x509.load_pem_x509_certificate((folder / f"{name}.pem").read_bytes())
+    key = serialization.load_pem_private_key((folder / "ca.key").read_bytes(), None)
+    builder = (
+        x509.CertificateBuilder()
+        .subject_name(old.subject)
+        .issuer_name(old.issuer)
+        .public_key(old.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now + begins)
+        .not_valid_after(now + ends)
+    )
+    signed = builder.sign(key, hashes.SHA256())  # type: ignore[arg-type]
+    (folder / f"{name}.pem").write_bytes(signed.public_bytes(serialization.Encoding.PEM))

@@ -3,15 +3,19 @@
 import json
 import os
 import re
+import shlex
 import shutil
 import signal
+import subprocess
+import sys
 from collections.abc import Sequence
+from datetime import timedelta
 from pathlib import Path
 
 import psutil
 import pyarrow.parquet
 import pytest
-from support.certificates import certificates
+from support.certificates import certificates, sign_for
 from support.sweeping import cases_in, cluster, sweeping
 
 from fleetloop.packages import HOME, NAMES
@@ -143,6 +147,67 @@ def test_a_cluster_with_certificates_serves_who_has_one_of_its_authority(folder:
     assert_every_case_once(sweep.out)
 
 
+def test_the_command_of_a_row_runs_its_case_from_any_folder(folder: Path, tmp_path: Path) -> None:
+    own, elsewhere = folder / "own", tmp_path / "elsewhere"
+    own.mkdir()
+    elsewhere.mkdir()
+    shutil.copy(HOME / "configs" / "two_robots.toml", own / "base.toml")
+    (own / "study.toml").write_text(STUDY.replace('"two_robots"', '"base.toml"'), "utf-8")
+    with sweeping(folder, "own/study.toml", "--workers", "1", "--cases", "1") as sweep:
+        assert sweep.end()[0] == 0
+    (row,) = pyarrow.parquet.read_table(sweep.out / "parts").to_pylist()
+    program, *words = shlex.split(row["command"])
+    assert program == "fleetloop"
+    subprocess.run(
+        [sys.executable, "-m", "fleetloop", *words],
+        cwd=elsewhere,
+        check=True,
+        capture_output=True,
+        timeout=100,
+    )
+
+
+@pytest.mark.parametrize(
+    ("begins", "ends", "said"),
+    [
+        (timedelta(days=-9), timedelta(days=-2), "certificate has expired"),
+        (timedelta(days=2), timedelta(days=9), "certificate is not yet valid"),
+    ],
+    ids=["expired", "not yet valid"],
+)
+def test_a_scheduler_whose_certificate_is_not_good_now_is_named_so(
+    folder: Path, begins: timedelta, ends: timedelta, said: str
+) -> None:
+    certificates(folder, ("head", "me"))
+    sign_for(folder, "head", begins=begins, ends=ends)
+    ours = ("--tls-ca", "ca.pem", "--tls-cert", "me.pem", "--tls-key", "me.key")
+    with cluster(folder, workers=0, tls=("ca.pem", "head.pem", "head.key")) as dask:
+        where = ("study.toml", "--scheduler", dask.address)
+        with sweeping(folder, *where, *ours) as sweep:
+            status, _ = sweep.end()
+    refusal = f"{dask.address}: its certificate can't be trusted: {said}"
+    assert status == 3
+    assert sweep.errors.read_text().splitlines()[-1] == f"fleetloop: --scheduler {refusal}"
+    assert not sweep.out.exists()
+
+
+def test_a_cluster_without_workers_is_said_to_be_waited_for(folder: Path) -> None:
+    with (
+        cluster(folder, workers=0) as dask,
+        sweeping(folder, "study.toml", "--scheduler", dask.address) as sweep,
+    ):
+        status, _ = sweep.end()
+    said = sweep.errors.read_text().splitlines()
+    waits = re.compile(rf"(fleetloop: )?waits for a worker at {dask.address}, \d+ s more")
+    assert len([line for line in said if waits.fullmatch(line)]) >= 5
+    assert said[-1] == (
+        f"fleetloop: --scheduler {dask.address}: no worker for 60 s; start one with"
+        f" dask worker {dask.address}"
+    )
+    assert status == 3
+    assert not sweep.out.exists()
+
+
 def test_a_worker_that_says_nothing_is_named_within_a_bound(folder: Path) -> None:
     with cluster(folder, workers=1) as dask:
         dask.await_workers(1)
@@ -185,6 +250,7 @@ def test_a_command_that_is_killed_leaves_no_process_and_its_study_goes_on(folder
         sweep.kill()
         sweep.end()
         assert_gone(family)
+    assert "resource_tracker" not in sweep.errors.read_text()
     before = {part.name: part.read_bytes() for part in (sweep.out / "parts").glob("part-*.parquet")}
     done = len(cases_in(sweep.out))
     assert 3 <= done < CASES

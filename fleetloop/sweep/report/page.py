@@ -174,7 +174,7 @@ def _worst(view: View) -> str:
     rows = "".join(line for one in view.worst for line in _worst_rows(one, names))
     note = (
         "Failed ones first, then by margin. A click on a command selects it all;"
-        " it runs the case again, exactly, where the study was begun."
+        " it runs the case again, exactly, in any folder."
     )
     return (
         f'<p class="note">{note}</p><div class="wide"><table><thead><tr>{head}</tr></thead>'

@@ -2,12 +2,14 @@
 
 import re
 import socket
+from datetime import timedelta
 from pathlib import Path
 
 import dask
 import distributed
 import pytest
-from support.certificates import certificates, openssl
+from cryptography import x509
+from support.certificates import certificates, openssl, sign_for
 
 from configs.errors import InfrastructureError, ScenarioError
 from fleetloop.sweep.scheduler import Tls, client_of_scheduler
@@ -24,6 +26,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / "me.pem").read_text() + (folder / "me.key").read_text()
     )
     openssl(folder, "ec", "-in", "me.key", "-aes256", "-passout", "pass:word", "-out", "locked.key")
+    openssl(folder, "genrsa", "-out", "rsa.key", "2048")
+    (folder / "empty.pem").touch()
+    (folder / "chain.pem").write_text(
+        (folder / "me.pem").read_text() + (folder / "you.key").read_text()
+    )
     return folder
 
 
@@ -45,7 +52,23 @@ def test_an_address_is_a_protocol_a_host_and_a_port(address: str) -> None:
         (("ca.pem", "me.pem", "no.key"), "--tls-key {}/no.key: no such file"),
         (("me.key", "me.pem", "me.key"), "{}/me.key: must be an authority's certificate (PEM): "),
         (("ca.pem", "me.csr", "me.key"), "{0}/me.csr: must be a certificate (PEM), with its key"),
-        (("ca.pem", "me.pem", "you.key"), "{0}/me.pem: must be a certificate (PEM), with its key"),
+        (
+            ("ca.pem", "me.pem", "you.key"),
+            "--tls-key {0}/you.key: the key in it is not that of the certificate {0}/me.pem",
+        ),
+        (
+            ("ca.pem", "me.pem", "rsa.key"),
+            "--tls-key {0}/rsa.key: the key in it is not that of the certificate {0}/me.pem",
+        ),
+        (
+            ("ca.pem", "chain.pem", None),
+            "--tls-cert {0}/chain.pem: the key in it is not that of the certificate {0}/chain.pem",
+        ),
+        ((".", "me.pem", "me.key"), "--tls-ca {0}: a folder; must be a file (PEM)"),
+        (("ca.pem", ".", "me.key"), "--tls-cert {0}: a folder; must be a file (PEM)"),
+        (("ca.pem", "me.pem", "."), "--tls-key {0}: a folder; must be a file (PEM)"),
+        (("empty.pem", "me.pem", "me.key"), "--tls-ca {0}/empty.pem: empty; must be a file in PEM"),
+        (("ca.pem", "me.pem/x", "me.key"), "--tls-cert {0}/me.pem/x: can't be read: Not a dir"),
         (("ca.pem", "me.pem", "locked.key"), "in {}/locked.key: the key has a password"),
         (("ca.pem", "me.pem", None), "{}/me.pem: must be a certificate (PEM) and its key: "),
         (("ca.pem", None, None), f"--scheduler {TLS}: needs --tls-cert, and --tls-key for a key"),
@@ -57,6 +80,39 @@ def test_a_file_that_tls_cannot_use_is_named(
 ) -> None:
     tls = Tls(*(name and folder / name for name in names))
     assert wrong.format(folder) in refusal(TLS, tls)
+
+
+@pytest.mark.parametrize(
+    ("begins", "ends", "said"),
+    [
+        (timedelta(days=-9), timedelta(days=-2), r"the certificate expired on {ends}; renew it"),
+        (timedelta(days=2), timedelta(days=9), r"the certificate is not valid before {begins}; is"),
+    ],
+    ids=["expired", "not yet valid"],
+)
+def test_a_certificate_that_is_not_good_now_is_named_with_the_date(
+    tmp_path: Path, begins: timedelta, ends: timedelta, said: str
+) -> None:
+    certificates(tmp_path, ("me",))
+    sign_for(tmp_path, "me", begins=begins, ends=ends)
+    made = x509.load_pem_x509_certificate((tmp_path / "me.pem").read_bytes())
+    dates = {
+        "begins": f"{made.not_valid_before_utc:%Y-%m-%d %H:%M} UTC",
+        "ends": f"{made.not_valid_after_utc:%Y-%m-%d %H:%M} UTC",
+    }
+    tls = Tls(tmp_path / "ca.pem", tmp_path / "me.pem", tmp_path / "me.key")
+    name = f"--tls-cert {tmp_path / 'me.pem'}: "
+    assert refusal(TLS, tls).startswith(name + said.format(**dates))
+
+
+def test_of_several_authorities_one_that_is_good_now_is_enough(tmp_path: Path) -> None:
+    certificates(tmp_path, ("me", "next"))
+    sign_for(tmp_path, "next", begins=timedelta(days=2), ends=timedelta(days=9))
+    bundle = (tmp_path / "ca.pem").read_text() + (tmp_path / "next.pem").read_text()
+    (tmp_path / "authorities.pem").write_text(bundle)
+    tls = Tls(tmp_path / "authorities.pem", tmp_path / "me.pem", tmp_path / "me.key")
+    with pytest.raises(InfrastructureError, match=re.escape(f"{TLS}: no scheduler there")):
+        client_of_scheduler(distributed, TLS, tls)
 
 
 def test_certificates_need_an_address_with_tls(folder: Path) -> None:

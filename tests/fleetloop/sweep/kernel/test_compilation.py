@@ -1,12 +1,14 @@
 """The compiled loop: made of the sources as they stand, never of older ones."""
 
 import ast
+import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from bridge.process.clock import SYSTEM_CLOCK
 from bridge.process.lifecycle import Stop
 from configs.loading import load
 from configs.resolve import schedule
@@ -128,3 +130,24 @@ def test_a_name_of_two_modules_is_refused() -> None:
 def test_a_name_that_a_module_does_not_have_is_refused() -> None:
     with pytest.raises(LinkError, match=r"agents\.laws\.path_errors has no wrapped of its own"):
         Linker("@_equation").add("agents.laws.path_errors", "wrapped")
+
+
+def test_old_loops_are_removed_but_those_used_last_and_what_is_not_one(tmp_path: Path) -> None:
+    long_ago_s = SYSTEM_CLOCK.wall_ns() / 1e9 - 2 * compilation.UNUSED_S
+    for n in range(6):
+        old = tmp_path / f"fleetloop_kernel_{n}"
+        old.mkdir()
+        os.utime(old, (long_ago_s + n, long_ago_s + n))
+    other = tmp_path / "other"
+    other.mkdir()
+    os.utime(other, (long_ago_s, long_ago_s))
+    module = compilation.module_of("x = 1\n", tmp_path)
+    kept = {path.name for path in tmp_path.iterdir()}
+    assert kept == {module.__name__, "fleetloop_kernel_5", "fleetloop_kernel_4", "other"}
+
+
+def test_a_loop_that_was_used_lately_is_kept_for_whom_it_serves(tmp_path: Path) -> None:
+    for n in range(6):
+        (tmp_path / f"fleetloop_kernel_{n}").mkdir()
+    compilation.module_of("x = 2\n", tmp_path)
+    assert len(list(tmp_path.iterdir())) == 7
