@@ -42,7 +42,8 @@ _MAX_FDS = 200
 """Descriptors that travel with one message; the kernel takes 253 and drops the rest silently."""
 _MORE, _ALL_STARTED = "+", "."
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-"""Of numpy, which would start others when it is imported: then a process can't be forked."""
+"""Of the recorder's numpy, which would start others when it is imported: a process with threads
+can't be forked. Roles in step import none; users' laws may, with all its threads."""
 IN_STEP = tuple(role.module for role in STARTED if role.in_step)
 """Modules of one fork server; any other module has one of its own."""
 _GROUPS = (IN_STEP, *((role.module,) for role in STARTED if not role.in_step))
@@ -151,6 +152,7 @@ class _Server:
         self.socket.settimeout(START_S)
         # Ctrl-C is the launcher's business: fork server and roles start with it blocked.
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        environment = packages.environment() | ({} if modules == IN_STEP else _ONE_THREAD)
         try:
             with theirs:
                 # -P: a folder here that is named like one of our packages must not shadow it.
@@ -159,7 +161,7 @@ class _Server:
                     stdin=theirs.fileno(),
                     stdout=subprocess.DEVNULL,
                     start_new_session=True,
-                    env=packages.environment() | _ONE_THREAD,
+                    env=environment,
                 )
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
