@@ -9,7 +9,7 @@
     launcher      one                                    the operator; its session is in the router
 
 Spawning, access control, keys and deployments read this table. A role more is a row here, its
-module, and the function that fills its brief (`fleetloop.launch.spawn.BRIEFS`). Modules are named
+module with a `main`, and the function that fills its brief (`fleetloop.launch.spawn.BRIEFS`). Modules are named
 by strings: the processes that read the table import none of them.
 
 A process that is no observer ends by itself at the closing tick; an observer goes on until it is
@@ -52,7 +52,7 @@ class Role:
 
     name: str
     module: str = ""
-    """Has its `main`, and runs it with `python -m`; empty for a role that no run starts."""
+    """Has its `main`, which returns the exit status; empty for a role that no run starts."""
     brief: type | None = None
     """The type of its brief, given on standard input."""
     per_robot: bool = False

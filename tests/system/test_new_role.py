@@ -31,8 +31,8 @@ def run(brief: CounterBrief, stop: Stop) -> str:
     return "counted"
 
 
-if __name__ == "__main__":
-    raise SystemExit(serve(CounterBrief, run, name=COUNTER.name))
+def main() -> int:
+    return serve(CounterBrief, run, name=COUNTER.name)
 '''
 ROW = """COUNTER = Role(
     name="counter",

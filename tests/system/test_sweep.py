@@ -94,8 +94,12 @@ def test_a_study_against_theory_ends_with_how_many_cases_agree(tmp_path: Path) -
 
 
 def test_a_worker_that_is_killed_loses_no_case_and_all_of_it_is_on_loopback(folder: Path) -> None:
-    with sweeping(folder, "study.toml", "--workers", "2") as sweep:
+    many = 4 * CASES  # one after another: both workers have some until one is killed
+    slowly = ("--in-process", "--cases", str(many))
+    with sweeping(folder, "study.toml", "--workers", "2", *slowly) as sweep:
         sweep.await_rows(3)
+        killed = sweep.workers()[0]
+        killed.suspend()  # so that it doesn't finish its cases before it is killed
         family = [sweep.main, *sweep.family()]
         places = {
             connection.laddr.ip
@@ -104,10 +108,10 @@ def test_a_worker_that_is_killed_loses_no_case_and_all_of_it_is_on_loopback(fold
             if connection.status == psutil.CONN_LISTEN
         }
         assert places == {"127.0.0.1"}
-        sweep.workers()[0].kill()
+        killed.kill()
         status, out = sweep.end()
-    assert (status, out.splitlines()[0]) == (0, f"short: {CASES} of {CASES} cases: {CASES} held")
-    assert_every_case_once(sweep.out)
+    assert (status, out.splitlines()[0]) == (0, f"short: {many} of {many} cases: {many} held")
+    assert_every_case_once(sweep.out, many)
     said = sweep.errors.read_text().splitlines()
     assert [line for line in said if not SAID.fullmatch(line)] == []
     assert any("has ended; its cases are computed again" in line for line in said)
