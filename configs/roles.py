@@ -9,8 +9,8 @@
     launcher      one                                    the operator; its session is in the router
 
 Spawning, access control, keys and deployments read this table. A role more is a row here, its
-module with a `main`, and the function that fills its brief (`fleetloop.launch.spawn.BRIEFS`). Modules are named
-by strings: the processes that read the table import none of them.
+module with a `main`, and the function that fills its brief (`fleetloop.launch.spawn.BRIEFS`).
+Modules are named by strings: the processes that read the table import none of them.
 
 A process that is no observer ends by itself at the closing tick; an observer goes on until it is
 asked to stop (SIGTERM). The recorder is one, and ends by itself once it has written the last row.
