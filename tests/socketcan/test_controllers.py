@@ -27,14 +27,14 @@ def test_one_robot_drives_over_two_controllers_and_their_driver(need, tmp_path) 
     before = {channel: statistics(channel) for channel in ("can0", "can1")}
     deployment = on_socketcan(tmp_path, {"r1": "can0 can1"})
     dump = ["candump", "-L", "-n", "300", "can1"]
-    witness = subprocess.Popen(dump, stdout=subprocess.PIPE, text=True)
-    process = Run(tmp_path / "run", str(SCENARIO), "--deployment", str(deployment))
-    try:
-        status, out = process.end(within_s=200.0)
-        seen, _ = witness.communicate(timeout=30)
-    finally:
-        witness.kill()
-        process.kill()
+    with subprocess.Popen(dump, stdout=subprocess.PIPE, text=True) as witness:
+        process = Run(tmp_path / "run", str(SCENARIO), "--deployment", str(deployment))
+        try:
+            status, out = process.end(within_s=200.0)
+            seen, _ = witness.communicate(timeout=30)
+        finally:
+            witness.kill()
+            process.kill()
     assert status == 0, out
     summary = process.summary()
     assert summary["stopped_robots"] == summary["bus_troubles"] == {}
