@@ -307,9 +307,9 @@ def _realtime(connections: _Connections, stop: Stop) -> str:
         connections.orders,
         watch=connections.watch,
     )
-    connections.await_peers(partial(deliver, connections.agent), stop)
     settle_memory()
-    missing = go_realtime(CONTROLLER_PRIORITY)
+    missing = go_realtime(CONTROLLER_PRIORITY)  # before it is ready: it may read from a slow disk
+    connections.await_peers(partial(deliver, connections.agent), stop)
     epoch_ns = loop.await_go(stop)
     if epoch_ns is None:
         return stop.reason

@@ -171,10 +171,11 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
     body: Callable[[Stop], None]
     waits_for: Callable[[], Sequence[str]]
     if brief.schedule.realtime:
+        settle_memory()
+        # Before it is ready: what is locked in memory may have to be read from a slow disk.
+        missing_privileges = go_realtime(PLANT_PRIORITY)
         link.declare_live(keys.live(name, PLANT.name))
         epoch_ns = _serve_until_go(brief, end, link, hellos, stop)
-        settle_memory()
-        missing_privileges = go_realtime(PLANT_PRIORITY)
         by_name = {other.robot: other for other in others}
         own, of_others = rows[: len(emulated)], rows[len(emulated) :]
         record = partial(_record, link, by_name, of_others, brief.schedule.period_s)

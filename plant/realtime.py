@@ -81,8 +81,8 @@ class RealtimeLoop:
         self.lateness = Lateness(brief.schedule.period_s)
 
     def progress(self) -> Progress:
-        """The progress of the plant."""
-        tick = self._tick
+        """The progress of the plant, to its closing tick at most."""
+        tick = min(self._tick, self._schedule.ticks)
         self.counters.ticks = max(tick, 0)
         wall_ns = max(self._clock.monotonic_ns() - self._epoch_ns, 0)
         return Progress(tick, tick * self._schedule.period_ns, wall_ns)
@@ -109,7 +109,6 @@ class RealtimeLoop:
             if now_ns >= self._next_report_ns:
                 self._next_report_ns = now_ns + REPORT_EVERY_NS
                 self._report(self.progress())
-        self._tick = min(self._tick, schedule.ticks)
         deadline = self._clock.monotonic_s() + FAREWELL_S
         while self._end.clients() and self._clock.monotonic_s() < deadline and not stop.requested:
             self._serve(0.01, power_up_ns)

@@ -28,6 +28,9 @@ _ATTRIBUTES: Final = struct.Struct("=IIQiIQQQII")
 def go_realtime(priority: int) -> list[str]:
     """Ask the kernel for what real time needs; return the privileges that are missing, by name.
 
+    Call before saying to be ready: locking memory reads all that is mapped, for seconds where it
+    comes from a slow disk.
+
     On a single processor a loop that is late would keep it from the network's own threads, so
     there it shares.
     """

@@ -173,7 +173,7 @@ class Segment:
     # --- transmissions ---------------------------------------------------------------------------
 
     def next_ns(self) -> int:
-        """Time of the next event, without further input."""
+        """Time of the next event, without further input; `NEVER`: no event is due."""
         plan = self._plan
         if plan is None and self._first_ns != NEVER:
             plan = self._plan = self._arbitrate(self._first_ns)

@@ -169,9 +169,9 @@ class _Server:
 
 @contextmanager
 def imports_begun(*, wanted: bool) -> Iterator[ForkServer | None]:
-    """Fork servers that import while this program does; what keeps them is told when they are used.
+    """Fork servers that import while this program does; None if there can be none.
 
-    Those that no run has used by then are ended at once.
+    Why not is told by the run, which tries again. Those that no run has used are ended at once.
     """
     fork_server = None
     if wanted:
