@@ -38,7 +38,6 @@ from typing import Final
 
 from configs.brief import MotorModel
 from plant.effects import WheelEffects
-from plant.noise import Normal
 from plant.supply import Supply
 
 _MODULATION: Final = sqrt(3.0) / 2.0
@@ -72,9 +71,9 @@ class Motor:
         "_mean_square",
         "_model",
         "_motor_zero_C",
-        "_noise",
         "_override_A",
         "_pending",
+        "_random",
         "_resistance",
         "_stuck_A",
         "_supply",
@@ -96,7 +95,7 @@ class Motor:
         self._model = model
         self._inertia = inertia_shaft_kg_m2
         self._supply = supply
-        self._noise = Normal(random)
+        self._random = random
         self._assumed_constant = model.assumed_torque_constant_N_m_A
         self._limit_A = model.current_limit_A
         self._loop_s = model.current_loop_s
@@ -163,7 +162,7 @@ class Motor:
         current = self.current_A
         torque = self._assumed_constant * current
         if model.torque_noise_shaft_N_m:
-            torque += self._noise.draw(model.torque_noise_shaft_N_m)
+            torque += self._random.gauss(0.0, model.torque_noise_shaft_N_m)
         quantum = model.current_quantum_A
         return torque, quantum * round(current / quantum) if quantum else current
 

@@ -36,7 +36,6 @@ from plant.bus.port import Begin, Port, Steps
 from plant.bus.wire_nodes import WireDrive, WireHost, disturb, has_to_send
 from plant.disturbance import Disturbance
 from plant.faults import BusFaults
-from plant.noise import whole_between
 from plant.robot import EmulatedRobot
 
 
@@ -282,7 +281,7 @@ class TimedBus:
             if target.node in event.heard_by and not target.apart:
                 latency_ns = target.soonest_ns
                 if target.latest_ns > latency_ns:
-                    latency_ns = whole_between(self._random, latency_ns, target.latest_ns)
+                    latency_ns = self._random.randint(latency_ns, target.latest_ns)
                 # In order: firmware reads its mailbox from the front.
                 target.looks_ns = max(target.looks_ns, end_ns + latency_ns)
                 self._number += 1
