@@ -6,6 +6,8 @@ import select
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -55,9 +57,27 @@ sys.stdin.read()
 """
 
 
+@contextmanager
+def launcher(program: str, number: signal.Signals) -> Iterator[list[int]]:
+    """Its fork servers, as descriptors; at the end it is killed, and they have to end."""
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        servers = [os.pidfd_open(int(pid)) for pid in process.stdout.readline().split()]
+        try:
+            yield servers
+        finally:
+            process.send_signal(number)
+            process.wait(10.0)
+            for server in servers:
+                assert select.select([server], [], [], 20.0)[0], "a fork server is still there"
+                os.close(server)
+
+
 @pytest.mark.parametrize("module", [role.module for role in STARTED])
 def test_three_hundred_descriptors_arrive_in_order_under_a_limit_of_a_thousand(
-    module: str, tmp_path
+    module: str, tmp_path: Path
 ) -> None:
     command = [sys.executable, "-c", FORK, str(tmp_path / "none"), module]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
@@ -70,19 +90,8 @@ def test_three_hundred_descriptors_arrive_in_order_under_a_limit_of_a_thousand(
 def test_the_folder_of_a_launcher_that_was_killed_goes(
     number: signal.Signals, runtime_folder: Path
 ) -> None:
-    launcher = subprocess.Popen(
-        [sys.executable, "-c", ASK], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    assert launcher.stdin is not None
-    assert launcher.stdout is not None
-    with launcher, launcher.stdin, launcher.stdout:
-        servers = [os.pidfd_open(int(pid)) for pid in launcher.stdout.readline().split()]
+    with launcher(ASK, number):
         assert (runtime_folder / "run" / "r2.can").is_socket()
-        launcher.send_signal(number)
-        launcher.wait(10.0)
-        for server in servers:
-            assert select.select([server], [], [], 20.0)[0], "a fork server is still there"
-            os.close(server)
     assert not runtime_folder.exists()
 
 
@@ -98,19 +107,8 @@ def test_fork_servers_that_no_run_uses_end_at_once() -> None:
 def test_fork_servers_end_with_a_launcher_that_never_said_what_they_serve(
     number: signal.Signals,
 ) -> None:
-    launcher = subprocess.Popen(
-        [sys.executable, "-c", BEGIN], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    assert launcher.stdin is not None
-    assert launcher.stdout is not None
-    with launcher, launcher.stdin, launcher.stdout:
-        servers = [os.pidfd_open(int(pid)) for pid in launcher.stdout.readline().split()]
-        launcher.send_signal(number)
-        launcher.wait(10.0)
-    assert len(servers) == 2
-    for server in servers:
-        assert select.select([server], [], [], 20.0)[0], "a fork server is still there"
-        os.close(server)
+    with launcher(BEGIN, number) as servers:
+        assert len(servers) == 2
 
 
 def test_a_package_that_is_not_ours_is_refused_before_it_is_imported(tmp_path: Path) -> None:
