@@ -30,7 +30,6 @@ a wheel drives, else 1: E' ≤ F v + T ω + Σ n_i ν_i, so slip creates no ener
 x, y [m]   θ [rad]   v [m/s]   ω [rad/s]   ν wheel speeds [rad/s]   τ, Δ [N·m] at the wheels
 """
 
-from collections.abc import Callable
 from math import cos, sin
 from typing import NamedTuple
 
@@ -40,8 +39,12 @@ from plant.divergence import FASTEST_WHEEL_RAD_S
 
 NO_SLIP = (1.0, 1.0)
 NO_PUSH = (0.0, 0.0)
-Rates = Callable[[tuple[float, ...], float, float, float, float], tuple[float, float]]
-"""Constants of the equations, v, ω, net torques right, left [N·m] ↦ v', ω'."""
+Rolling = tuple[float, float, float, float, float, float, float, float]
+"""Constants of (4)."""
+Slipping = tuple[
+    float, float, float, float, float, float, float, float, float, float, float, float, float
+]
+"""Constants of (4')."""
 
 
 class State(NamedTuple):
@@ -104,14 +107,16 @@ class RigidBody:
             min(rolled) ** 2
         )
         """No wheel turns less than this, whatever the other one does."""
-        if rolled == NO_SLIP and push == NO_PUSH:
-            self.rates: Rates = body_rates
-            self.constants = self._constants()
-        else:
-            self.rates = general_rates
+        self.rolling: Rolling = (
+            *(self.c * b / self.mbar_1, self.c / b / self.mbar_2),
+            *self._damping,
+            *(0.5 * r / self.mbar_1, 0.5 * r / b / self.mbar_2),
+        )
+        self.slipping: Slipping | None = None
+        """None where the body neither slips nor is pushed."""
+        if rolled != NO_SLIP or push != NO_PUSH:
             load = body.body_mass_kg * a
-            self.constants = self._general_constants((mass, inertia, axle, load), push)
-        """The equations under net wheel torques τ − Δ, and their constants."""
+            self.slipping = self._slipping((mass, inertia, axle, load), push)
         self.disturbed = disturbance.amplitude_wheel_N_m != 0.0
         self.disturbs: Waves = (
             disturbance.amplitude_wheel_N_m,
@@ -154,23 +159,14 @@ class RigidBody:
         self, v: float, omega: float, right: float, left: float
     ) -> tuple[float, float]:
         """(v', ω') under net wheel torques τ − Δ [N·m]."""
-        return self.rates(self.constants, v, omega, right, left)
+        return rates(self.rolling, self.slipping, v, omega, right, left)
 
-    def _constants(self) -> tuple[float, ...]:
-        """Those of (4), for `body_rates`."""
-        return (
-            *(self.c * self.b / self.mbar_1, self.c / self.b / self.mbar_2),
-            *self._damping,
-            0.5 * self.r / self.mbar_1,
-            0.5 * self.r / self.b / self.mbar_2,
-        )
-
-    def _general_constants(
+    def _slipping(
         self,
         inertias: tuple[float, float, float, float],
         push: tuple[float, float],
-    ) -> tuple[float, ...]:
-        """Those of (4'), for `general_rates`: `inertias` are m, I, I_w and m_c a."""
+    ) -> Slipping:
+        """The constants of (4'); `inertias` are m, I, I_w and m_c a."""
         mass, inertia, axle, load = inertias
         b, inv_r, inv_right, inv_left = self.b, 1.0 / self.r, self.inv_right, self.inv_left
         j_right, j_left = axle * inv_right * inv_right, axle * inv_left * inv_left
@@ -206,23 +202,32 @@ def disturbance_torques(t_s: float, waves: Waves) -> tuple[float, float]:
     return amplitude * sin(angle), amplitude * cos(angle)
 
 
-def body_rates(
-    constants: tuple[float, ...], v: float, omega: float, right: float, left: float
+def rates(
+    rolling: Rolling, slipping: Slipping | None, v: float, omega: float, right: float, left: float
 ) -> tuple[float, float]:
-    """(v', ω') of (4) under net wheel torques."""
-    centrifugal, coriolis, d11, d12, d21, d22, g1, g2 = constants
+    """(v', ω') of a body under net wheel torques τ − Δ [N·m]."""
+    if slipping is not None:
+        return slipping_rates(slipping, v, omega, right, left)
+    return rolling_rates(rolling, v, omega, right, left)
+
+
+def rolling_rates(
+    rolling: Rolling, v: float, omega: float, right: float, left: float
+) -> tuple[float, float]:
+    """(v', ω') of (4) under net wheel torques [N·m]."""
+    centrifugal, coriolis, d11, d12, d21, d22, g1, g2 = rolling
     return (
         centrifugal * omega * omega - d11 * v - d12 * omega + g1 * (right + left),
         -coriolis * v * omega - d21 * v - d22 * omega + g2 * (right - left),
     )
 
 
-def general_rates(
-    constants: tuple[float, ...], v: float, omega: float, right: float, left: float
+def slipping_rates(
+    slipping: Slipping, v: float, omega: float, right: float, left: float
 ) -> tuple[float, float]:
-    """(v', ω') of (4') under net wheel torques."""
-    along, across, turning, determinant, load, b, inv_r, inv_right, inv_left = constants[:9]
-    d_right, d_left, force, torque = constants[9:]
+    """(v', ω') of (4') under net wheel torques [N·m]."""
+    along, across, turning, determinant, load, b, inv_r, inv_right, inv_left = slipping[:9]
+    d_right, d_left, force, torque = slipping[9:]
     nu_right, nu_left = (v + b * omega) * inv_right, (v - b * omega) * inv_left
     net_right, net_left = right - d_right * nu_right, left - d_left * nu_left
     drive_right = net_right * (inv_r if net_right * nu_right > 0.0 else inv_right)

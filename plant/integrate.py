@@ -7,7 +7,7 @@ batch kernel of sweeps compiles it as it stands.
 
 from math import cos, sin
 
-from plant.body import Rates, RigidBody, State, Waves, disturbance_torques
+from plant.body import RigidBody, Rolling, Slipping, State, Waves, disturbance_torques, rates
 from plant.divergence import FARTHEST
 
 Motion = tuple[float, float, float, float, float, float, float]
@@ -42,7 +42,7 @@ def moved(
     else:
         net = (tau_right, tau_left, tau_right, tau_left, tau_right, tau_left)
     after = runge_kutta(
-        body.rates, body.constants, motion, net, step_s, body.b, body.inv_right, body.inv_left
+        body.rolling, body.slipping, motion, net, step_s, body.b, body.inv_right, body.inv_left
     )
     if not within_bounds(after, body.b, body.fastest_m_s):
         raise ValueError("the motion diverged")
@@ -64,8 +64,8 @@ def net_torques(
 
 
 def runge_kutta(
-    rates: Rates,
-    constants: tuple[float, ...],
+    rolling: Rolling,
+    slipping: Slipping | None,
     motion: Motion,
     net: Torques,
     step_s: float,
@@ -77,13 +77,13 @@ def runge_kutta(
     x, y, theta, v, omega, right_wheel_rad, left_wheel_rad = motion
     right_1, left_1, right_2, left_2, right_4, left_4 = net
     half = 0.5 * step_s
-    a1, w1 = rates(constants, v, omega, right_1, left_1)
+    a1, w1 = rates(rolling, slipping, v, omega, right_1, left_1)
     v2, omega2, theta2 = v + half * a1, omega + half * w1, theta + half * omega
-    a2, w2 = rates(constants, v2, omega2, right_2, left_2)
+    a2, w2 = rates(rolling, slipping, v2, omega2, right_2, left_2)
     v3, omega3, theta3 = v + half * a2, omega + half * w2, theta + half * omega2
-    a3, w3 = rates(constants, v3, omega3, right_2, left_2)
+    a3, w3 = rates(rolling, slipping, v3, omega3, right_2, left_2)
     v4, omega4, theta4 = v + step_s * a3, omega + step_s * w3, theta + step_s * omega3
-    a4, w4 = rates(constants, v4, omega4, right_4, left_4)
+    a4, w4 = rates(rolling, slipping, v4, omega4, right_4, left_4)
 
     sixth = step_s / 6.0
     along = sixth * (v + 2.0 * (v2 + v3) + v4)

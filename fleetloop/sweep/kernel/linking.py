@@ -28,19 +28,6 @@ SAID_AGAIN: Final[Mapping[tuple[str, str], str]] = {
 """(module, name) -> the name in `primitives`."""
 
 
-class Binding(NamedTuple):
-    """A parameter that is a function, and the one function that the loop gives for it."""
-
-    place: int
-    parameter: str
-    module: str
-    function: str
-
-
-BOUND: Final = {"runge_kutta": Binding(0, "rates", "plant.body", "body_rates")}
-"""By the function that has the parameter. numba keeps nothing on disk that is given functions, so
-they are put in."""
-_FUNCTIONS: Final = {bound.function: bound.module for bound in BOUND.values()}
 OURS: Final = ("agents", "bridge", "configs", "fleetloop", "plant")
 _Definition = ast.FunctionDef | ast.ClassDef | ast.Assign
 
@@ -127,30 +114,6 @@ class _Bare(ast.NodeTransformer):
         return node
 
 
-class _Bound(ast.NodeTransformer):
-    """Puts functions in the place of parameters."""
-
-    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.FunctionDef:
-        self.generic_visit(node)
-        bound = BOUND.get(node.name)
-        if bound is None:
-            return node
-        if [one.arg for one in node.args.args][bound.place] != bound.parameter:
-            raise LinkError(f"parameter {bound.place} of {node.name} isn't {bound.parameter}")
-        del node.args.args[bound.place]
-        named: ast.FunctionDef = _Bare({bound.parameter: bound.function}).visit(node)
-        return named
-
-    def visit_Call(self, node: ast.Call) -> ast.Call:
-        self.generic_visit(node)
-        bound = BOUND.get(node.func.id) if isinstance(node.func, ast.Name) else None
-        if bound is not None:
-            given = node.args.pop(bound.place)
-            if not (isinstance(given, ast.Name) and given.id == bound.function):
-                raise LinkError(f"{ast.unparse(node.func)} is given {ast.unparse(given)}")
-        return node
-
-
 def _without_docstring(body: list[ast.stmt]) -> list[ast.stmt]:
     match body:
         case [ast.Expr(value=ast.Constant(value=str())), *rest]:
@@ -190,7 +153,7 @@ class Linker:
         if isinstance(node, ast.ClassDef):
             self._texts[name] = self._class(source, node)
             return
-        bare = _Bound().visit(_Bare({}).visit(ast.parse(ast.unparse(node))))
+        bare = _Bare({}).visit(ast.parse(ast.unparse(node)))
         renamed = {}
         for used in _globals_of(ast.unparse(bare)):
             if used == name or used in _names_of(node):
@@ -206,7 +169,7 @@ class Linker:
 
     def _resolve(self, source: _Source, used: str) -> str:
         """Take in what a name of a module stands for; the name that it has here."""
-        there, original = source.imported.get(used, (_FUNCTIONS.get(used, source.name), used))
+        there, original = source.imported.get(used, (source.name, used))
         if there == source.name and used not in source.defined:
             if not hasattr(builtins, used):
                 raise LinkError(f"{source.name}: {used} is neither defined nor imported")

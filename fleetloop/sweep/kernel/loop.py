@@ -39,6 +39,7 @@ from agents.neighbours import extrapolated
 from agents.paths import (
     Jet,
     PlanarJet,
+    Point,
     circle_jet,
     cosine_jet,
     cosine_reference,
@@ -64,7 +65,7 @@ from fleetloop.sweep.kernel.layout import (
     WORLD,
 )
 from fleetloop.sweep.kernel.primitives import FLOAT32_MOST, float32
-from plant.body import body_rates, rolling_speeds
+from plant.body import rolling_speeds
 from plant.exact import shaft_motion
 from plant.integrate import net_torques, runge_kutta, within_bounds
 
@@ -328,7 +329,7 @@ def _control(
     robot: Any,
     state: Any,
     told: Any,
-    reference: tuple[float, float, float, float, float],
+    reference: Point,
     tick: int,
 ) -> bool:
     """Torques to the drives, by what the controller knows; False: that isn't finite."""
@@ -434,21 +435,18 @@ def _send(robot: Any, state: Any, right: float, left: float) -> None:
 # --- the path -------------------------------------------------------------------------------------
 
 
-def _cosine(robot: Any, s: float) -> tuple[float, float, float, float, float]:
+def _cosine(robot: Any, s: float) -> Point:
     """The robot's reference at s on the paper's path."""
     return cosine_reference(
         s, robot.path_1, robot.path_2, robot.path_3, robot.path_4, robot.path_5, robot.path_6
     )
 
 
-def _reference(
-    case: Any, robot: Any, curves: Any, s: float
-) -> tuple[float, float, float, float, float]:
+def _reference(case: Any, robot: Any, curves: Any, s: float) -> Point:
     """The robot's reference at s on any other path."""
     centre = _centre(case, curves, s)
     if robot.offset == WORLD:
-        shifted = shifted_reference(centre, robot.path_1, robot.path_2)
-        return shifted.x, shifted.y, shifted.theta, shifted.v_bar, shifted.omega_bar
+        return shifted_reference(centre, robot.path_1, robot.path_2)
     if robot.offset == STRUCTURE:
         ahead = Jet(robot.path_1, 0.0, 0.0, 0.0)
         place = PlanarJet(ahead, Jet(robot.path_2, 0.0, 0.0, 0.0))
@@ -456,8 +454,7 @@ def _reference(
         knots, first, second = curves
         a, b = robot.first_knot, robot.last_knot
         place = varying_jet(s, knots[a:b], first[a : b - 1], second[a : b - 1])
-    turned = turning_reference(centre, place)
-    return turned.x, turned.y, turned.theta, turned.v_bar, turned.omega_bar
+    return turning_reference(centre, place)
 
 
 def _centre(case: Any, curves: Any, s: float) -> PlanarJet:
@@ -488,7 +485,7 @@ def _advance(substeps: int, step_s: float, robot: Any, state: Any, t_s: float, t
     state.demand_right, state.demand_left = right, left
     if state.diverged:
         return
-    constants = (
+    rolling = (
         *(robot.centrifugal, robot.coriolis),
         *(robot.damping_11, robot.damping_12, robot.damping_21, robot.damping_22),
         *(robot.gain_1, robot.gain_2),
@@ -505,7 +502,7 @@ def _advance(substeps: int, step_s: float, robot: Any, state: Any, t_s: float, t
         else:
             net = (right, left, right, left, right, left)
         after = runge_kutta(
-            body_rates, constants, motion, net, step_s, half_track, robot.inv_right, robot.inv_left
+            rolling, None, motion, net, step_s, half_track, robot.inv_right, robot.inv_left
         )
         if not within_bounds(after, half_track, robot.fastest_m_s):
             x, y, theta, v, omega, right_rad, left_rad = motion

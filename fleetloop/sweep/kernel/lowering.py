@@ -296,7 +296,7 @@ def _drives(mounting: sections.Mounting) -> Numbers:
 @lru_cache(maxsize=4096)
 def _body(body: sections.Body) -> Numbers:
     rigid = RigidBody(body, _UNDISTURBED)
-    return *rigid.constants, rigid.b, rigid.inv_right, rigid.inv_left, rigid.fastest_m_s
+    return *rigid.rolling, rigid.b, rigid.inv_right, rigid.inv_left, rigid.fastest_m_s
 
 
 @lru_cache(maxsize=4096)

@@ -24,7 +24,7 @@ EQUATIONS = {
     "agents/coordination.py": ("advanced", "period_map"),
     "agents/paths.py": ("cosine_reference", "spline_jet", "turning_reference"),
     "plant/integrate.py": ("runge_kutta", "within_bounds", "net_torques"),
-    "plant/body.py": ("body_rates", "rolling_speeds"),
+    "plant/body.py": ("rates", "rolling_rates", "rolling_speeds"),
 }
 ROOT = Path(linking.__file__).parents[3]
 
@@ -37,7 +37,8 @@ def functions_of(text: str) -> dict[str, ast.FunctionDef]:
 def arithmetic(function: ast.FunctionDef) -> list[str]:
     """All expressions in which numbers are computed, with Python's names for what is said again."""
     kinds = (ast.BinOp, ast.Compare)
-    said = [ast.unparse(node) for node in ast.walk(function) if isinstance(node, kinds)]
+    nodes = (node for part in function.body for node in ast.walk(part))
+    said = [ast.unparse(node) for node in nodes if isinstance(node, kinds)]
     return sorted(it.replace("least(", "min(").replace("most(", "max(") for it in said)
 
 
