@@ -5,8 +5,7 @@ bus's question of that tick ends without one of them: the controller then acts o
 Each tick is due once, in order.
 """
 
-from collections.abc import Callable
-
+from bridge.drives.interface import DriveClient
 from configs.brief import Schedule
 from configs.ticks import Ticks
 
@@ -15,23 +14,21 @@ class BusClock:
     """Counts the ticks of one controller.
 
     Args:
-        feedback_since: whether both encoder frames were received after a bus time [ns].
+        drives: of the robot; both encoder frames have to be in.
         first: the first tick that is due; the first of the countdown, if none is given.
     """
 
-    __slots__ = ("_due_ns", "_feedback_since", "_next", "_period_ns")
+    __slots__ = ("_drives", "_due_ns", "_next", "_period_ns")
 
-    def __init__(
-        self, schedule: Schedule, feedback_since: Callable[[int], bool], first: int | None = None
-    ) -> None:
-        self._feedback_since = feedback_since
+    def __init__(self, schedule: Schedule, drives: DriveClient, first: int | None = None) -> None:
+        self._drives = drives
         self._period_ns = schedule.period_ns
         self._next = -schedule.countdown_ticks if first is None else first
         self._due_ns = Ticks(schedule).bus_time_ns(self._next)
 
     def due(self, now_ns: int) -> int | None:
         """The tick to compute after a frame of bus time `now_ns`; None if none is due."""
-        if now_ns >= self._due_ns and self._feedback_since(self._due_ns - 1):
+        if now_ns >= self._due_ns and self._drives.feedback_since(self._due_ns - 1):
             return self._advance()
         return None
 

@@ -138,7 +138,7 @@ class LockstepLoop:
         frames = first
         on_frame = agent.on_frame
         first_tick = agent.brief.resumes_tick if self._resumes else -schedule.countdown_ticks
-        clock = BusClock(schedule, agent.feedback_since, first_tick)
+        clock = BusClock(schedule, agent.guard.drives, first_tick)
         self.faults.skip_to(first_tick)
         self._asked_ns = self._told_ns = self._clock.monotonic_ns()
         next_tick = first_tick

@@ -139,7 +139,6 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
             traffic = row_publisher(line, f"can/{bus}", publisher)
             truths.append(traffic)
             logs[bus] = FrameBuffer(partial(put_rows, traffic))
-    taps = {bus: log.add for bus, log in logs.items()}
     progress = link.publisher(keys.progress(name, PLANT.name))
     report = link.publisher(keys.report(name, PLANT.name))
     refusals = Refusals()
@@ -181,7 +180,7 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         record = partial(_record, link, by_name, of_others, brief.schedule.period_s)
         orders = PlantOrders(brief.schedule, inbox, relays)
         loop = wall = RealtimeLoop(
-            brief, emulated, end, hub, poses, own, say, taps, record, of_others, orders
+            brief, emulated, end, hub, poses, own, say, logs, record, of_others, orders
         )
         counters, progress_of, stalls = wall.counters, wall.progress, wall.lateness.stalls
         waits_for = tuple  # nobody
@@ -194,7 +193,7 @@ def _run(brief: PlantBrief, stop: Stop, link: ZenohLink, hub: Hub, end: DrivePor
         absent = AbsentControllers(brief, hub, silences, herald.note)
         pacing = Pacing(brief.schedule, brief.speed)
         orders = PlantOrders(brief.schedule, inbox, relays, absent, pacing)
-        loop = lockstep = LockstepLoop(brief, emulated, hub, poses, rows, say, taps, absent, orders)
+        loop = lockstep = LockstepLoop(brief, emulated, hub, poses, rows, say, logs, absent, orders)
         counters, progress_of, body = lockstep.counters, lockstep.progress, lockstep.run
         waits_for = lockstep.waits_for
     for served in loop.buses.values():

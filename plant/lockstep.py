@@ -25,7 +25,7 @@ from typing import Final, NamedTuple
 from bridge.can_bus.hub import Hub
 from bridge.network.link import Publisher
 from bridge.network.messages import Progress
-from bridge.network.telemetry import RowBuffer, RowLooks, Tap
+from bridge.network.telemetry import FrameBuffer, RowBuffer, RowLooks
 from bridge.process.awake import LOOK_S, STALL_S
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop, launcher_stopped
@@ -73,7 +73,7 @@ class LockstepLoop:
         poses: Sequence[Publisher],
         rows: Sequence[RowBuffer],
         report: Callable[[Progress], None],
-        taps: Mapping[str, Tap],
+        logs: Mapping[str, FrameBuffer],
         absent: AbsentControllers,
         orders: PlantOrders | None = None,
         *,
@@ -101,7 +101,7 @@ class LockstepLoop:
             return partial(self._begin, [(robot, ends[robot]) for robot in group])
 
         self.buses = build_buses(
-            brief, robots, lambda name, _: SocketPort(name, hub, hub), begin, taps
+            brief, robots, lambda name, _: SocketPort(name, hub, hub), begin, logs
         )
         """By name."""
         self._lanes = {name: Lane(name, bus, first) for name, bus in self.buses.items()}

@@ -16,7 +16,7 @@ from bridge.can_bus.drive_port import DrivePort
 from bridge.can_bus.hub import Hub
 from bridge.network.link import Publisher
 from bridge.network.messages import Progress
-from bridge.network.telemetry import RowBuffer, RowLooks, Tap
+from bridge.network.telemetry import FrameBuffer, RowBuffer, RowLooks
 from bridge.process.awake import Lateness
 from bridge.process.clock import SYSTEM_CLOCK, Clock
 from bridge.process.lifecycle import Stop
@@ -49,7 +49,7 @@ class RealtimeLoop:
         poses: Sequence[Publisher],
         rows: Sequence[RowBuffer],
         report: Callable[[Progress], None],
-        taps: Mapping[str, Tap],
+        logs: Mapping[str, FrameBuffer],
         record_others: Callable[[int], None] = _record_nobody,
         other_rows: Sequence[RowBuffer] = (),
         orders: PlantOrders | None = None,
@@ -66,7 +66,7 @@ class RealtimeLoop:
         self._report = report
         external = {robot.brief.bus for robot in robots}.difference(hub.names)
         self.buses = build_buses(
-            brief, robots, lambda name, _: SocketPort(name, end, hub), no_begin, taps, external
+            brief, robots, lambda name, _: SocketPort(name, end, hub), no_begin, logs, external
         )
         """By name."""
         self._acting = [bus for bus in self.buses.values() if bus.acts_between_ticks]

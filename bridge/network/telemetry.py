@@ -205,13 +205,6 @@ FROM_DRIVE: Final = 1
 """Flag of a frame that a drive sent."""
 BLOCK_FRAMES: Final = 1024
 
-Tap = Callable[[int, Sequence[Frame], int], None]
-"""Told what crosses a bus: end in bus time [ns], frames, flags."""
-
-
-def no_tap(end_ns: int, frames: Sequence[Frame], flags: int) -> None:
-    """Nobody listens."""
-
 
 class FrameBuffer:
     """Gathers the frames of one bus and hands them on as blocks: (first, count, frames, final)."""
@@ -224,7 +217,7 @@ class FrameBuffer:
         self._first = 0
         self._count = 0
 
-    def add(self, end_ns: int, frames: Sequence[Frame], flags: int) -> None:
+    def add(self, end_ns: int, frames: list[Frame], flags: int) -> None:
         """Add frames that ended at one bus time."""
         block = self._block
         for frame in frames:

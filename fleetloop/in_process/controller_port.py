@@ -16,9 +16,9 @@ class Controller:
 
     def __init__(self, agent: Agent) -> None:
         self._agent = agent
-        self._clock = BusClock(agent.brief.schedule, agent.feedback_since)
+        self._clock = BusClock(agent.brief.schedule, agent.guard.drives)
 
-    def hear(self, stamp_ns: int, frames: Sequence[Frame]) -> Sequence[Frame]:
+    def hear(self, stamp_ns: int, frames: list[Frame]) -> Sequence[Frame]:
         """The answer to frames of one bus time."""
         agent, clock = self._agent, self._clock
         said: Sequence[Frame] = ()
@@ -60,11 +60,11 @@ class ControllerPort(Port):
         self._controllers = dict(controllers)
         self._in_order = list(controllers.values())
         self._stamp_ns = 0
-        self._frames: Sequence[Frame] = ()
+        self._frames: list[Frame] = []
         self._pending: dict[str, list[Stamped]] = {robot: [] for robot in controllers}
         self._asked = ""
 
-    def deliver(self, stamp_ns: int, frames: Sequence[Frame]) -> None:
+    def deliver(self, stamp_ns: int, frames: list[Frame]) -> None:
         """Keep frames for the controllers that are asked next."""
         self._stamp_ns, self._frames = stamp_ns, frames
 

@@ -67,7 +67,7 @@ class Exchange:
                 for hearer in self._places[robot].hearers:
                     hearer.receive_path_state(robot, state)
 
-    def begin(self, places: "Sequence[_Place]", tick: int) -> None:
+    def begin(self, places: "list[_Place]", tick: int) -> None:
         """Begin a tick as a plant's process does: rows of the robots, and poses that are due."""
         t_ns = tick * self._period_ns
         for place in places:

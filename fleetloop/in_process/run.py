@@ -106,8 +106,7 @@ class InProcessRun:
 
         names = dict.fromkeys(robot.brief.bus for robot in self._robots) if plant.traffic else {}
         self._logs = {bus: FrameBuffer(partial(_write_traffic, writer, bus)) for bus in names}
-        taps = {bus: log.add for bus, log in self._logs.items()}
-        self._buses = build_buses(plant, self._robots, port, begin, taps)
+        self._buses = build_buses(plant, self._robots, port, begin, self._logs)
         for bus in self._buses.values():
             bus.faults.note = self._herald.note
         self._meter = PlantMeter(self._buses, self._robots)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Container, Mapping, Sequence
 from random import Random
 
-from bridge.network.telemetry import Tap, no_tap
+from bridge.network.telemetry import FrameBuffer
 from configs.brief import PlantBrief
 from plant.bus.ideal import IdealBus
 from plant.bus.port import Begin, Bus, Port
@@ -27,19 +27,20 @@ def build_buses(
     robots: Sequence[EmulatedRobot],
     ports: Ports,
     begins: Begins,
-    taps: Mapping[str, Tap],
+    logs: Mapping[str, FrameBuffer],
     external: Container[str] = (),
 ) -> dict[str, Bus]:
     """All buses by name, with the robots on them in the order of the scenario.
 
-    `taps` are given all frames of a bus. `external` buses have no bit timing of ours.
+    All frames of a bus go into its one of `logs`, if there is one. `external` buses have no bit
+    timing of ours.
     """
     by_bus: dict[str, list[EmulatedRobot]] = {}
     for robot in robots:
         by_bus.setdefault(robot.brief.bus, []).append(robot)
     buses: dict[str, Bus] = {}
     for name, group in by_bus.items():
-        port, begin, tap = ports(name, group), begins(group), taps.get(name, no_tap)
+        port, begin, log = ports(name, group), begins(group), logs.get(name)
         if brief.wire is None or name in external:
             buses[name] = IdealBus(
                 group,
@@ -47,11 +48,11 @@ def build_buses(
                 brief.substeps,
                 port,
                 begin,
-                tap,
+                log,
                 BusFaults(brief.faults, group, brief.schedule),
             )
         else:
-            buses[name] = timed_bus(brief, name, group, port, begin, tap)
+            buses[name] = timed_bus(brief, name, group, port, begin, log)
     return buses
 
 
@@ -61,7 +62,7 @@ def timed_bus(
     robots: Sequence[EmulatedRobot],
     port: Port,
     begin: Begin,
-    tap: Tap,
+    log: FrameBuffer | None,
 ) -> TimedBus:
     """A bus with the bit timing that the brief wants.
 
@@ -78,7 +79,7 @@ def timed_bus(
         brief.substeps,
         port=port,
         begin=begin,
-        tap=tap,
+        log=log,
         random=random,
         faults=BusFaults(brief.faults, robots, brief.schedule),
     )

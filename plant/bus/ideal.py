@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from bridge.frame import Frame
-from bridge.network.telemetry import FROM_DRIVE, Tap
+from bridge.network.telemetry import FROM_DRIVE, FrameBuffer
 from configs.brief import Schedule
 from configs.ticks import Ticks
 from plant.bus.interference import Interference
@@ -36,17 +36,18 @@ class IdealBus:
         substeps: int,
         port: Port,
         begin: Begin,
-        tap: Tap,
+        log: FrameBuffer | None,
         faults: BusFaults,
     ) -> None:
         self.robots = robots
+        self._robots = list(robots)
         self.faults = faults
         self._interference = Interference(robots)
         faults.disturbances.disturb = self._interference.disturb
         self.crossed = 0
         self.now_ns = 0
         self.busy_ns: int | None = None
-        self._tap = tap
+        self._log = log
         self._port = port
         self._schedule = schedule
         self._substeps = substeps
@@ -68,14 +69,14 @@ class IdealBus:
     def steps(self) -> Steps:
         """The ticks from the first of the countdown to the closing one."""
         schedule, begin, substeps = self._schedule, self._begin, self._substeps
-        tap, port, ticks = self._tap, self._port, self._ticks
+        port, ticks = self._port, self._ticks
         period_s, period_ns, last = schedule.period_s, schedule.period_ns, schedule.ticks
-        robots, begin_faults, interference = self.robots, self.faults.begin, self._interference
+        robots, faults, interference = self._robots, self.faults, self._interference
         (single,) = robots if len(robots) == 1 else (None,)
         late: list[Frame] = []  # replies that wait for the next tick
         for tick in range(-schedule.countdown_ticks, last + 1):
             self.now_ns = bus_ns = ticks.bus_time_ns(tick)
-            begin_faults(tick)
+            faults.begin(tick)
             begin(tick)
             if interference.acts:
                 frames = interference.frames_due(bus_ns)
@@ -83,7 +84,7 @@ class IdealBus:
                 frames = single.frames_due(bus_ns)
             else:
                 frames = sorted(frame for robot in robots for frame in robot.frames_due(bus_ns))
-            tap(bus_ns, frames, FROM_DRIVE)
+            self._record(bus_ns, frames, FROM_DRIVE)
             if late:
                 frames, late = [*frames, *late], []
             port.deliver(bus_ns, frames)
@@ -95,11 +96,11 @@ class IdealBus:
             self.crossed += len(frames) + len(answers)
             while answers:
                 count += len(answers)
-                tap(bus_ns, answers, 0)
+                self._record(bus_ns, answers, 0)
                 replies = self._react(answers, bus_ns)
                 if not replies:
                     break
-                tap(bus_ns, replies, FROM_DRIVE)
+                self._record(bus_ns, replies, FROM_DRIVE)
                 if count >= MOST_A_TICK:
                     late = replies
                     break
@@ -125,7 +126,7 @@ class IdealBus:
         """Process the clients' frames, and answer."""
         self.move(now_ns)
         received = self._arriving(self._port.receive(), now_ns)
-        self._tap(now_ns, received, 0)
+        self._record(now_ns, received, 0)
         replies = self._react(received, now_ns)
         for robot in self.robots:
             replies += self._leaving(robot.feedback(now_ns), now_ns)
@@ -148,7 +149,7 @@ class IdealBus:
         """Let the drives send what is due at a tick."""
         if self._interference.acts:
             held = self._interference.to_drives((), bus_ns)
-            self._tap(bus_ns, held, 0)
+            self._record(bus_ns, held, 0)
             self.crossed += len(held)
             replies = self._react(held, bus_ns)
             replies += self._interference.frames_due(bus_ns)
@@ -156,13 +157,18 @@ class IdealBus:
             return
         self._send(bus_ns, [frame for robot in self.robots for frame in robot.frames_due(bus_ns)])
 
-    def _send(self, bus_ns: int, frames: Sequence[Frame]) -> None:
+    def _send(self, bus_ns: int, frames: list[Frame]) -> None:
         if frames:
             self.crossed += len(frames)
-            self._tap(bus_ns, frames, FROM_DRIVE)
+            self._record(bus_ns, frames, FROM_DRIVE)
             self._port.deliver(bus_ns, frames)
 
-    def _arriving(self, sent: Sequence[Frame], bus_ns: int) -> Sequence[Frame]:
+    def _record(self, end_ns: int, frames: list[Frame], flags: int) -> None:
+        """Log what crossed the bus."""
+        if self._log is not None:
+            self._log.add(end_ns, frames, flags)
+
+    def _arriving(self, sent: list[Frame], bus_ns: int) -> list[Frame]:
         """What arrives at the drives of frames of clients."""
         return self._interference.to_drives(sent, bus_ns) if self._interference.acts else sent
 
@@ -170,12 +176,12 @@ class IdealBus:
         """What arrives at the clients of frames of drives."""
         return self._interference.from_drives(sent, bus_ns) if self._interference.acts else sent
 
-    def _react(self, frames: Sequence[Frame], bus_ns: int) -> list[Frame]:
+    def _react(self, frames: list[Frame], bus_ns: int) -> list[Frame]:
         if self._interference.acts:
             heard = self._interference.react(frames, bus_ns)
             return self._interference.from_drives(heard, bus_ns)
         replies: list[Frame] = []
-        for robot in self.robots:
+        for robot in self._robots:
             for frame in frames:
                 if replied := robot.on_frame(frame, bus_ns):
                     replies += replied

@@ -29,11 +29,11 @@ class Port(ABC):
     """The clients of one bus. Ideal buses need the first two methods, timed buses the others."""
 
     @abstractmethod
-    def deliver(self, stamp_ns: int, frames: Sequence[Frame]) -> None:
+    def deliver(self, stamp_ns: int, frames: list[Frame]) -> None:
         """Give frames of the drives, all of one bus time, to all clients."""
 
     @abstractmethod
-    def receive(self) -> Sequence[Frame]:
+    def receive(self) -> list[Frame]:
         """The frames that clients sent since the last call, in order."""
 
     @abstractmethod

@@ -19,7 +19,7 @@ class SocketPort(Port):
         self._end = end
         self._hub = hub
 
-    def deliver(self, stamp_ns: int, frames: Sequence[Frame]) -> None:
+    def deliver(self, stamp_ns: int, frames: list[Frame]) -> None:
         """Send frames of the drives to all clients."""
         self._end.deliver(self._name, stamp_ns, frames)
 

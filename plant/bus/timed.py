@@ -24,7 +24,7 @@ from random import Random
 
 from bridge.can_bus.packet import Key, Submitted, Transmitted
 from bridge.frame import Frame
-from bridge.network.telemetry import FROM_DRIVE, Tap
+from bridge.network.telemetry import FROM_DRIVE, FrameBuffer
 from bridge.wire.confinement import BUS_OFF, ERROR_ACTIVE, NodeState
 from bridge.wire.error_frames import of_error, of_state
 from bridge.wire.node import Delivered, ErrorFrame, Node, StateChanged
@@ -51,12 +51,12 @@ class TimedBus:
         *,
         port: Port,
         begin: Begin,
-        tap: Tap,
+        log: FrameBuffer | None,
         random: Random,
         faults: BusFaults,
     ) -> None:
         self.faults = faults
-        self._tap = tap
+        self._log = log
         self._port = port
         self.robots = robots
         self.acts_between_ticks = True
@@ -258,6 +258,11 @@ class TimedBus:
                 self._submit(drive, drive.drive.due(at_ns))
                 drive.due_ns = drive.drive.next_due_ns
 
+    def _record(self, end_ns: int, frame: Frame, flags: int) -> None:
+        """Log what crossed the bus."""
+        if self._log is not None:
+            self._log.add(end_ns, [frame], flags)
+
     def _deliver(self, event: Delivered) -> None:
         end_ns, sender, frame = event.end_ns, event.sender, event.frame
         drive = self._of_node.get(sender)
@@ -265,13 +270,13 @@ class TimedBus:
             if not drive.apart:
                 self.crossed += 1
                 self._transmitted.append(Transmitted(end_ns, frame))
-                self._tap(end_ns, (frame,), FROM_DRIVE)
+                self._record(end_ns, frame, FROM_DRIVE)
             self._submit_backlog(drive)
             return
         self.crossed += 1
         key = self._key_of.get(sender)
         self._transmitted.append(Transmitted(end_ns, frame, key))
-        self._tap(end_ns, (frame,), FROM_DRIVE if key is None else 0)
+        self._record(end_ns, frame, FROM_DRIVE if key is None else 0)
         if key is not None:
             self._stirred[key] = None
         can_id = frame.can_id

@@ -9,7 +9,6 @@ from agents.guard import Phase
 from bridge.can_bus.packet import Submitted
 from bridge.drives.odrive.frames import AxisState, Command, identifier
 from bridge.frame import RTR, Frame
-from bridge.network.telemetry import no_tap
 from bridge.wire.node import NodeState
 from configs.faults.kinds import KINDS
 from configs.loading import load
@@ -349,7 +348,7 @@ class Wall:
         self.port = ManualPort()
         robot = emulated_robot(plant.robots[0])
         acting = BusFaults(plant.faults, [robot], plant.schedule)
-        self.bus = IdealBus([robot], plant.schedule, 1, self.port, lambda _: None, no_tap, acting)
+        self.bus = IdealBus([robot], plant.schedule, 1, self.port, lambda _: None, None, acting)
         self.schedule = plant.schedule
         self.tick_number = 0
 
@@ -411,7 +410,7 @@ def test_in_real_time_a_client_on_a_cut_wire_is_not_acknowledged_and_its_queue_f
     changes = (f"fault=[{fault('bus_cut', 0.01, 0.01)}]", 'clock.mode="realtime"', *WIRE)
     plant = plant_brief(load("two_robots_100hz", changes), network=NOWHERE)
     robot, port = emulated_robot(plant.robots[0]), ManualPort()
-    bus = timed_bus(plant, "r1", [robot], port, lambda _: None, no_tap)
+    bus = timed_bus(plant, "r1", [robot], port, lambda _: None, None)
     freed = []
     for tick in range(3):
         bus.advance(Ticks(plant.schedule).bus_time_ns(tick))

@@ -4,7 +4,6 @@ from support.manual_port import ManualPort
 
 from bridge.drives.odrive.frames import Command, identifier
 from bridge.frame import RTR, Frame
-from bridge.network.telemetry import no_tap
 from configs.connections import NetworkLink
 from configs.loading import load
 from configs.resolve import plant_brief
@@ -22,7 +21,7 @@ def bus(port: ManualPort, scenario: str = "two_robots", *overrides: str) -> Idea
     brief = plant_brief(load(scenario, overrides), network=NetworkLink("t", "", "", ""))
     robot = emulated_robot(brief.robots[0])
     none = BusFaults((), (), brief.schedule)
-    return IdealBus([robot], brief.schedule, brief.substeps, port, lambda _: None, no_tap, none)
+    return IdealBus([robot], brief.schedule, brief.substeps, port, lambda _: None, None, none)
 
 
 def test_who_never_stops_asking_cannot_stop_time_and_is_answered_with_the_next_tick() -> None:

@@ -11,7 +11,6 @@ from bridge.can_bus.packet import Submitted
 from bridge.drives.odrive import frames as f
 from bridge.drives.odrive.frames import AxisState, Command, RebootAction, identifier
 from bridge.frame import ERR, Frame
-from bridge.network.telemetry import no_tap
 from bridge.wire.node import NodeState
 from configs.brief import PlantBrief
 from configs.connections import NetworkLink
@@ -55,7 +54,7 @@ class Driven:
         self.began: list[int] = []
         self.robot = robot = emulated_robot(plant.robots[0])
         self.port = ManualPort()
-        self.bus: TimedBus = timed_bus(plant, "r1", [robot], self.port, self.began.append, no_tap)
+        self.bus: TimedBus = timed_bus(plant, "r1", [robot], self.port, self.began.append, None)
         self.steps = self.bus.steps()
         self._answer = answer
         self.tick_number = -plant.schedule.countdown_ticks
@@ -256,7 +255,7 @@ def test_frames_of_seven_robots_on_one_bus_come_to_each_in_its_turn() -> None:
     plant = plant_brief(loads("seven", text), network=NetworkLink("t", "", "", ""))
     port = ManualPort()
     emulated = [emulated_robot(robot) for robot in plant.robots]
-    steps = timed_bus(plant, "fleet", emulated, port, lambda _: None, no_tap).steps()
+    steps = timed_bus(plant, "fleet", emulated, port, lambda _: None, None).steps()
     for _ in range(3):
         asked, stamps = [], []
         while (ask := port.next_question(steps)) is not None:
