@@ -58,7 +58,6 @@ from configs.netem import LOCALISATION, MOST_DELAY_NS
 from configs.reach import beyond
 from configs.signals import AGE_PREFIX
 
-_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 _NOWHERE: Final = RobotMotion(nan, nan, nan, nan, nan)
 _NO_REFERENCE: Final = Reference(nan, nan, nan, nan, nan)
 POSE_HISTORY_TICKS: Final = 64
@@ -250,8 +249,8 @@ class Agent:
 
     def share(self, tick: int) -> PathState:
         """The path state for the out-neighbours at this tick; known after the tick before."""
-        v_hat, _, s = self._coordination
-        return PathState(tick, tick * self._schedule.period_ns, s, v_hat)
+        now = self._coordination
+        return PathState(tick, tick * self._schedule.period_ns, now.s, now.v_hat)
 
     def step(self, tick: int) -> Sequence[Frame]:
         """Compute one tick; return the frames for the bus.
@@ -313,16 +312,15 @@ class Agent:
         """The coordination and the law at one tick; where either diverges the robot stops."""
         t_ns = tick * self._period_ns
         self._tick = tick
-        v_hat, mu, s = coordination = self._coordination
+        coordination = self._coordination
+        v_hat, mu, s = coordination.v_hat, coordination.mu, coordination.s
         s_dot = mu + v_hat
         sums = self._neighbours.sums(t_ns, s)
         v_r = self._reception.leader_speed(tick, v_hat)
         after = self._coordinator.advance(coordination, sums, self._edges.h, v_r)
-        v_hat_after, mu_after, _ = after
-        along = _new(PathVariable, (s, s_dot, (v_hat_after + mu_after - s_dot) / self._h))
+        along = PathVariable(s, s_dot, (after.v_hat + after.mu - s_dot) / self._h)
         guard = self._guard
         law_state: Any = None
-        signals: Sequence[float]
         try:
             reference = self._path(s)
             out = self._law_step(self._law_state, motion, reference, along)
@@ -331,8 +329,8 @@ class Agent:
             how, why = failure(error, self._law_name)
             frames = guard.command(tick, nan, nan, f"{how} at s = {s:.4g} m: {why}")
         else:
-            right_wheel_N_m, left_wheel_N_m, law_state, signals = out
-            frames = guard.command(tick, right_wheel_N_m, left_wheel_N_m)
+            law_state, signals = out.state, tuple(out.signals)
+            frames = guard.command(tick, out.tau_right, out.tau_left)
         outcome = guard.outcome
         if outcome is UNCHANGED:
             self._law_state = law_state
@@ -350,10 +348,9 @@ class Agent:
         rows.put(mu)
         rows.put(v_hat)
         rows.put(sums.neighbours)
-        x_d, y_d, theta_d, _, _ = reference
-        rows.put(x_d)
-        rows.put(y_d)
-        rows.put(theta_d)
+        rows.put(reference.x)
+        rows.put(reference.y)
+        rows.put(reference.theta)
         self._end_row(t_ns, signals)
         return frames
 
@@ -383,14 +380,13 @@ class Agent:
     def _put_motion(self, motion: RobotMotion) -> None:
         """Its numbers of a row."""
         rows = self.rows
-        x, y, theta, v, omega = motion
-        rows.put(x)
-        rows.put(y)
-        rows.put(theta)
-        rows.put(v)
-        rows.put(omega)
+        rows.put(motion.x)
+        rows.put(motion.y)
+        rows.put(motion.theta)
+        rows.put(motion.v)
+        rows.put(motion.omega)
 
-    def _end_row(self, t_ns: int, signals: Sequence[float]) -> None:
+    def _end_row(self, t_ns: int, signals: tuple[float, ...]) -> None:
         """The numbers of a row from the ages of what was heard on, the law's among them."""
         rows = self.rows
         if self._records_ages:
@@ -411,8 +407,8 @@ class Agent:
 
     def _accept_path_variable(self, t_s: float, after: CoordinationState) -> None:
         """Accept the next path variable; one beyond reach is rejected, and the robot stops."""
-        v_hat, mu, s = after
-        far = beyond(self.admission.reach, t_s, s, v_hat if isfinite(mu) else mu)
+        mu = after.mu
+        far = beyond(self.admission.reach, t_s, after.s, after.v_hat if isfinite(mu) else mu)
         if far is None:
             self._coordination = after
         if (far is None) is self._diverged:

@@ -14,8 +14,9 @@ they stand.
 """
 
 from math import isfinite, nan
-from typing import Final, NamedTuple
+from typing import Final
 
+from agents.laws.values import Values
 from agents.neighbours import Sums
 from configs.sections import Coordination
 
@@ -27,7 +28,6 @@ Map = tuple[Three, Six, Six]
 μ and s from v̂, μ, s, V, v_r and S."""
 MOST_MAPS: Final = 256
 """Maps kept, one for each d and h_i: many neighbours that come and go make more."""
-_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
 def advanced(
@@ -43,12 +43,19 @@ def advanced(
     )
 
 
-class CoordinationState(NamedTuple):
+class CoordinationState(Values):
     """A robot's estimate of the common motion: v̂ [m/s], μ [m/s], s [m]."""
 
-    v_hat: float
-    mu: float
-    s: float
+    __slots__ = ("mu", "s", "v_hat")
+
+    def __init__(self, v_hat: float, mu: float, s: float) -> None:
+        self.v_hat: Final = v_hat
+        self.mu: Final = mu
+        self.s: Final = s
+
+    def in_order(self) -> Three:
+        """All values, in the order of the constructor's arguments."""
+        return self.v_hat, self.mu, self.s
 
 
 class Coordinator:
@@ -70,8 +77,8 @@ class Coordinator:
         degree = sums.degree
         if degree != self._degree or h != self._h:
             self._degree, self._h, self._map = degree, h, self._map_of(degree, h)
-        v_hat, mu, s = state
-        return _new(CoordinationState, advanced(self._map, v_hat, mu, s, sums.s, sums.v, v_r))
+        v_hat, mu, s = advanced(self._map, state.v_hat, state.mu, state.s, sums.s, sums.v, v_r)
+        return CoordinationState(v_hat, mu, s)
 
     def _map_of(self, degree: float, h: float) -> Map:
         rows = self._maps.get((degree, h))

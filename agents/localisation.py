@@ -17,13 +17,9 @@ a fix is taken as the nearest angle of its direction.
 
 from collections import deque
 from math import cos, pi, sin
-from typing import Final
 
 from agents.laws.interface import RobotMotion
 from configs.brief import Wheels
-
-_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
-
 
 Planar = tuple[float, float, float]
 """x, y [m], θ [rad]."""
@@ -133,4 +129,4 @@ class Localiser:
             x, y, theta = self._anchor[:3]
         else:
             x, y, theta = carried(self._anchor, self._odometry)
-        return _new(RobotMotion, (x, y, theta, v, omega))
+        return RobotMotion(x, y, theta, v, omega)

@@ -21,12 +21,9 @@ don't depend on the order of arrival.
 from collections import deque
 from collections.abc import Collection, Iterable
 from math import nan
-from typing import Final
 
 from configs.edges import InEdge
 from configs.sections import Coordination
-
-_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 
 
 def extrapolated(s: float, v_hat: float, age_s: float, half_s: float) -> float:

@@ -18,7 +18,7 @@ stand; closures bind them to the parameters of a scenario.
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from math import atan2, cos, isfinite, sin, sqrt
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 from agents.laws.failure import ShapeError, number, raised
 from agents.laws.interface import Reference, RobotPath
@@ -26,7 +26,8 @@ from configs.curves import FormationOffset, ReferencePath, SplinePath, VaryingOf
 from configs.paths import Circle, Cosine, FigureEight, Line, Structure, World
 from configs.plugins import Choice, file_of
 
-_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
+Point = tuple[float, float, float, float, float]
+"""The numbers of a `Reference`."""
 
 
 class Jet(NamedTuple):
@@ -69,11 +70,11 @@ def robot_path(path: ReferencePath, offset: FormationOffset) -> RobotPath:
             return _turning(centre, own_curve(offset))
 
 
-def reference_of(x: Jet, y: Jet) -> Reference:
+def reference_of(x: Jet, y: Jet) -> Point:
     """(1), (10), (11) of a point and its derivatives."""
     square = x.d1 * x.d1 + y.d1 * y.d1
     omega_bar = (x.d1 * y.d2 - x.d2 * y.d1) / square
-    return Reference(x.value, y.value, atan2(y.d1, x.d1), sqrt(square), omega_bar)
+    return x.value, y.value, atan2(y.d1, x.d1), sqrt(square), omega_bar
 
 
 # --- offsets --------------------------------------------------------------------------------------
@@ -84,7 +85,8 @@ def _shifted_cosine(path: Cosine, offset: World) -> RobotPath:
     x_0, y_0, a, k, ak, akk = cosine_numbers(path, offset)
 
     def reference_at(s: float) -> Reference:
-        return _new(Reference, cosine_reference(s, x_0, y_0, a, k, ak, akk))
+        x, y, theta, v_bar, omega_bar = cosine_reference(s, x_0, y_0, a, k, ak, akk)
+        return Reference(x, y, theta, v_bar, omega_bar)
 
     return reference_at
 
@@ -98,8 +100,8 @@ def cosine_numbers(path: Cosine, offset: World) -> tuple[float, float, float, fl
 
 def cosine_reference(
     s: float, x_0: float, y_0: float, a: float, k: float, ak: float, akk: float
-) -> tuple[float, float, float, float, float]:
-    """`Reference` on the cosine; `ak` and `akk` are a k and a k²."""
+) -> Point:
+    """On the cosine; `ak` and `akk` are a k and a k²."""
     c = cos(k * s)
     dy = -ak * sin(k * s)
     square = 1.0 + dy * dy
@@ -108,27 +110,27 @@ def cosine_reference(
 
 def _shifted(centre: _Curve, x_m: float, y_m: float) -> RobotPath:
     def reference_at(s: float) -> Reference:
-        return shifted_reference(centre(s), x_m, y_m)
+        return Reference(*shifted_reference(centre(s), x_m, y_m))
 
     return reference_at
 
 
-def shifted_reference(centre: PlanarJet, x_m: float, y_m: float) -> Reference:
+def shifted_reference(centre: PlanarJet, x_m: float, y_m: float) -> Point:
     """Of a robot whose offset is fixed in world axes."""
     x, y, theta, v_bar, omega_bar = reference_of(centre.x, centre.y)
-    return Reference(x + x_m, y + y_m, theta, v_bar, omega_bar)
+    return x + x_m, y + y_m, theta, v_bar, omega_bar
 
 
 def _turning(centre: _Curve, offset: _Curve) -> RobotPath:
     """Γ_0 + R(θ) l with θ = θ_d0(s), differentiated twice; R' = θ' R J, J a quarter turn."""
 
     def reference_at(s: float) -> Reference:
-        return turning_reference(centre(s), offset(s))
+        return Reference(*turning_reference(centre(s), offset(s)))
 
     return reference_at
 
 
-def turning_reference(centre: PlanarJet, offset: PlanarJet) -> Reference:
+def turning_reference(centre: PlanarJet, offset: PlanarJet) -> Point:
     """Of a robot whose offset turns with the path."""
     x, y = centre.x, centre.y
     l_x, l_y = offset.x, offset.y

@@ -25,7 +25,7 @@ the batch kernel of sweeps compiles as they stand. `proj` is in `agents.laws.dsc
 
 from collections.abc import Sequence
 from math import atan, cos, exp, inf, sqrt, tanh
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar
 
 from mypy_extensions import mypyc_attr
 
@@ -53,9 +53,8 @@ from agents.laws.interface import (
     Theta,
     Wheels,
 )
-from agents.laws.path_errors import path_errors
+from agents.laws.path_errors import errors_of
 
-_new: Final = tuple.__new__  # of a named tuple, past its constructor: this is the hot path
 Filters = tuple[float, float, float]
 """α_θ, α_v, α_ω."""
 Constants = tuple[Row, Filters, Filters, Filters, tuple[float, float]]
@@ -213,13 +212,11 @@ class AdaptiveDsc(Law):
         """One period of (8)-(36)."""
         constants = self._constants
         (k1, k2, k3, k4), _, _, (keep, gain, _), _ = constants
-        x, y, theta, v, omega = motion
-        x_d, y_d, theta_d, v_bar_d, omega_bar_d = reference
-        s_dot = along[1]
-        x_e, y_e, theta_e = path_errors(x, y, theta, x_d, y_d, theta_d)  # (8)
+        v, omega, s_dot = motion.v, motion.omega, along.s_dot
+        x_e, y_e, theta_e = errors_of(motion, reference)  # (8)
         closing, bar_theta = self._approach(x_e, sense(s_dot) * y_e, k1, k2)  # (17)
         bar_v, turn = virtual_controls(  # (15), (25)
-            closing, bar_theta, theta_e, s_dot, v_bar_d, omega_bar_d, k3
+            closing, bar_theta, theta_e, s_dot, reference.v_bar, reference.omega_bar, k3
         )
         if state is None:
             theta_1, theta_2, kappa = self.estimates
@@ -258,7 +255,7 @@ class AdaptiveDsc(Law):
             t8,
             kappa,
         )
-        return _new(LawOutput, (tau_right, tau_left, after, said))
+        return LawOutput(tau_right, tau_left, after, said)
 
     def _approach(self, x_e: float, y_e: float, k1: float, k2: float) -> tuple[float, float]:
         """The part of (15) that closes x_e, and (17)."""

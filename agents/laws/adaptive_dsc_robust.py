@@ -76,7 +76,7 @@ class AdaptiveDscRobust(AdaptiveDsc):
     ) -> LawOutput:
         """One period; at the torque limit the estimates hold still."""
         out = super().step(state, motion, reference, along)
-        limit, right, left = self._tau_limit, out[0], out[1]
+        limit, right, left = self._tau_limit, out.tau_right, out.tau_left
         if at_limit(right, left, limit):
             right, left = clip(right, limit), clip(left, limit)
             return LawOutput(right, left, self.hold(state, out.state), out.signals)

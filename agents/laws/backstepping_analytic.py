@@ -42,7 +42,7 @@ from agents.laws.interface import (
     Theta,
     Wheels,
 )
-from agents.laws.path_errors import path_errors
+from agents.laws.path_errors import errors_of
 
 _STEP_M = 1e-4
 """Of the central differences along the path."""
@@ -81,7 +81,7 @@ class BacksteppingAnalytic(Backstepping):
         along: PathVariable,
     ) -> LawOutput:
         """One tick of (9)-[4]."""
-        errors = path_errors(*motion[:3], *reference[:3])  # (8)
+        errors = errors_of(motion, reference)  # (8)
         v_bar, v_rate, omega_bar, omega_rate, divisor = self.virtual(
             errors, motion.v, motion.omega, reference, along
         )
@@ -98,9 +98,10 @@ class BacksteppingAnalytic(Backstepping):
         along: PathVariable,
     ) -> tuple[float, float, float, float, float]:
         """v̄, v̄', ω̄, ω̄', and the divisor of [2]."""
-        g, (x_e, y_e, theta_e), (s, s_dot, s_ddot) = self._gains, errors, along
-        _, _, _, v_bar_d, omega_bar_d = reference
-        v_bar_d_s, omega_bar_d_s = self._slopes(s)
+        g, (x_e, y_e, theta_e) = self._gains, errors
+        s_dot, s_ddot = along.s_dot, along.s_ddot
+        v_bar_d, omega_bar_d = reference.v_bar, reference.omega_bar
+        v_bar_d_s, omega_bar_d_s = self._slopes(along.s)
         a, w = v_bar_d * s_dot, omega_bar_d * s_dot
         a_rate = v_bar_d_s * s_dot * s_dot + v_bar_d * s_ddot
         w_rate = omega_bar_d_s * s_dot * s_dot + omega_bar_d * s_ddot
@@ -128,7 +129,7 @@ class BacksteppingAnalytic(Backstepping):
         """v̄_d' and ω̄_d' by s."""
         after, before = self._path(s + _STEP_M), self._path(s - _STEP_M)
         span = 2.0 * _STEP_M
-        return (after[3] - before[3]) / span, (after[4] - before[4]) / span
+        return (after.v_bar - before.v_bar) / span, (after.omega_bar - before.omega_bar) / span
 
     # --- what follows from the equations, for `fleetloop check` ---------------------------------
 

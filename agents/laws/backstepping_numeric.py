@@ -29,7 +29,7 @@ from agents.laws.interface import (
     Theta,
     Wheels,
 )
-from agents.laws.path_errors import path_errors
+from agents.laws.path_errors import errors_of
 
 
 class LastTick(NamedTuple):
@@ -74,7 +74,7 @@ class BacksteppingNumeric(Backstepping):
     ) -> LawOutput:
         """One tick of (8)-[6]."""
         g, h = self._gains, self._h
-        errors = path_errors(*motion[:3], *reference[:3])  # (8)
+        errors = errors_of(motion, reference)  # (8)
         x_e, y_e, theta_e = errors
         v_bar = -g.k1 * x_e + reference.v_bar * along.s_dot * cos(theta_e)  # (15)
         theta_bar = -atan(g.k2 * sense(along.s_dot) * y_e)  # (17)

@@ -20,7 +20,7 @@ from agents.laws.interface import (
     Signal,
     Wheels,
 )
-from agents.laws.path_errors import path_errors
+from agents.laws.path_errors import errors_of
 from configs.errors import ScenarioError
 from configs.plugins import LAWS, Choice
 from configs.signals import gives_path_errors
@@ -86,8 +86,7 @@ def _checked(law: Law, table: Sequence[Signal], note: Callable[[str], None]) -> 
             noted = True
             note(_not_finite(table, values))
         if adds:
-            errors = path_errors(*motion[:3], *reference[:3])
-            return LawOutput(right, left, after, (*errors, *values))
+            return LawOutput(right, left, after, (*errors_of(motion, reference), *values))
         return LawOutput(right, left, after, values)
 
     def hold(before: Any, after: Any) -> Any:

@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from math import inf
 from typing import Any, ClassVar, NamedTuple, Protocol
 
+from agents.laws.values import LawOutput, PathVariable, Reference, RobotMotion
 from configs.brief import Wheels
 from configs.parameters import Parameters
 from configs.signals import PATH_ERRORS, Signal
@@ -41,45 +42,8 @@ __all__ = [
 ]
 
 
-class RobotMotion(NamedTuple):
-    """The motion of the robot, as its controller measures it."""
-
-    x: float  # [m], world
-    y: float  # [m], world
-    theta: float  # [rad], counter-clockwise from world x, not wrapped
-    v: float  # [m/s], forward
-    omega: float  # [rad/s]
-
-
-class Reference(NamedTuple):
-    """The path at one s."""
-
-    x: float  # [m], world
-    y: float  # [m], world
-    theta: float  # [rad], in (−π, π]
-    v_bar: float  # (10) [m per unit of s]
-    omega_bar: float  # (11) [rad per unit of s]
-
-
-class PathVariable(NamedTuple):
-    """The path variable of the robot, from the coordination (40), (45)."""
-
-    s: float  # [m]
-    s_dot: float  # [m/s], μ + v̂_r
-    s_ddot: float  # [m/s²], mean of the coming period
-
-
 RobotPath = Callable[[float], Reference]
 """s ↦ the robot's own reference Γ_i(s), its offset included."""
-
-
-class LawOutput(NamedTuple):
-    """One step of a law."""
-
-    tau_right: float  # [N·m] at the wheel
-    tau_left: float  # [N·m] at the wheel
-    state: Any  # at the next tick
-    signals: Sequence[float]  # the values of SIGNALS, in their order
 
 
 Theta = tuple[float, float, float, float, float, float, float, float]

@@ -7,6 +7,8 @@ y_e = −sin θ (x − x_d) + cos θ (y − y_d)
 
 from math import cos, pi, sin
 
+from agents.laws.values import Reference, RobotMotion
+
 PathErrors = tuple[float, float, float]
 """(8): where the robot is, seen from itself, against its reference: x_e, y_e [m], θ_e [rad]."""
 
@@ -26,3 +28,9 @@ def path_errors(
     c, s = cos(theta), sin(theta)
     dx, dy = x - x_d, y - y_d
     return c * dx + s * dy, c * dy - s * dx, wrap(theta - theta_d)
+
+
+def errors_of(motion: RobotMotion, reference: Reference) -> PathErrors:
+    """Errors (8) of a robot against its reference."""
+    x, y, theta = motion.x, motion.y, motion.theta
+    return path_errors(x, y, theta, reference.x, reference.y, reference.theta)

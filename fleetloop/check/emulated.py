@@ -12,7 +12,7 @@ from math import ceil, hypot, nan
 
 import numpy as np
 
-from agents.coordination import CoordinationState, Coordinator
+from agents.coordination import CoordinationState, Coordinator, Three
 from agents.in_edges import InEdges
 from agents.joining import joining
 from agents.laws.interface import RobotPath
@@ -119,8 +119,8 @@ class _Fleet:
         self._newest_ns: dict[EmulatedEdge, int | None] = dict.fromkeys(self._channels)
         self._v_r: dict[str, float] = {}
 
-    def states(self) -> list[CoordinationState]:
-        return [self._states[robot] for robot in self._graph.robots]
+    def states(self) -> list[Three]:
+        return [self._states[robot].in_order() for robot in self._graph.robots]
 
     def advance(self, now_ns: int, v_r: float, *, shares: bool) -> list[float]:
         """One step of all robots; the ages of what each edge's hearer knows [s]."""

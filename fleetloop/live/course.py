@@ -30,9 +30,10 @@ def courses(scenario: Scenario) -> dict[str, np.ndarray]:
         points = []
         for s in np.linspace(start_m, end_m, count):
             try:
-                points.append(path(float(s))[:2])
+                here = path(float(s))
             except Exception:  # a path of the user's own, beyond the end that it has
                 continue
+            points.append((here.x, here.y))
         found[robot.name] = np.array(points, dtype=float).reshape(-1, 2)
     return found
 

@@ -237,9 +237,10 @@ def path_points(robot: DrawnRobot) -> np.ndarray:
     points = []
     for s in np.linspace(*robot.s_span, _PATH_POINTS).tolist():
         try:
-            points.append(path(s)[:2])
+            here = path(s)
         except Exception:  # beyond the end that it has
             continue
+        points.append((here.x, here.y))
     return np.array(points).reshape(-1, 2)
 
 

@@ -67,7 +67,12 @@ def path_distance(scenario: Scenario, robot: str, plant: np.ndarray, s: np.ndarr
     (own,) = (one for one in scenario.robot if one.name == robot)
     path = robot_path(reference_path(scenario.path), formation_offset(own.offset))
     places = np.linspace(known.min() - _MARGIN_M, known.max() + _MARGIN_M, _PATH_POINTS)
-    points = _points(lambda at: path(at)[:2], places)
+
+    def point(s: float) -> tuple[float, float]:
+        here = path(s)
+        return here.x, here.y
+
+    points = _points(point, places)
     if len(points) < 2:
         return np.full(len(plant), np.nan)
     return polygon_distance(np.stack([plant["x_m"], plant["y_m"]], axis=1), points)

@@ -46,7 +46,7 @@ def one_robot(heard: int, hears_leader: bool, share_every: int) -> np.ndarray:
         for tick in range(share_every):
             sums = ears.sums(period_ns + tick * tick_ns, 0.0)
             state = mind.advance(state, sums, float(hears_leader), 0.0)
-        columns.append(state)
+        columns.append(state.in_order())
     return np.array(columns).T
 
 

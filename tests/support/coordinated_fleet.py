@@ -56,7 +56,7 @@ def coordinated_fleet(
     }
     profile = (SpeedChange(0, v_r), *changes)
     history = np.empty((ticks + 1, len(robots), 3))
-    history[0] = [states[r] for r in robots]
+    history[0] = [states[r].in_order() for r in robots]
     for tick in range(ticks):
         now_ns = round(tick * h_s * 1e9)
         for r in robots:
@@ -69,5 +69,5 @@ def coordinated_fleet(
         sums = {r: receivers[r].sums(now_ns, states[r].s) for r in robots}
         speed = speed_at(profile, now_ns)
         states = {r: coordinators[r].advance(states[r], sums[r], edges[r].h, speed) for r in robots}
-        history[tick + 1] = [states[r] for r in robots]
+        history[tick + 1] = [states[r].in_order() for r in robots]
     return history

@@ -39,7 +39,7 @@ def test_a_robot_beside_a_circle_is_as_far_from_it_as_its_radius_differs() -> No
 
         (own,) = (one for one in scenario.robot if one.name == robot)
         curve = robot_path(reference_path(path), formation_offset(own.offset))
-        on = np.array([curve(float(at))[:3] for at in s])
+        on = np.array([tuple(curve(float(at)))[:3] for at in s])
         left = np.stack([-np.sin(on[:, 2]), np.cos(on[:, 2])], axis=1)
         for apart in (0.0, 0.05, -0.05):
             x, y = (on[:, :2] + apart * left).T
