@@ -16,6 +16,7 @@ relative to a fault                               after, after_end, during, befo
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from math import ceil, floor
+from operator import attrgetter
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 from annotated_types import Ge, Gt, Le, Len, Lt
@@ -93,9 +94,13 @@ class Expect(Parameters):
     @property
     def stated(self) -> dict[str, object]:
         """The keys that differ from their defaults, and `from_s`."""
-        values = {one.name: getattr(self, one.name) for one in fields(self)}
-        kept = {k: v for k, v in values.items() if v is not None and (k, v) != ("holds", "always")}
-        return {k: list(v) if isinstance(v, tuple) else v for k, v in kept.items()}
+        values = zip(_KEYS, _VALUES(self), strict=True)
+        kept = [(k, v) for k, v in values if v is not None and (k, v) != ("holds", "always")]
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in kept}
+
+
+_KEYS = tuple(key.name for key in fields(Expect))
+_VALUES = attrgetter(*_KEYS)
 
 
 class Window(NamedTuple):

@@ -11,8 +11,7 @@ held         else
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
+from collections.abc import Sequence
 from math import ceil, inf, isnan
 from typing import Any, NamedTuple
 
@@ -20,15 +19,12 @@ import numpy as np
 
 from configs.events import MAX_EVENTS, Event
 from configs.expect import BOUNDS, COUNTS, Expect, Window, claim, window_of
-from configs.membership import ALWAYS, Membership
 from configs.scenario import Scenario
-from configs.signals import DERIVED_SIGNALS, DISTANCE, PATH_DISTANCE, PLANT_SIGNALS, SPREAD
+from configs.signals import DERIVED_SIGNALS, PLANT_SIGNALS, SPREAD
 from fleetloop.record.reader import Record
 from fleetloop.results import robustness
-from fleetloop.results.derived import counted, distance, mask, path_distance, spread
 from fleetloop.results.robustness import Finding
-
-_OF_PLANT = {signal.name for signal in PLANT_SIGNALS} - {"t_s"}
+from fleetloop.results.series import Series, SeriesOf
 
 Judged = dict[str, Any]
 """An expectation as in summary.json: its keys, and
@@ -45,15 +41,6 @@ Judged = dict[str, Any]
 """
 
 
-class Series(NamedTuple):
-    """Values of a signal by tick, from tick 0 on."""
-
-    robots: tuple[str, ...]
-    member: Membership  # when it counts
-    values: np.ndarray
-    known: np.ndarray
-
-
 class _Part(NamedTuple):
     """A series and what was found of it."""
 
@@ -63,7 +50,11 @@ class _Part(NamedTuple):
 
 
 def judge(
-    expect: Expect, record: Record, scenario: Scenario, events: Sequence[Event] | None = None
+    expect: Expect,
+    record: Record,
+    scenario: Scenario,
+    events: Sequence[Event] | None = None,
+    series_of: SeriesOf | None = None,
 ) -> Judged:
     """Compare an expectation with the record; a robot counts while it is a member.
 
@@ -74,7 +65,9 @@ def judge(
         record: of the run, complete or not.
         scenario: of the run.
         events: all of the run; None: they aren't known, and none of them is reached.
+        series_of: of the record, where several expectations are judged.
     """
+    series_of = series_of or SeriesOf(record, scenario)
     window = window_of(expect, scenario, scenario.ends_at_s) or Window(0, -1)
     period_s = scenario.clock.control_period_s
     judged: Judged = {**expect.stated, "claim": claim(expect)}
@@ -85,7 +78,7 @@ def judge(
     if expect.event is not None:
         return judged | _judge_events(expect, record, window, period_s, events)
     parts, seen = [], []
-    for series in series_of(expect.signal or "", expect.robots or (), record, scenario):
+    for series in series_of(expect.signal or "", expect.robots or ()):
         first = max(window.first, series.member.joins_tick)
         behind = min(window.last + 1, series.member.leaves_tick)
         # A window that begins after the end of the run counts a robot that is a member then.
@@ -118,8 +111,11 @@ def _find(expect: Expect, series: Series, first: int, behind: int, period_s: flo
         most=inf if expect.max is None else expect.max,
         widest=inf if expect.max_abs is None else expect.max_abs,
     )
-    g[~series.known[first:behind]] = np.nan
+    if not series.all_known:
+        g[~series.known[first:behind]] = np.nan
     ticks = behind - first
+    if expect.holds == "always" and expect.quantile is None and expect.settle_within_s is None:
+        return robustness.always(g, ticks)
     broken = g == -inf
     if broken.any():  # no number, whatever was expected of it
         return Finding(False, -inf, int(np.argmax(broken)))
@@ -131,9 +127,7 @@ def _find(expect: Expect, series: Series, first: int, behind: int, period_s: flo
             return robustness.eventually(g, ticks, piece)
     if expect.quantile is not None:
         return robustness.share(g, ticks, expect.quantile)
-    if expect.settle_within_s is not None:
-        return robustness.settles(g, ticks, period_s, expect.settle_within_s)
-    return robustness.always(g, ticks)
+    return robustness.settles(g, ticks, period_s, expect.settle_within_s or 0.0)
 
 
 def _worst(expect: Expect, parts: Sequence[_Part], record: Record, period_s: float) -> Judged:
@@ -191,53 +185,6 @@ def _unit(expect: Expect, record: Record) -> str:
     tables = (PLANT_SIGNALS, DERIVED_SIGNALS, *record.signals.values())
     named = (it.unit for table in tables for it in table if it.name == expect.signal)
     return next(named, "")
-
-
-def series_of(
-    signal: str, robots: Sequence[str], record: Record, scenario: Scenario
-) -> Iterator[Series]:
-    """A signal of each of these robots, of each pair, or of all together; all if none is named."""
-    robots, members = robots or record.robots, scenario.members
-    if signal == SPREAD:
-        yield _spread(robots, record, members)
-    elif signal == DISTANCE:
-        for one, other in combinations(dict.fromkeys(robots), 2):
-            values = distance(record.plant[one], record.plant[other])
-            both = Membership(
-                max(members[one].joins_tick, members[other].joins_tick),
-                min(members[one].leaves_tick, members[other].leaves_tick),
-            )
-            yield Series((one, other), both, values, np.ones(len(values), dtype=bool))
-    else:
-        for robot in robots:
-            if (found := _of_robot(signal, robot, record, scenario)) is not None:
-                values, known = found
-                yield Series((robot,), members[robot], values, known)
-
-
-def _spread(robots: Sequence[str], record: Record, members: Mapping[str, Membership]) -> Series:
-    rows = {robot: record.controller[robot] for robot in robots}
-    values = spread(rows, members)
-    known = np.ones(len(values), dtype=bool)
-    for robot, part in rows.items():
-        member = members[robot]
-        known &= (counted(part, member) | ~mask(member, len(part)))[: len(values)]
-    return Series(tuple(robots), ALWAYS, values, known)
-
-
-def _of_robot(
-    signal: str, robot: str, record: Record, scenario: Scenario
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """A signal of one robot and where it is known; None if it has none of this name."""
-    plant, controller = record.plant[robot], record.controller[robot]
-    if signal == PATH_DISTANCE:
-        values = path_distance(scenario, robot, plant, controller["s"])
-        return values, np.ones(len(values), dtype=bool)
-    if signal in _OF_PLANT:
-        return plant[signal], np.ones(len(plant), dtype=bool)
-    if signal in (controller.dtype.names or ()):
-        return controller[signal], counted(controller, scenario.members[robot])
-    return None
 
 
 # --- events ---------------------------------------------------------------------------------------

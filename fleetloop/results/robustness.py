@@ -14,7 +14,7 @@ end gives a verdict only if nothing of the rest could change it.
 Source: Donzé, Maler, Robust satisfaction of temporal logic over real-valued signals, 2010.
 """
 
-from math import ceil, inf, nan
+from math import ceil, inf, isnan, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -40,20 +40,36 @@ def slack(
 ) -> np.ndarray:
     """The distance of values inside their bounds: min, max and max_abs; −∞ of what is no number."""
     finite = np.isfinite(values)
-    numbers = np.where(finite, values, 0.0)
-    inside = np.minimum(np.minimum(most - numbers, numbers - least), widest - np.abs(numbers))
-    found: np.ndarray = np.where(finite, inside, -inf)
-    return found
+    whole = bool(finite.all())
+    numbers = values if whole else np.where(finite, values, 0.0)
+    distances = []  # from the bounds that there are: each pass takes its time
+    if most != inf:
+        distances.append(most - numbers)
+    if least != -inf:
+        distances.append(numbers - least)
+    if widest != inf:
+        distances.append(widest - np.abs(numbers))
+    inside = distances[0] if distances else np.full(len(values), inf)
+    for other in distances[1:]:
+        inside = np.minimum(inside, other)
+    return inside if whole else np.where(finite, inside, -inf)
 
 
 def always(g: np.ndarray, ticks: int) -> Finding:
     """At every tick; `ticks` are those of the whole window, of which `g` may be the first part."""
+    if not len(g):
+        return NOTHING
+    at = int(g.argmin())  # the first that is unknown, if one is
+    margin = float(g[at])
+    if not isnan(margin):
+        whole = True if len(g) == ticks else None
+        return Finding(False if margin < 0.0 else whole, margin, at)
     unknown = np.isnan(g)
     if unknown.all():
         return NOTHING
     at = int(np.argmin(np.where(unknown, inf, g)))  # np.nanargmin takes twice as long
     margin = float(g[at])
-    return Finding(False if margin < 0.0 else _if_whole(g, ticks), margin, at)
+    return Finding(False if margin < 0.0 else None, margin, at)
 
 
 def share(g: np.ndarray, ticks: int, quantile: float) -> Finding:

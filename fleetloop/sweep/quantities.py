@@ -25,7 +25,8 @@ from configs.signals import DERIVED_SIGNALS, DISTANCE, PATH_DISTANCE, PLANT_SIGN
 from configs.wording import guess
 from fleetloop.record.reader import Record
 from fleetloop.results import expectations
-from fleetloop.results.expectations import Judged, judge, series_of
+from fleetloop.results.expectations import Judged, judge
+from fleetloop.results.series import Series, SeriesOf
 from fleetloop.results.tables import claim
 from fleetloop.sweep import theory
 from fleetloop.sweep.statistics import TORQUE, TORQUES, UNITS, Course, Kind, parts_of, statistic
@@ -105,12 +106,13 @@ class Quantities:
             stopped: robots that stopped themselves or diverged, and why.
             events: all of the run.
         """
-        judged = [judge(expect, record, scenario, events) for expect in scenario.expect]
+        series_of = SeriesOf(record, scenario)
+        judged = [judge(expect, record, scenario, events, series_of) for expect in scenario.expect]
         verdict = expectations.verdict(judged, stopped=bool(stopped), cut_short=False)
         margins = [one["margin"] for one in judged]
         seen: _Courses = {}
         values: dict[str, float | None] = {
-            one.name: _value(one, record, scenario, seen) for one in self.statistics
+            one.name: _value(one, series_of, scenario, seen) for one in self.statistics
         }
         values |= dict.fromkeys(self.expected)
         values |= {
@@ -158,7 +160,7 @@ def _reason(verdict: str, judged: Sequence[Judged], stopped: Mapping[str, str]) 
 _Courses = dict[tuple[str, tuple[str, ...]], list[Course]]
 
 
-def _value(one: Quantity, record: Record, scenario: Scenario, seen: _Courses) -> float | None:
+def _value(one: Quantity, series_of: SeriesOf, scenario: Scenario, seen: _Courses) -> float | None:
     """The value of a column; several are about the same courses, which are `seen` once."""
     about = (one.signal, one.robots)
     if about not in seen:
@@ -166,7 +168,7 @@ def _value(one: Quantity, record: Record, scenario: Scenario, seen: _Courses) ->
         seen[about] = [
             course
             for signal in signals
-            for course in _courses(signal, one.robots, record, scenario)
+            for course in _courses(series_of(signal, one.robots), scenario)
         ]
     courses = seen[about]
     if one.statistic == "growth_1_s_of":
@@ -182,13 +184,15 @@ def _when_shared(course: Course, scenario: Scenario) -> Course:
     return Course(course.t_s[here], course.values[here])
 
 
-def _courses(
-    signal: str, robots: Sequence[str], record: Record, scenario: Scenario
-) -> Iterator[Course]:
+def _courses(some: Sequence[Series], scenario: Scenario) -> Iterator[Course]:
     period_s = scenario.clock.control_period_s
-    for series in series_of(signal, robots, record, scenario):
+    for series in some:
         t_s = _times_s(len(series.values), period_s)[series.member.ticks]
-        values, known = series.values[series.member.ticks], series.known[series.member.ticks]
+        values = series.values[series.member.ticks]
+        if series.all_known:
+            yield Course(t_s, values)
+            continue
+        known = series.known[series.member.ticks]
         yield Course(t_s, values) if known.all() else Course(t_s[known], values[known])
 
 
