@@ -1,6 +1,7 @@
 """Checks of [[expect]]: keys that belong together, and what the scenario has to offer."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 from math import ceil, inf
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ from configs.signals import (
     DISTANCE,
     PLANT_SIGNALS,
     SPREAD,
+    Signal,
     controller_signals,
 )
 from configs.wording import MISSING, guess
@@ -25,9 +27,9 @@ from configs.wording import MISSING, guess
 if TYPE_CHECKING:
     from configs.scenario import Scenario
 
-_Table = tuple[str, set[str] | None]
+_Table = tuple[str, frozenset[str] | None]
 """A robot and its controller's signals; None: its law isn't here, of a record."""
-_OF_ALL = {signal.name for signal in (*PLANT_SIGNALS, *DERIVED_SIGNALS)} - {"t_s"}
+_OF_ALL = frozenset(signal.name for signal in (*PLANT_SIGNALS, *DERIVED_SIGNALS)) - {"t_s"}
 """Signals that every robot has."""
 _OF_SIGNALS = (*BOUNDS, "for_s", "quantile", "settle_within_s")
 
@@ -67,26 +69,37 @@ def _tables(scenario: "Scenario", *, sound_edges: bool) -> Iterator[_Table]:
         if isinstance(control.parameters, Recorded):
             yield robot.name, None
             continue
-        signals = controller_signals(
-            control.load().SIGNALS, scenario.aged(robot.name) if sound_edges else ()
-        )
-        yield robot.name, {signal.name for signal in signals}
+        aged = scenario.aged(robot.name) if sound_edges else ()
+        yield robot.name, _names(control.load().SIGNALS, aged)
 
 
-def _expectable(tables: Iterable[_Table], robots: Sequence[str]) -> set[str]:
+@lru_cache(maxsize=256)
+def _names(law: tuple[Signal, ...], aged: tuple[str, ...]) -> frozenset[str]:
+    return frozenset(signal.name for signal in controller_signals(law, aged))
+
+
+def _expectable(tables: Iterable[_Table], robots: Sequence[str]) -> frozenset[str]:
     """Signals that all of these robots have, or some robot if none is named.
 
     Nothing if a law isn't here.
     """
-    named = []
+    named: set[frozenset[str]] = set()
     for robot, table in tables:
         if robots and robot not in robots:
             continue
         if table is None:
-            return set()
-        named.append(table)
-    of_all = set.intersection if robots else set.union
-    return (_OF_ALL | of_all(*named)) - {"t_s"} if named else set()
+            return frozenset()
+        named.add(table)
+    if not named:
+        return frozenset()
+    return _together(frozenset(named), every=bool(robots))
+
+
+@lru_cache(maxsize=256)
+def _together(tables: frozenset[frozenset[str]], *, every: bool) -> frozenset[str]:
+    """Signals of every table, or of any, and those that every robot has."""
+    of_all = frozenset.intersection if every else frozenset.union
+    return (_OF_ALL | of_all(*tables)) - {"t_s"}
 
 
 # --- what is expected -----------------------------------------------------------------------------

@@ -10,11 +10,11 @@ Only right variants are made so. One that isn't is loaded whole, and said to be 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
-from functools import cached_property
+from functools import cache, cached_property
 from operator import attrgetter
 from typing import Any, Final
 
-from pydantic import ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
 from configs.checks import Check, cross_problems
 from configs.errors import Complaint, Problem
@@ -73,18 +73,21 @@ class Variants:
     def _right(self, name: str, overrides: Sequence[Override]) -> Scenario | None:
         """The variant; None if something seems to be wrong with it."""
         data = dict(self._table)
-        if any(isinstance(one.apply(data), Complaint) for one in overrides):
-            return None
+        for one in overrides:
+            if isinstance(one.apply(data), Complaint):
+                return None
         if includes_graph(data):  # then its file counts, too
             return None
+        keys = _unlike(data, self._table)
+        if not keys <= _FIELDS.keys():
+            return None
         try:
-            scenario = Scenario.model_validate(
-                {key: self._known(key, value) for key, value in data.items()},
-                context=self._context,
-            )
+            valid = {key: self._validated(key, data) for key in keys}
         except ValidationError:
             return None
-        differing = self._differing(data)
+        given = {_FIELDS[key] for key in data}
+        scenario = Scenario.model_construct(given, **{**self._values, **valid})
+        differing = self._differing(data, keys)
 
         def again(check: Check, scenario: Scenario, **how: bool) -> list[Problem]:
             same = self._reads[check].isdisjoint(differing)
@@ -96,6 +99,15 @@ class Variants:
         if cross_problems(scenario, again):
             return None
         return scenario.originating(Origin(name, self._folder, data))
+
+    def _validated(self, key: str, data: Mapping[str, Any]) -> Any:
+        """What a field is by the value of its key, or without one.
+
+        Raises:
+            ValidationError: the value is wrong, or must be given.
+        """
+        given = {key: self._known(key, data[key])} if key in data else {}
+        return getattr(_alone(key).model_validate(given, context=self._context), _FIELDS[key])
 
     def _known(self, key: str, value: Any) -> Any:
         """What stands at a key of the file: validated already, as far as it is the base's."""
@@ -109,9 +121,8 @@ class Variants:
             )
         return as_tuples(value)
 
-    def _differing(self, data: Mapping[str, Any]) -> set[str]:
-        """Keys in which a table differs from the base's, as `_reads` has them."""
-        keys = _unlike(data, self._table)
+    def _differing(self, data: Mapping[str, Any], keys: set[str]) -> set[str]:
+        """The fields of keys in which a table differs from the base's, as `_reads` has them."""
         names = {_FIELDS[key] for key in keys}
         if _ROBOTS in names and _alike(data[_ROBOTS], self._table[_ROBOTS]):
             names.remove(_ROBOTS)
@@ -123,6 +134,15 @@ class Variants:
         found: list[Problem] = []
         self._reads[check] = _reads(scenario, lambda it: found.extend(check(it, **how)))
         return found
+
+
+@cache
+def _alone(key: str) -> type[BaseModel]:
+    """One field of a scenario by itself: no field is validated by another one's value."""
+    name = _FIELDS[key]
+    field = Scenario.model_fields[name]
+    fields_of_it: dict[str, Any] = {name: (field.annotation, field)}
+    return create_model(f"Scenario.{key}", __config__=Scenario.model_config, **fields_of_it)
 
 
 def _alike(value: object, there: object) -> bool:
