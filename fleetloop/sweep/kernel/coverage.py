@@ -4,7 +4,7 @@ A key that stands in no list may only have its default, and a section that stand
 at all: what is added to scenarios goes to the in-process reference until the kernel learns it.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields
 from functools import cache
 from importlib.util import find_spec
@@ -147,7 +147,16 @@ def lacks(scenario: Scenario) -> str:
     """Why the kernel can't run a scenario, "" if it can."""
     if not _has_compiler():
         return "numba, which isn't installed: pip install 'fleetloop[sweep]'"
-    return next(_reasons(scenario), "")
+    if _covered and next(_reasons(scenario, _covered[0]), None) is None:
+        return ""
+    found = next(_reasons(scenario), "")
+    if not found:
+        _covered[:] = [scenario]
+    return found
+
+
+_covered: Final[list[Scenario]] = []
+"""The last scenario of which all was looked at and nothing found: cases share its sections."""
 
 
 @cache
@@ -155,32 +164,64 @@ def _has_compiler() -> bool:
     return find_spec("numba") is not None
 
 
-def _reasons(scenario: Scenario) -> Iterator[str]:
-    for name, field in type(scenario).model_fields.items():
+_LOOKED_AT: Final = (
+    *("clock", "path", "leader", "graph", "coordination", "localisation", "bus", "mounting"),
+    *("host", "disturbance", "network"),
+)
+
+
+def _reasons(scenario: Scenario, covered: Scenario | None = None) -> Iterator[str]:
+    """Of all sections, or of those that aren't the same objects in a covered scenario."""
+    fields_of = type(scenario).model_fields
+    differing = {
+        name
+        for name in fields_of
+        if covered is None or getattr(scenario, name) is not getattr(covered, name)
+    }
+    for name in filter(differing.__contains__, fields_of):
         value = getattr(scenario, name)
         if name in _SECTIONS:
             yield from filter(None, (_SECTIONS[name](value),))
-        elif value != field.get_default(call_default_factory=True):
+        elif value != fields_of[name].get_default(call_default_factory=True):
             yield f"section [{name}]"
-    for section in (
-        *(scenario.clock, scenario.path, scenario.leader, *scenario.leader.steps),
-        *(scenario.graph, scenario.coordination, scenario.localisation, scenario.bus),
-        *(scenario.mounting, scenario.host, scenario.disturbance, scenario.network),
-        *(scenario.network.default, *scenario.network.edge),
-    ):
-        yield from _of_section(section)
-    if scenario.drive_choice.name == DEFAULT:
-        yield from filter(None, (_reason_of(scenario.drive_choice.parameters),))
-    else:
-        yield f"the drive protocol {scenario.drive_choice.name}"
+    for name in filter(differing.__contains__, _LOOKED_AT):
+        for section in _parts(getattr(scenario, name)):
+            yield from _of_section(section)
+    if "drive_choice" in differing:
+        if scenario.drive_choice.name == DEFAULT:
+            yield from filter(None, (_reason_of(scenario.drive_choice.parameters),))
+        else:
+            yield f"the drive protocol {scenario.drive_choice.name}"
+    known = () if covered is None else covered.robot
+    yield from _of_robots(scenario, known, anew="control" in differing)
+    if "robot_types" in differing:
+        for body in scenario.robot_types.values():
+            yield from _of_section(body)
+
+
+def _of_robots(scenario: Scenario, known: Sequence[sections.Robot], *, anew: bool) -> Iterator[str]:
+    """Of robots that aren't known; of the others the law, if it is to be looked at anew."""
+    there = {id(robot) for robot in known}
     for robot in scenario.robot:
-        yield from filter(None, (_reason_of(robot),))
-        yield from _of_section(robot.offset)
-        yield from _of_law(scenario.control_of(robot))
-        yield from _of_section(robot.pose)
-        yield from _of_section(robot.disturbance or scenario.disturbance)
-    for body in scenario.robot_types.values():
-        yield from _of_section(body)
+        unknown = id(robot) not in there
+        if unknown:
+            yield from filter(None, (_reason_of(robot),))
+            yield from _of_section(robot.offset)
+        if unknown or anew:
+            yield from _of_law(scenario.control_of(robot))
+        if unknown:
+            yield from _of_section(robot.pose)
+            yield from _of_section(robot.disturbance or scenario.disturbance)
+
+
+def _parts(section: object) -> tuple[object, ...]:
+    """A section and the tables in it."""
+    match section:
+        case sections.Leader():
+            return section, *section.steps
+        case sections.Network():
+            return section, section.default, *section.edge
+    return (section,)
 
 
 def _of_law(choice: Choice) -> Iterator[str]:

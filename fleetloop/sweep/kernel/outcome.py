@@ -66,9 +66,9 @@ class Columns(NamedTuple):
     def rows(self, robots: int, ticks: int, period_ns: int) -> tuple[Rows, NDArray[np.void]]:
         """Room for the rows of all robots: as numbers, for the loop, and as rows of a record."""
         blank = _blank(self.signals, ticks, period_ns)
-        rows = np.empty((robots, ticks), blank.dtype)
-        rows[:] = blank
-        return rows.view(np.float64).reshape(robots, ticks, len(self.signals) + 1), rows
+        numbers = np.empty((robots, ticks, len(self.signals) + 1))
+        numbers[:] = blank.view(np.float64).reshape(ticks, -1)  # many times as fast as by fields
+        return numbers, numbers.view(blank.dtype)[:, :, 0]
 
 
 @lru_cache(maxsize=8)

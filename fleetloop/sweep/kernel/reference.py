@@ -43,8 +43,7 @@ def arming(scenario: Scenario, ticks: Schedule) -> list[Event]:
     Raises:
         InfrastructureError: the drives were not armed when control had to start.
     """
-    events = _armed(_Countdown(scenario, ticks))
-    return [event._replace(source=robot) for robot in scenario.names for event in events]
+    return [*_armed(_Countdown(scenario, ticks), scenario.names)]
 
 
 class _Countdown:
@@ -65,7 +64,14 @@ class _Countdown:
 
 
 @lru_cache(maxsize=256)
-def _armed(countdown: _Countdown) -> tuple[Event, ...]:
+def _armed(countdown: _Countdown, robots: tuple[str, ...]) -> tuple[Event, ...]:
+    """The events of these robots up to tick 0."""
+    events = _armed_alone(countdown)
+    return tuple(event._replace(source=robot) for robot in robots for event in events)
+
+
+@lru_cache(maxsize=256)
+def _armed_alone(countdown: _Countdown) -> tuple[Event, ...]:
     """The events of one robot up to tick 0."""
     scenario = countdown.scenario
     plant = plant_brief(scenario, network=_NETWORK)

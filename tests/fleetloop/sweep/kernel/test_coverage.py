@@ -1,13 +1,16 @@
 """What the kernel says that it lacks: all that stands in no list of it."""
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
 import pytest
 
-from configs.loading import load, shipped
+from configs.loading import folder_of, load, read, shipped
+from configs.overrides import Override
 from configs.scenario import Scenario
+from configs.variants import Variants
 from fleetloop.sweep.kernel import coverage
 from fleetloop.sweep.kernel.coverage import lacks
 
@@ -37,6 +40,19 @@ NOT_COVERED = {
 @pytest.mark.parametrize("reason", NOT_COVERED)
 def test_what_is_not_covered_is_named(reason: str) -> None:
     assert lacks(load("paper", NOT_COVERED[reason])) == reason
+
+
+@pytest.mark.parametrize("reason", NOT_COVERED)
+def test_it_is_named_in_a_variant_of_what_is_covered(reason: str) -> None:
+    file, text = read("paper")
+    base = load("paper")
+    variants = Variants(base, tomllib.loads(text), [], folder_of(file))
+    overrides = [Override.from_set(one) for one in NOT_COVERED[reason]]
+    variant = variants.scenario("case 1", [one for one in overrides if isinstance(one, Override)])
+    assert lacks(base) == ""
+    assert lacks(variant) == reason
+    assert lacks(variants.scenario("case 2", [Override("k4", "control.k4", 2.0)])) == ""
+    assert lacks(variant) == reason
 
 
 def test_every_shipped_scenario_is_covered_or_has_a_reason() -> None:
