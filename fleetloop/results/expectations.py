@@ -24,7 +24,7 @@ from configs.signals import DERIVED_SIGNALS, PLANT_SIGNALS, SPREAD
 from fleetloop.record.reader import Record
 from fleetloop.results import robustness
 from fleetloop.results.robustness import Finding
-from fleetloop.results.series import Series, SeriesOf
+from fleetloop.results.series import Alike, Series, SeriesOf
 
 Judged = dict[str, Any]
 """An expectation as in summary.json: its keys, and
@@ -78,7 +78,11 @@ def judge(
     if expect.event is not None:
         return judged | _judge_events(expect, record, window, period_s, events)
     parts, seen = [], []
-    for series in series_of(expect.signal or "", expect.robots or ()):
+    alike = series_of.alike(expect.signal or "", expect.robots or ())
+    if alike is not None and _at_every_tick(expect):
+        parts = _least_of(expect, alike, window)
+        seen = [alike.values.shape[1]]
+    for series in () if parts else series_of(expect.signal or "", expect.robots or ()):
         first = max(window.first, series.member.joins_tick)
         behind = min(window.last + 1, series.member.leaves_tick)
         # A window that begins after the end of the run counts a robot that is a member then.
@@ -103,18 +107,40 @@ def _all_held(held: Sequence[bool | None]) -> bool | None:
 # --- signals --------------------------------------------------------------------------------------
 
 
-def _find(expect: Expect, series: Series, first: int, behind: int, period_s: float) -> Finding:
-    """What the ticks from `first` to before `behind` say."""
-    g = robustness.slack(
-        series.values[first:behind],
+def _least_of(expect: Expect, alike: Alike, window: Window) -> list[_Part]:
+    """Of series that count at all ticks the one with the least margin; none without a tick.
+
+    Whether it holds is whether all of them do: all have as many ticks.
+    """
+    values = alike.values[:, window.first : window.first + len(window)]
+    if not values.size:
+        return []
+    g = _slack(expect, values)
+    row = int(g.argmin()) // g.shape[1]
+    finding = robustness.always(g[row], len(window))
+    return [_Part(alike.series(row), window.first, finding)]
+
+
+def _at_every_tick(expect: Expect) -> bool:
+    return expect.holds == "always" and expect.quantile is None and expect.settle_within_s is None
+
+
+def _slack(expect: Expect, values: np.ndarray) -> np.ndarray:
+    return robustness.slack(
+        values,
         least=-inf if expect.min is None else expect.min,
         most=inf if expect.max is None else expect.max,
         widest=inf if expect.max_abs is None else expect.max_abs,
     )
+
+
+def _find(expect: Expect, series: Series, first: int, behind: int, period_s: float) -> Finding:
+    """What the ticks from `first` to before `behind` say."""
+    g = _slack(expect, series.values[first:behind])
     if not series.all_known:
         g[~series.known[first:behind]] = np.nan
     ticks = behind - first
-    if expect.holds == "always" and expect.quantile is None and expect.settle_within_s is None:
+    if _at_every_tick(expect):
         return robustness.always(g, ticks)
     broken = g == -inf
     if broken.any():  # no number, whatever was expected of it

@@ -49,7 +49,7 @@ def slack(
         distances.append(numbers - least)
     if widest != inf:
         distances.append(widest - np.abs(numbers))
-    inside = distances[0] if distances else np.full(len(values), inf)
+    inside = distances[0] if distances else np.full(values.shape, inf)
     for other in distances[1:]:
         inside = np.minimum(inside, other)
     return inside if whole else np.where(finite, inside, -inf)

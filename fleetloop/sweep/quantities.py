@@ -26,7 +26,7 @@ from configs.wording import guess
 from fleetloop.record.reader import Record
 from fleetloop.results import expectations
 from fleetloop.results.expectations import Judged, judge
-from fleetloop.results.series import Series, SeriesOf
+from fleetloop.results.series import SeriesOf
 from fleetloop.results.tables import claim
 from fleetloop.sweep import theory
 from fleetloop.sweep.statistics import TORQUE, TORQUES, UNITS, Course, Kind, parts_of, statistic
@@ -168,7 +168,7 @@ def _value(one: Quantity, series_of: SeriesOf, scenario: Scenario, seen: _Course
         seen[about] = [
             course
             for signal in signals
-            for course in _courses(series_of(signal, one.robots), scenario)
+            for course in _courses(signal, one.robots, series_of, scenario)
         ]
     courses = seen[about]
     if one.statistic == "growth_1_s_of":
@@ -184,9 +184,16 @@ def _when_shared(course: Course, scenario: Scenario) -> Course:
     return Course(course.t_s[here], course.values[here])
 
 
-def _courses(some: Sequence[Series], scenario: Scenario) -> Iterator[Course]:
+def _courses(
+    signal: str, robots: Sequence[str], series_of: SeriesOf, scenario: Scenario
+) -> Iterator[Course]:
     period_s = scenario.clock.control_period_s
-    for series in some:
+    alike = series_of.alike(signal, robots)
+    if alike is not None:
+        t_s = _times_s(alike.values.shape[1], period_s)
+        yield from (Course(t_s, values) for values in alike.values)
+        return
+    for series in series_of(signal, robots):
         t_s = _times_s(len(series.values), period_s)[series.member.ticks]
         values = series.values[series.member.ticks]
         if series.all_known:
