@@ -12,7 +12,6 @@ from configs.errors import Problem
 from configs.events import KINDS
 from configs.expect import BOUNDS, COUNTS, REFERENCES, Expect, Window, window_of
 from configs.faults.plan import fault_window, names_of
-from configs.plugins import Recorded
 from configs.signals import (
     AGE_PREFIX,
     DERIVED_SIGNALS,
@@ -66,7 +65,7 @@ def _tables(scenario: "Scenario", *, sound_edges: bool) -> Iterator[_Table]:
             control = scenario.control_of(robot)
         except ValidationError:  # said already
             continue
-        if isinstance(control.parameters, Recorded):
+        if control.recorded:
             yield robot.name, None
             continue
         aged = scenario.aged(robot.name) if sound_edges else ()

@@ -332,6 +332,11 @@ class Choice:
         return self.plugin.name
 
     @property
+    def recorded(self) -> bool:
+        """Whether it is a record's whose class isn't here: keys and values alone."""
+        return isinstance(self.parameters, Recorded)
+
+    @property
     def kind(self) -> str:
         """The name, as shapes have theirs."""
         return self.plugin.name

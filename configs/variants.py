@@ -23,10 +23,14 @@ from configs.loading import context_of, of_data
 from configs.origin import Origin
 from configs.overrides import Override
 from configs.parameters import as_tuples
+from configs.plugins import Choice
 from configs.scenario import Scenario
 from configs.sections import Robot
 
 _ROBOTS: Final = "robot"
+_CONTROL: Final = "control"
+_PARTS: Final = {"control.plugin": "plugin", "control.recorded": "recorded"}
+"""Of the fleet's law, which most often only differs in its gains."""
 _FIELDS: Final = {it.alias or name: name for name, it in Scenario.model_fields.items()}
 """Of a scenario, by the keys of its file."""
 _COMPUTED: Final = tuple(
@@ -88,6 +92,8 @@ class Variants:
         given = {_FIELDS[key] for key in data}
         scenario = Scenario.model_construct(given, **{**self._values, **valid})
         differing = self._differing(data, keys)
+        if _CONTROL in differing:
+            differing |= _unlike_parts(scenario.control, self._base.control)
 
         def again(check: Check, scenario: Scenario, **how: bool) -> list[Problem]:
             same = self._reads[check].isdisjoint(differing)
@@ -157,10 +163,18 @@ def _unlike(one: Mapping[str, Any], other: Mapping[str, Any]) -> set[str]:
     return {key for key in one.keys() | other.keys() if one.get(key) is not other.get(key)}
 
 
+def _unlike_parts(one: Choice, other: Choice) -> set[str]:
+    return {part for part, of in _PARTS.items() if getattr(one, of) != getattr(other, of)}
+
+
 def _reads(scenario: Scenario, look: Callable[[Scenario], object]) -> frozenset[str]:
-    """The fields of a scenario that a function reads; those of robots as "robot.pose"."""
+    """The fields of a scenario that a function reads; those of robots as "robot.pose".
+
+    Of the fleet's law the class by itself is "control.plugin", what else is read of it "control".
+    """
     noted: set[str] = set()
     fields_of_robots = {key.name for key in fields(Robot)}
+    fields_of_choices = {key.name for key in fields(Choice)}
 
     class ReadRobot(Robot):
         __slots__ = ()
@@ -170,11 +184,23 @@ def _reads(scenario: Scenario, look: Callable[[Scenario], object]) -> frozenset[
                 noted.add(f"{_ROBOTS}.{name}")
             return super().__getattribute__(name)
 
+    class ReadChoice(Choice):
+        __slots__ = ()
+
+        def __getattribute__(self, name: str) -> Any:
+            part = f"{_CONTROL}.{name}"
+            if part in _PARTS:
+                noted.add(part)
+                return getattr(scenario.control, name)
+            if name in fields_of_choices:
+                noted.add(_CONTROL)
+            return super().__getattribute__(name)
+
     class ReadScenario(Scenario):
         model_config = ConfigDict(defer_build=True)
 
         def __getattribute__(self, name: str) -> Any:
-            if name in Scenario.model_fields:
+            if name in Scenario.model_fields and name != _CONTROL:
                 noted.add(name)
             return super().__getattribute__(name)
 
@@ -183,5 +209,6 @@ def _reads(scenario: Scenario, look: Callable[[Scenario], object]) -> frozenset[
         for robot in scenario.robot
     )
     values = {key: getattr(scenario, name) for key, name in _FIELDS.items()}
-    look(ReadScenario.model_construct(**{**values, _ROBOTS: robots}))
+    control = ReadChoice(scenario.control.plugin, scenario.control.parameters)
+    look(ReadScenario.model_construct(**{**values, _ROBOTS: robots, _CONTROL: control}))
     return frozenset(noted)

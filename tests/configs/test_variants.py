@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from configs.errors import ScenarioError
+from configs.expect_checks import expect_problems
 from configs.loading import folder_of, load, loads, of_data, read, shipped
 from configs.overrides import Override
 from configs.scenario import Scenario
@@ -121,3 +122,14 @@ def test_a_variant_leaves_no_trace_in_the_next_one() -> None:
     before = told(lambda: variants_of("paper").scenario("case 1", []))
     variants_of("paper").scenario("case 1", [Override("x", "robot.r1.pose.x_m", -7.0)])
     assert told(lambda: variants_of("paper").scenario("case 1", [])) == before
+
+
+def test_expectations_are_checked_again_with_another_law_but_not_with_other_gains() -> None:
+    file, text = read("paper")
+    first = Override("--set expect", "expect", [{"signal": "theta_hat_1", "max_abs": 9.0}])
+    variants = Variants(loads(file, text, (first,)), tomllib.loads(text), (first,), "")
+    variants.scenario("case 1", [Override("k4", "control.k4", 2.0)])
+    with pytest.raises(ScenarioError, match=r"theta_hat_1.*no such signal"):
+        variants.scenario("case 2", [Override("law", "control", {"law": "backstepping_analytic"})])
+    assert {"control.plugin", "expect"} <= variants._reads[expect_problems]
+    assert "control" not in variants._reads[expect_problems]
