@@ -34,25 +34,14 @@ def counted(rows: np.ndarray, member: Membership) -> np.ndarray:
 
 def spread(controllers: Mapping[str, np.ndarray], members: Mapping[str, Membership]) -> np.ndarray:
     """max_i s_i − min_i s_i over the members at every tick at which all robots have a row."""
-    there = {robot: counted(rows, members[robot]) for robot, rows in controllers.items()}
-    return spread_where(controllers, there)
-
-
-def spread_where(
-    controllers: Mapping[str, np.ndarray], there: Mapping[str, np.ndarray]
-) -> np.ndarray:
-    """The same over those that are there, as `counted` says of each robot."""
     ticks = min(len(rows) for rows in controllers.values())
+    there = [counted(rows, members[robot])[:ticks] for robot, rows in controllers.items()]
     s = [rows["s"][:ticks] for rows in controllers.values()]
-    counting = [there[robot][:ticks] for robot in controllers]
-    return spread_of(np.stack(s, axis=1), np.stack(counting, axis=1))
+    return spread_of(np.stack(s, axis=1), np.stack(there, axis=1))
 
 
 def spread_of(s: np.ndarray, there: np.ndarray) -> np.ndarray:
     """Max − min of each row over those that are there, 0 without any."""
-    if there.all() and there.size:
-        everyone: np.ndarray = s.max(axis=1) - s.min(axis=1)
-        return everyone
     most = np.where(there, s, -np.inf).max(axis=1)
     least = np.where(there, s, np.inf).min(axis=1)
     difference: np.ndarray = np.where(there.any(axis=1), most - least, 0.0)

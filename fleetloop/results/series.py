@@ -11,7 +11,7 @@ from configs.membership import ALWAYS, Membership
 from configs.scenario import Scenario
 from configs.signals import DISTANCE, PATH_DISTANCE, PLANT_SIGNALS, SPREAD
 from fleetloop.record.reader import Record
-from fleetloop.results.derived import counted, distance, mask, path_distance, spread_where
+from fleetloop.results.derived import counted, distance, mask, path_distance, spread
 
 _OF_PLANT = {signal.name for signal in PLANT_SIGNALS} - {"t_s"}
 
@@ -124,15 +124,16 @@ class SeriesOf:
                     yield Series((robot,), members[robot], values, *known)
 
     def _spread(self, robots: tuple[str, ...]) -> Series:
+        alike = self.alike("s", robots)
+        if alike is not None:
+            s = alike.values
+            return Series(robots, ALWAYS, s.max(axis=0) - s.min(axis=0), alike.known, True)
         rows = {robot: self._record.controller[robot] for robot in robots}
-        there = {robot: self._known_of(robot).there for robot in robots}
-        values = spread_where(rows, there)
-        if all(self._known_of(robot).everywhere for robot in robots):
-            return Series(robots, ALWAYS, values, *self._known_always(len(values)))
+        values = spread(rows, self._members)
         known = np.ones(len(values), dtype=bool)
         for robot, part in rows.items():
             outside = ~mask(self._members[robot], len(part))
-            known &= (there[robot] | outside)[: len(values)]
+            known &= (self._known_of(robot).there | outside)[: len(values)]
         return Series(robots, ALWAYS, values, *_Known.at(known))
 
     def _of_robot(self, signal: str, robot: str) -> tuple[np.ndarray, _Known] | None:

@@ -71,7 +71,7 @@ def statistic(kind: Kind, courses: Sequence[Course]) -> float | None:
 
 
 def _magnitude(courses: Sequence[Course]) -> float:
-    return max(float(np.max(np.abs(course.values))) for course in courses)
+    return max(float(np.abs(course.values).max()) for course in courses)
 
 
 def _final(courses: Sequence[Course]) -> float:
