@@ -31,6 +31,8 @@ _C_FLAGS = (
     *("-fvisibility=hidden", "-fno-plt"),
     *("-g0", "-w"),
 )
+_UNITS = 3
+"""For each processor."""
 # The dependencies, and with them their types, are missing here: what mypy finds wrong isn't.
 _MYPY = """\
 [mypy]
@@ -106,8 +108,9 @@ def compile_modules(modules: Sequence[str], scratch: Path) -> None:
             compile_one = self.compiler.compile
 
             def side_by_side(sources: Sequence[str], **options: Any) -> list[str]:
+                units = _units(sources, Path(self.build_temp))
                 with ThreadPoolExecutor(os.cpu_count()) as pool:
-                    objects = pool.map(lambda one: compile_one([one], **options), sources)
+                    objects = pool.map(lambda one: compile_one([one], **options), units)
                     return [name for names in objects for name in names]
 
             self.compiler.compile = side_by_side
@@ -152,6 +155,29 @@ def compile_modules(modules: Sequence[str], scratch: Path) -> None:
     sources = {one: blake2b(Path(one).read_bytes(), digest_size=16).hexdigest() for one in modules}
     manifest = {"python": sys.implementation.cache_tag, "sources": sources, "libraries": libraries}
     (out / "manifest.json").write_text(json.dumps(manifest, indent=1))
+
+
+def _units(sources: Sequence[str], folder: Path) -> list[str]:
+    """Files that include several of these: the headers of all take long to read.
+
+    A few for each processor, of about the same size.
+    """
+    count = _UNITS * (os.cpu_count() or 1)
+    if len(sources) <= count:
+        return list(sources)
+    units: list[list[str]] = [[] for _ in range(count)]
+    sizes = [0] * count
+    for source in sorted(sources, key=lambda one: -Path(one).stat().st_size):
+        least = sizes.index(min(sizes))
+        units[least].append(source)
+        sizes[least] += Path(source).stat().st_size
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for number, unit in enumerate(units):
+        path = folder / f"unit_{number}.c"
+        path.write_text("".join(f'#include "{Path(one).absolute()}"\n' for one in unit))
+        paths.append(str(path))
+    return paths
 
 
 if __name__ == "__main__":
