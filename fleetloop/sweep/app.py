@@ -43,7 +43,8 @@ app = typer.Typer(
 def sweep() -> None:
     """One scenario in thousands of cases: sweeps and Monte Carlo, on this machine or a cluster.
 
-    fleetloop sweep STUDY.toml is fleetloop sweep run STUDY.toml.
+    fleetloop sweep STUDY.toml is fleetloop sweep run STUDY.toml; fleetloop sweep run --help lists
+    its options.
     """
 
 

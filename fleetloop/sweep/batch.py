@@ -25,7 +25,7 @@ from fleetloop.in_process.whole import run_in_memory
 from fleetloop.record.reader import Record
 from fleetloop.sweep.cases import Case, Cases
 from fleetloop.sweep.dataset import Row
-from fleetloop.sweep.watch import Watch
+from fleetloop.sweep.watch import OverdueError, Watch
 
 KERNEL, REFERENCE = "kernel", "in process"
 NO_KERNEL = "the batch kernel isn't there"
@@ -136,7 +136,7 @@ def _by_kernel(
     try:
         scenarios = [one.scenario for one in valid]
         brought = kernel.run(scenarios, cases.quantities.signals, watch.begin(len(valid)))
-    except Exception as error:
+    except (Exception, OverdueError) as error:
         failure = f"the kernel failed: {_described(error)}"
     if watch.end():
         failure = f"the kernel {watch.reason}"
@@ -160,7 +160,7 @@ def _by_reference(cases: Cases, one: Valid, why_not: str, watch: Watch) -> Row:
     told, outcome = "", None
     try:
         outcome = run_in_memory(one.scenario, watch.begin())
-    except Exception as error:
+    except (Exception, OverdueError, KeyboardInterrupt) as error:  # the last one is a law's
         told = _one_line(error) if isinstance(error, FleetloopError) else _described(error)
     overdue = watch.end()
     wall_s = SYSTEM_CLOCK.monotonic_s() - began_s
@@ -225,11 +225,11 @@ def _row(
     )
 
 
-def _one_line(error: Exception) -> str:
+def _one_line(error: BaseException) -> str:
     return "; ".join(str(error).splitlines())
 
 
-def _described(error: Exception) -> str:
+def _described(error: BaseException) -> str:
     """An exception that is nobody's message: its kind, its text, where it was raised."""
     place = ""
     trace = error.__traceback__

@@ -61,10 +61,10 @@ class Cases:
         self.plan = plan
         self.study: Study = plan.study
         base = plan.base
-        self.base: Scenario = loads(base.name, base.text, self.study.set_, folder=base.folder)
+        overrides = _overrides(name, self.study.set_)
+        self.base: Scenario = loads(base.name, base.text, overrides, folder=base.folder)
         _refuse(base.source, self.base)
         table: dict[str, Any] = tomllib.loads(base.text)
-        overrides = [_override(text) for text in self.study.set_]
         self._variants = Variants(self.base, table, overrides, base.folder)
         for one in overrides:
             one.apply(table)
@@ -74,6 +74,7 @@ class Cases:
             Factor(one.column, expanded(one.every_key, self.base.names), one.draw(self.base.names))
             for one in self.study.factor
         )
+        _refuse_repeated(name, self.factors)
         self.quantities: Quantities
         self.quantities, found = quantities_of(self.study, self.base, name)
         if found:
@@ -148,11 +149,38 @@ def cases_of(plan: Plan) -> Cases:
     return Cases(plan)
 
 
-def _override(text: str) -> Override:
-    made = Override.from_set(text)
-    if isinstance(made, Complaint):  # said already, when the base was loaded
-        raise ScenarioError(f"{made.where}: {made.remedy}", [made])
+def _overrides(name: str, texts: Sequence[str]) -> list[Override]:
+    """Those of a study's `set`, which errors name instead of an option."""
+    made: list[Override] = []
+    found: list[Complaint] = []
+    for n, text in enumerate(texts):
+        option = f"{name}: set.{n} = {text}"
+        match Override.from_set(text):
+            case Override() as one:
+                made.append(one._replace(option=option))
+            case wrong:
+                found.append(wrong._replace(where=option))
+    if found:
+        raise refusal(found)
     return made
+
+
+def _refuse_repeated(name: str, factors: Sequence[Factor]) -> None:
+    """Refuse a key that is set twice: the last would win, and the other look like a result.
+
+    Raises:
+        ScenarioError: it names both factors.
+    """
+    found: list[Complaint] = []
+    of: dict[str, Factor] = {}
+    for n, factor in enumerate(factors):
+        for key in factor.keys:
+            if key in of:
+                remedy = f"factor {of[key].name} sets it already"
+                found.append(Complaint(name, f"factor.{n}", key, remedy))
+            of.setdefault(key, factor)
+    if found:
+        raise refusal(found)
 
 
 def _refuse(source: str, scenario: Scenario) -> None:

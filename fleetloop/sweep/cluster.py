@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -83,7 +84,8 @@ def client_of(place: Place, folder: Path) -> Iterator[Any]:
 
 def _here(distributed: Any, place: Place, folder: Path, stack: ExitStack) -> Any:
     security = distributed.Security.temporary()
-    sys.warnoptions.append(_OF_A_KILL)  # for the process that multiprocessing starts for itself
+    sys.warnoptions.append(_OF_A_KILL)  # for the process that multiprocessing starts for itself,
+    resource_tracker.ensure_running()  # now: it lets Ctrl-C through to the thread that starts it
     scratch = folder / ".dask"
     try:
         with _without_ctrl_c():
@@ -159,6 +161,18 @@ def _check_versions(client: Any) -> None:
         )
 
 
+class _File(logging.FileHandler):
+    """What finds no room, as on a full disk, goes: the study's own writing says so."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Nothing."""
+
+    def close(self) -> None:
+        """Close the file; what waits to be written and can't be goes."""
+        with suppress(OSError):
+            super().close()
+
+
 @contextmanager
 def _logged(path: Path) -> Iterator[None]:
     """Dask's messages go to a file while this lasts, and nowhere afterwards.
@@ -171,7 +185,7 @@ def _logged(path: Path) -> Iterator[None]:
         logger.handlers = []
         logger.propagate = name not in _LOGGERS
         logger.setLevel(logging.WARNING if name in _LOGGERS else logging.NOTSET)
-    handler = logging.FileHandler(path, delay=True)
+    handler = _File(path, delay=True)
     handler.setFormatter(logging.Formatter("%(asctime)s %(name)s %(levelname)s %(message)s"))
     for name in _LOGGERS:
         logging.getLogger(name).handlers = [handler]

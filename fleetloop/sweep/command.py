@@ -25,7 +25,7 @@ from fleetloop.sweep import study as studies
 from fleetloop.sweep import theory
 from fleetloop.sweep.cases import Cases
 from fleetloop.sweep.cluster import client_of
-from fleetloop.sweep.dataset import PARTS, Dataset, read
+from fleetloop.sweep.dataset import PARTS, Columns, Dataset, read
 from fleetloop.sweep.engine import Engine, Pace
 from fleetloop.sweep.extra import PACKAGES, require
 from fleetloop.sweep.options import Ways
@@ -181,7 +181,7 @@ class _Work:
 
 def _go(folder: Path, cases: Cases, ways: Ways) -> int:
     total = cases.study.total
-    dataset = Dataset(folder, total)
+    dataset = Dataset(folder, total, Columns(cases).schema)
     try:
         with stop_on_signals() as stop:
             work = _Work(folder, cases, ways, dataset, _tally_of(folder, total, dataset))

@@ -87,8 +87,11 @@ class Columns:
             columns[name] = [row.factors[name] for row in rows]
         for name in self._quantities:
             columns[name] = [_number(row.values.get(name)) for row in rows]
-        for name in ("verdict", "reason", "engine", "engine_reason", "seed", "wall_s", "command"):
+        for name in ("verdict", "engine", "seed", "wall_s", "command"):
             columns[name] = [getattr(row, name) for row in rows]
+        for name in ("reason", "engine_reason"):  # which are anybody's, and may be no UTF-8
+            texts = [getattr(row, name) for row in rows]
+            columns[name] = [text.encode("utf-8", "backslashreplace").decode() for text in texts]
         columns["margin"] = [_number(row.margin) for row in rows]
         columns["version"] = [self._version] * len(rows)
         arrays = [
@@ -100,12 +103,17 @@ class Columns:
 class Dataset:
     """The dataset of a study's folder, open for adding; one process at a time has it so.
 
+    Args:
+        folder: of the study.
+        total: how many cases it has.
+        schema: of its columns.
+
     Raises:
         ScenarioError: another process has it.
         InfrastructureError: the folder can't be read or written.
     """
 
-    def __init__(self, folder: Path, total: int) -> None:
+    def __init__(self, folder: Path, total: int, schema: "pa.Schema") -> None:
         self.parts = folder / PARTS
         self._folder = folder
         self.done = np.zeros(total, dtype=bool)
@@ -122,13 +130,13 @@ class Dataset:
             raise ScenarioError(f"{folder}: another command is at work on this study") from None
         for left in self.parts.glob(".part-*"):  # of a command that was killed
             left.unlink(missing_ok=True)
-        for path, numbers in _numbers(self.parts):
-            if numbers is None:
-                note(f"{path}: damaged; its cases are computed again")
+        for path, numbers, flaw in _numbers(self.parts, total, schema):
+            if flaw:
+                note(f"{path}: {flaw}; its cases are computed again")
                 with suppress(OSError):
                     path.replace(path.with_suffix(".damaged"))
             else:
-                self.done[numbers[numbers < total]] = True
+                self.done[numbers] = True
 
     def add(self, batch: "pa.RecordBatch") -> None:
         """Keep rows; those of cases that have one already go.
@@ -184,10 +192,22 @@ def read(folder: Path, columns: Sequence[str] | None = None) -> "pa.Table":
     paths = sorted((folder / PARTS).glob("part-*.parquet"))
     if not paths:
         raise ScenarioError(f"{folder}: no rows of a study there ({PARTS}/part-*.parquet)")
-    try:
-        table = pa.concat_tables([pq.read_table(path, columns=columns) for path in paths])
-    except (OSError, pa.ArrowException) as error:
-        raise InfrastructureError(f"{folder / PARTS}: {error}") from error
+    tables: list[Any] = []
+    for path in paths:
+        try:
+            part = pq.read_table(path, columns=columns)
+        except (OSError, pa.ArrowException) as error:
+            said = f"{path}: {str(error).splitlines()[0]}"
+            raise InfrastructureError(
+                f"{said}; fleetloop sweep --resume {folder} sets it aside"
+            ) from error
+        if tables and not part.schema.equals(tables[0].schema):
+            raise InfrastructureError(
+                f"{path}: not of this study, its columns are others than those of {paths[0].name};"
+                f" fleetloop sweep --resume {folder} sets it aside"
+            )
+        tables.append(part)
+    table = pa.concat_tables(tables)
     cases = table.column("case").to_numpy()
     _, first = np.unique(cases, return_index=True)
     return table.take(first)
@@ -199,17 +219,28 @@ def about(table: "pa.Table") -> dict[str, Any]:
     return found
 
 
-def _numbers(parts: Path) -> Sequence[tuple[Path, np.ndarray | None]]:
-    """The cases of each part; None: it is damaged."""
+def _numbers(
+    parts: Path, total: int, schema: "pa.Schema"
+) -> Sequence[tuple[Path, np.ndarray, str]]:
+    """The cases of each part, and what is wrong with it; "" if nothing is."""
     pa = _arrow()
     import pyarrow.parquet as pq
 
-    found: list[tuple[Path, np.ndarray | None]] = []
+    found: list[tuple[Path, np.ndarray, str]] = []
     for path in sorted(parts.glob("part-*.parquet")):
+        numbers, flaw = np.empty(0, dtype=np.int64), ""
         try:
-            found.append((path, pq.read_table(path, columns=["case"]).column("case").to_numpy()))
+            if pq.read_schema(path).equals(schema):
+                column = pq.read_table(path, columns=["case"]).column("case")
+                flaw = "has rows without a case" if column.null_count else ""
+                numbers = column.to_numpy()
+            else:
+                flaw = "not of this study: its columns are others"
         except (OSError, pa.ArrowException):
-            found.append((path, None))
+            flaw = "damaged"
+        if not flaw and not ((numbers >= 0) & (numbers < total)).all():
+            flaw = f"not of this study: its cases aren't within 0 to {total - 1}"
+        found.append((path, numbers, flaw))
     return found
 
 

@@ -191,7 +191,7 @@ class Engine:
         return enough
 
     def _take(self, future: Any) -> bool:
-        from distributed import KilledWorker
+        from distributed import CancelledError, KilledWorker
 
         chunk = self._running.pop(future, None)
         if chunk is None:
@@ -199,7 +199,7 @@ class Engine:
         if future.status == "finished":
             try:
                 done: Done = future.result(timeout=FETCH_S)
-            except (OSError, TimeoutError):  # its worker ended meanwhile
+            except (OSError, TimeoutError, CancelledError, KilledWorker):  # its worker ended
                 self._again.append(chunk)
                 return False
             self.pace.take(len(chunk.numbers), done)
@@ -207,7 +207,11 @@ class Engine:
         if future.status != "error":  # done, and lost with its worker before it was fetched
             self._again.append(chunk)
             return False
-        error = future.exception(timeout=FETCH_S)
+        try:
+            error = future.exception(timeout=FETCH_S)
+        except (OSError, TimeoutError, CancelledError):
+            self._again.append(chunk)
+            return False
         if isinstance(error, VersionMismatchError):
             raise InfrastructureError(f"a worker has other versions: {error}")
         if not isinstance(error, KilledWorker) and len(chunk.numbers) == 1:

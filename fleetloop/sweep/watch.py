@@ -18,8 +18,11 @@ STUCK = 17
 """Exit status of a process that couldn't end a case otherwise."""
 
 
-class OverdueError(Exception):
-    """Raised in a thread that computes a case for too long."""
+class OverdueError(BaseException):
+    """Raised in a thread that computes a case for too long.
+
+    No law that raises an exception stops its robot with it, and none keeps it to itself.
+    """
 
 
 class Watch:

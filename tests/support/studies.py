@@ -54,10 +54,17 @@ def study_folder(
     cases = Cases(plan)
     folder.mkdir(parents=True, exist_ok=True)
     plan.save(folder)
-    dataset = Dataset(folder, cases.study.total)
+    columns = Columns(cases)
+    dataset = Dataset(folder, cases.study.total, columns.schema)
     try:
         chosen = range(cases.study.total) if numbers is None else numbers
-        dataset.add(Columns(cases).batch(rows_of(cases, chosen, Watch(300.0), kernel)))
+        dataset.add(columns.batch(rows_of(cases, chosen, Watch(300.0), kernel)))
     finally:
         dataset.close()
     return folder
+
+
+def opened(folder: Path) -> Dataset:
+    """The dataset of a folder with a study, as a command has it that is at work."""
+    cases = Cases(Plan.resume(folder))
+    return Dataset(folder, cases.study.total, Columns(cases).schema)

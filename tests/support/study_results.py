@@ -35,7 +35,7 @@ def made_study(
     cases = Cases(plan)
     folder.mkdir(parents=True, exist_ok=True)
     plan.save(folder)
-    dataset = Dataset(folder, cases.study.total)
+    dataset = Dataset(folder, cases.study.total, Columns(cases).schema)
     try:
         rows = [_row(cases, n, outcome) for n in numbers or range(cases.study.total)]
         dataset.add(Columns(cases).batch(rows))

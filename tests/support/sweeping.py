@@ -45,6 +45,15 @@ class Sweep:
             self._wait(_LOOK_S)
         raise AssertionError(f"not {count} rows in time: {self.errors.read_text()}")
 
+    def await_workers(self, count: int) -> None:
+        """Return when so many workers have begun to start."""
+        for _ in range(int(WAIT_S / _LOOK_S)):
+            if len(self.workers()) >= count:
+                return
+            assert self._process.poll() is None, self.errors.read_text()
+            self._wait(_LOOK_S)
+        raise AssertionError(f"not {count} workers in time: {self.errors.read_text()}")
+
     def workers(self) -> list[psutil.Process]:
         """Processes that compute, here."""
         return [

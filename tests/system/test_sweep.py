@@ -283,6 +283,19 @@ def test_ctrl_c_keeps_what_is_done_and_leaves_no_process(folder: Path) -> None:
     assert out.startswith(f"short: {len(done)} of {CASES} cases: {len(done)} held")
 
 
+def test_ctrl_c_while_workers_start_and_again_ends_it_all_without_a_traceback(folder: Path) -> None:
+    with sweeping(folder, "study.toml", "--workers", "2") as sweep:
+        sweep.await_workers(2)
+        family = sweep.family()
+        for _ in range(3):
+            sweep.interrupt()
+        status, _ = sweep.end()
+        assert_gone(family)
+    said = sweep.errors.read_text().splitlines()
+    assert status == 130
+    assert [line for line in said if not SAID.fullmatch(line)] == []
+
+
 MORTAL = '''
 import os
 import signal

@@ -101,3 +101,20 @@ def test_a_base_beside_the_study_is_found_from_anywhere(tmp_path) -> None:
     assert plan.base.source == str(folder / "base.toml")
     cases = Cases(plan)
     assert of_command(cases.command(cases.case(0))) == cases.scenario(cases.case(0))
+
+
+def test_a_key_of_two_factors_is_refused_and_both_are_named() -> None:
+    one = P + 'name = "slow"\n'
+    for key in ("coordination.p", "robot.*.body.body_mass_kg"):
+        other = f'[[factor]]\nname = "q"\nkey = "{key}"\nuniform = [1.0, 2.0]\n'
+        again = other.replace('"q"', '"r"').replace("*", "r2")
+        head = SHORT + 'design = "random"\ncases = 3\n'
+        with pytest.raises(ScenarioError, match=r"study\.toml: factor\..*sets it already"):
+            cases_of(head + (one if key == "coordination.p" else other) + again + FEW)
+
+
+@pytest.mark.parametrize("text", ["until_s", "until_s=-3", "control.nope=1"])
+def test_an_error_in_set_names_the_study_and_its_place(text: str) -> None:
+    head = SHORT.replace('"until_s=0.1",', f'"until_s=0.1", "{text}",')
+    with pytest.raises(ScenarioError, match=r"study\.toml: set\.1"):
+        cases_of(head + 'design = "grid"\n' + P + FEW)

@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import resource
 import shutil
 import subprocess
@@ -22,6 +23,8 @@ from fleetloop.sweep.watch import Watch
 GRAPH = "\n[[factor]]\ngraph = {}\n"
 LAW = '\n[[factor]]\nkey = "control.law"\nvalues = ["adaptive_dsc", "adaptive_dsc_robust"]\n'
 SEED = '\n[[factor]]\nkey = "seed"\nintegers = [3, 9]\n'
+THREE = SHORT + 'design = "grid"\n' + P + FEW
+SCHEMA = Columns(cases_of(THREE)).schema
 TEXT = SHORT + 'design = "random"\ncases = 6\n' + MASS + GRAPH + LAW + SEED
 
 
@@ -59,10 +62,10 @@ def test_pandas_and_arrow_open_its_folder_of_parts_as_one_table(folder) -> None:
 
 
 def test_a_case_has_one_row_whatever_comes_twice(tmp_path) -> None:
-    cases = cases_of(SHORT + 'design = "grid"\n' + P + FEW)
+    cases = cases_of(THREE)
     columns = Columns(cases)
     rows = rows_of(cases, range(3), Watch(300.0))
-    dataset = Dataset(tmp_path, 3)
+    dataset = Dataset(tmp_path, 3, SCHEMA)
     dataset.add(columns.batch(rows[:2]))
     dataset.add(columns.batch([replace(rows[1], reason="again"), rows[2]]))
     dataset.add(columns.batch(rows))
@@ -73,27 +76,27 @@ def test_a_case_has_one_row_whatever_comes_twice(tmp_path) -> None:
 
 
 def test_who_opens_it_again_knows_what_is_done(tmp_path) -> None:
-    study_folder(tmp_path, SHORT + 'design = "grid"\n' + P + FEW, [2, 0])
-    dataset = Dataset(tmp_path, 3)
+    study_folder(tmp_path, THREE, [2, 0])
+    dataset = Dataset(tmp_path, 3, SCHEMA)
     assert dataset.done.tolist() == [True, False, True]
     dataset.close()
 
 
 def test_one_command_at_a_time_adds_to_it(tmp_path) -> None:
-    dataset = Dataset(tmp_path, 3)
+    dataset = Dataset(tmp_path, 3, SCHEMA)
     with pytest.raises(ScenarioError, match="another command is at work on this study"):
-        Dataset(tmp_path, 3)
+        Dataset(tmp_path, 3, SCHEMA)
     dataset.close()
-    Dataset(tmp_path, 3).close()
+    Dataset(tmp_path, 3, SCHEMA).close()
 
 
 def test_what_a_killed_command_left_half_written_is_no_part(tmp_path, capfd) -> None:
-    study_folder(tmp_path, SHORT + 'design = "grid"\n' + P + FEW, [0])
-    study_folder(tmp_path, SHORT + 'design = "grid"\n' + P + FEW, [1])
+    study_folder(tmp_path, THREE, [0])
+    study_folder(tmp_path, THREE, [1])
     one, other = sorted((tmp_path / "parts").glob("part-*"))
     shutil.copy(one, tmp_path / "parts" / ".part-unfinished.parquet")
     other.write_bytes(other.read_bytes()[:100])
-    dataset = Dataset(tmp_path, 3)
+    dataset = Dataset(tmp_path, 3, SCHEMA)
     dataset.close()
     assert dataset.done.tolist() == [True, False, False]
     assert sorted(path.suffix for path in (tmp_path / "parts").iterdir()) == [
@@ -103,8 +106,51 @@ def test_what_a_killed_command_left_half_written_is_no_part(tmp_path, capfd) -> 
     assert "damaged; its cases are computed again" in capfd.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("column", "told"),
+    [
+        (pyarrow.array(["0", "1"]), "its columns are others"),
+        (pyarrow.array([0.0, 1.0]), "its columns are others"),
+        (pyarrow.array([1, None]), "has rows without a case"),
+        (pyarrow.array([-3, 1]), "its cases aren't within 0 to 2"),
+        (pyarrow.array([1, 10**12]), "its cases aren't within 0 to 2"),
+    ],
+)
+def test_a_part_that_is_not_of_the_study_is_set_aside(
+    tmp_path, capfd, column: pyarrow.Array, told: str
+) -> None:
+    study_folder(tmp_path, THREE, [0, 1])
+    parts = tmp_path / "parts"
+    table = read(tmp_path)
+    foreign = table.set_column(0, "case", column)
+    pyarrow.parquet.write_table(foreign, parts / "part-foreign.parquet")
+    dataset = Dataset(tmp_path, 3, SCHEMA)
+    dataset.close()
+    assert dataset.done.tolist() == [True, True, False]
+    assert (parts / "part-foreign.damaged").exists()
+    assert told in capfd.readouterr().err
+    assert read(tmp_path).equals(table)
+
+
+def test_a_part_with_other_columns_is_named_where_rows_are_read(tmp_path) -> None:
+    study_folder(tmp_path, THREE, [0, 1])
+    foreign = pyarrow.table({"case": [7]})
+    path = tmp_path / "parts" / "part-foreign.parquet"
+    pyarrow.parquet.write_table(foreign, path)
+    with pytest.raises(InfrastructureError, match=re.escape(str(path))):
+        read(tmp_path)
+    with pytest.raises(InfrastructureError, match=re.escape(str(path))):
+        read(tmp_path, ["case", "verdict"])
+
+
+def test_a_reason_that_is_no_utf_8_is_kept_as_it_can_be_shown(tmp_path) -> None:
+    cases = cases_of(THREE)
+    rows = [replace(row, reason="boom \udc80") for row in rows_of(cases, [0], Watch(300.0))]
+    assert Columns(cases).batch(rows).column("reason").to_pylist() == ["boom \\udc80"]
+
+
 def test_an_infinite_margin_is_kept_and_an_unknown_one_is_null(tmp_path) -> None:
-    cases = cases_of(SHORT + 'design = "grid"\n' + P + FEW)
+    cases = cases_of(THREE)
     rows = rows_of(cases, range(3), Watch(300.0))
     rows = [replace(rows[0], margin=-math.inf), replace(rows[1], margin=None)]
     column = Columns(cases).batch([*rows, replace(rows[1], margin=math.nan)]).column("margin")
@@ -120,7 +166,7 @@ study_folder(Path(sys.argv[1]), sys.argv[2], [int(sys.argv[3])])
 
 
 def test_a_full_disk_is_named_and_what_was_there_is_kept(tmp_path) -> None:
-    text = SHORT + 'design = "grid"\n' + P + FEW
+    text = THREE
     study_folder(tmp_path, text, [0])
 
     def little_room() -> None:

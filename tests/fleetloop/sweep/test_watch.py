@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -44,6 +45,16 @@ def test_python_that_does_not_look_is_interrupted() -> None:
         deadline_s = time.monotonic() + 30.0
         while time.monotonic() < deadline_s:
             pass
+
+
+def test_so_is_python_that_keeps_all_exceptions_to_itself() -> None:
+    with Watch(0.02, grace_s=0.02) as watch, pytest.raises(OverdueError):
+        watch.begin()
+        deadline_s = time.monotonic() + 30.0
+        while time.monotonic() < deadline_s:
+            with suppress(Exception, SystemExit):  # as a controller does with its law
+                while time.monotonic() < deadline_s:
+                    pass
 
 
 def test_what_is_stuck_in_a_library_ends_its_process() -> None:

@@ -5,10 +5,8 @@ import shlex
 
 import pytest
 from support.command_line import fleetloop
-from support.studies import FEW, MASS, SHORT, P, study_folder
+from support.studies import FEW, MASS, SHORT, P, opened, study_folder
 from support.study_results import Came, made_study
-
-from fleetloop.sweep.dataset import Dataset
 
 GRID = SHORT + 'design = "grid"\n' + P + FEW
 SAMPLES = SHORT + 'design = "random"\ncases = 40\n' + P + MASS + FEW
@@ -91,7 +89,7 @@ def test_a_folder_without_rows_is_refused(tmp_path) -> None:
 
 def test_a_study_that_is_running_is_reported_as_far_as_it_is(tmp_path) -> None:
     made_study(tmp_path / "study", SAMPLES, some, range(12))
-    dataset = Dataset(tmp_path / "study", 40)
+    dataset = opened(tmp_path / "study")
     try:
         result = fleetloop(tmp_path, "sweep", "report", "study")
     finally:

@@ -4,11 +4,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from support.studies import FEW, MASS, SHORT, P, study_folder
+from support.studies import FEW, MASS, SHORT, P, opened, study_folder
 from support.study_results import Came, made_results, made_study
 
 from configs.errors import InfrastructureError, ScenarioError
-from fleetloop.sweep.dataset import Dataset
 from fleetloop.sweep.report.columns import nice_marks, unit_of, wrapped
 from fleetloop.sweep.report.results import results_of
 
@@ -68,7 +67,7 @@ def test_if_no_part_can_be_read_there_is_no_report(tmp_path) -> None:
 
 def test_a_study_at_which_a_command_is_at_work_is_running(tmp_path) -> None:
     made_study(tmp_path, GRID, lambda _: Came(), [0])
-    dataset = Dataset(tmp_path, 3)
+    dataset = opened(tmp_path)
     try:
         assert results_of(tmp_path).running
     finally:
@@ -79,7 +78,7 @@ def test_a_study_at_which_a_command_is_at_work_is_running(tmp_path) -> None:
 def test_who_reads_keeps_nobody_from_adding(tmp_path) -> None:
     made_study(tmp_path, GRID, lambda _: Came(), [0])
     results_of(tmp_path)
-    Dataset(tmp_path, 3).close()
+    opened(tmp_path).close()
 
 
 @pytest.mark.parametrize(
