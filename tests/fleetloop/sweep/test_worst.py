@@ -24,12 +24,13 @@ def test_those_that_failed_come_first_then_the_least_margins(tmp_path) -> None:
         ("held", 0.3), ("failed", -0.2), ("error", None), ("held", 0.1), ("failed", float("-inf")),
         ("not checked", None),
     ]  # fmt: skip
-    dataset = Dataset(tmp_path, 6)
+    columns = Columns(cases)
+    dataset = Dataset(tmp_path, 6, columns.schema)
     changed = [
         replace(row, verdict=verdict, margin=margin)
         for row, (verdict, margin) in zip(rows, told, strict=True)
     ]
-    dataset.add(Columns(cases).batch(changed))
+    dataset.add(columns.batch(changed))
     dataset.close()
     assert worst_of(tmp_path, 10) == [4, 1, 3, 0, 5]
     assert worst_of(tmp_path, 2) == [4, 1]
