@@ -392,7 +392,7 @@ schema = 1
 title = "short"
 base = "two_robots"
 design = "random"
-cases = 400
+cases = 40000
 set = ["until_s=0.1", "expect.0.from_s=0.05", "expect.1.from_s=0.05"]
 {more}
 [[factor]]
@@ -413,7 +413,7 @@ def test_a_study_ends_when_its_failure_rate_is_known_and_goes_on_when_asked(fold
     told = json.loads(out)
     least, most = told["failure_rate_interval"]
     assert status == 0
-    assert told["done"] < told["cases"] == 400
+    assert told["done"] < told["cases"] == 40_000
     assert told["ended"].startswith("the failure rate is ")
     assert 0.5 * (most - least) <= 0.2
     assert least < 0.5 < most  # |x_e| is 0.1 m, the bound is drawn from 0 to 0.2 m
