@@ -21,7 +21,7 @@ STUCK = 17
 class OverdueError(BaseException):
     """Raised in a thread that computes a case for too long.
 
-    No law that raises an exception stops its robot with it, and none keeps it to itself.
+    No `Exception`: a controller would take that for its law's, and a law can keep one to itself.
     """
 
 

@@ -39,8 +39,7 @@ class IdealBus:
         log: FrameBuffer | None,
         faults: BusFaults,
     ) -> None:
-        self.robots = robots
-        self._robots = list(robots)
+        self.robots = list(robots)
         self.faults = faults
         self._interference = Interference(robots)
         faults.disturbances.disturb = self._interference.disturb
@@ -71,7 +70,7 @@ class IdealBus:
         schedule, begin, substeps = self._schedule, self._begin, self._substeps
         port, ticks = self._port, self._ticks
         period_s, period_ns, last = schedule.period_s, schedule.period_ns, schedule.ticks
-        robots, faults, interference = self._robots, self.faults, self._interference
+        robots, faults, interference = self.robots, self.faults, self._interference
         (single,) = robots if len(robots) == 1 else (None,)
         late: list[Frame] = []  # replies that wait for the next tick
         for tick in range(-schedule.countdown_ticks, last + 1):
@@ -181,7 +180,7 @@ class IdealBus:
             heard = self._interference.react(frames, bus_ns)
             return self._interference.from_drives(heard, bus_ns)
         replies: list[Frame] = []
-        for robot in self._robots:
+        for robot in self.robots:
             for frame in frames:
                 if replied := robot.on_frame(frame, bus_ns):
                     replies += replied

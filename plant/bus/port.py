@@ -56,12 +56,15 @@ class Port(ABC):
 class Bus(Protocol):
     """One bus with the robots on it, in lockstep (`steps`) or in real time (the other methods)."""
 
-    robots: Sequence[EmulatedRobot]
     faults: BusFaults
     crossed: int
     """Frames that crossed the bus, drives' and clients'."""
     acts_between_ticks: bool
     """In real time, whether `next_ns` has to be looked at between two ticks."""
+
+    @property
+    def robots(self) -> Sequence[EmulatedRobot]:
+        """Those on it, in the order of the scenario."""
 
     @property
     def now_ns(self) -> int:
