@@ -256,12 +256,15 @@ class LockstepLoop:
 
     def _next_tick(self, now_ns: int) -> None:
         """The slowest have gone on; without any bus left, the run is over."""
-        ticks = [lane.tick for lane in self._lanes.values() if not lane.done]
-        if not ticks:
+        slowest, at_slowest = self._last_tick + 1, 0
+        for lane in self._lanes.values():
+            if not lane.done and lane.tick <= slowest:
+                at_slowest = 1 if lane.tick < slowest else at_slowest + 1
+                slowest = lane.tick
+        if not at_slowest:
             self._slowest = self._schedule.ticks
             return
-        self._slowest = slowest = min(ticks)
-        self._at_slowest = ticks.count(slowest)
+        self._slowest, self._at_slowest = slowest, at_slowest
         pacing = self._pacing
         if slowest <= 0:
             self._start_ns = now_ns

@@ -18,11 +18,10 @@ to be opened again. Neither ends the plant. Interfaces without a file descriptor
 import contextlib
 import select
 from collections.abc import Mapping, Sequence
-from typing import Protocol
 
 import can
 
-from bridge.can_bus.drive_port import DrivePort
+from bridge.can_bus.drive_port import DrivePort, WaitablePort
 from bridge.can_bus.echo import Echoes, hands_back
 from bridge.can_bus.pythoncan import open_bus, to_frame, to_message
 from bridge.frame import Frame
@@ -86,7 +85,7 @@ class _Attachment:
         self.reason = ""
 
 
-class ExternalBuses:
+class ExternalBuses(WaitablePort):
     """The drives' end of the buses in `settings`, by name.
 
     Raises:
@@ -279,14 +278,7 @@ class ExternalBuses:
                 attachment.reason = str(error)
 
 
-class WaitablePort(DrivePort, Protocol):
-    """A drive port with a descriptor to wait for."""
-
-    def fileno(self) -> int:
-        """A descriptor that is readable when there is something to handle."""
-
-
-class CombinedPort:
+class CombinedPort(DrivePort):
     """Two ends as one; each bus is on one of them."""
 
     def __init__(self, ours: WaitablePort, others: ExternalBuses, names: Sequence[str]) -> None:

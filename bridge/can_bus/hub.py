@@ -30,6 +30,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from bridge.can_bus.connection import Bus, Connection
+from bridge.can_bus.drive_port import WaitablePort
 from bridge.can_bus.packet import (
     DONE,
     MAX_FRAMES,
@@ -53,7 +54,7 @@ _NEVER: Final = 1 << 62
 _NOBODY: Final[Mapping[str, Mapping[str, str]]] = {}
 
 
-class Hub:
+class Hub(WaitablePort):
     """All buses of one process.
 
     Args:

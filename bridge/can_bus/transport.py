@@ -8,9 +8,12 @@ import contextlib
 import select
 import socket
 import struct
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
+
+from mypy_extensions import mypyc_attr
 
 from bridge.can_bus import sockets
 from bridge.can_bus.packet import MAX_BYTES, WELCOME, Packet, decode
@@ -22,21 +25,29 @@ FINE_S: Final = 0.03
 _TIMEVAL: Final = struct.Struct("ll")
 
 
-class Transport(Protocol):
+@mypyc_attr(allow_interpreted_subclasses=True)
+class Transport(ABC):
     """One client's connection to a hub."""
 
+    __slots__ = ()
+
+    @abstractmethod
     def send(self, packet: bytes) -> None:
         """Send at once. Raises `BlockingIOError` without space, `OSError` when it is broken."""
 
+    @abstractmethod
     def await_writable(self, timeout_s: float) -> bool:
         """Wait until a packet can be sent; whether it can."""
 
+    @abstractmethod
     def receive(self, wait_s: float | None) -> bytes | None:
         """The next packet; None if none came within `wait_s` (None: for ever); empty at the end."""
 
+    @abstractmethod
     def fileno(self) -> int:
         """A descriptor that is readable when a packet is there; −1 once it is closed."""
 
+    @abstractmethod
     def close(self) -> None:
         """Leave; sent packets arrive, and waits in other threads end. Idempotent."""
 
@@ -45,7 +56,7 @@ class JoinError(Exception):
     """A client could not join a bus; the text has the reason."""
 
 
-class UnixTransport:
+class UnixTransport(Transport):
     """A transport over a Unix socket that keeps packet boundaries."""
 
     __slots__ = ("_bound_s", "_recv", "_send", "_socket")

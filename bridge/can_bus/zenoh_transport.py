@@ -30,6 +30,7 @@ from bridge.can_bus.packet import (
     REFUSED,
     encode_text,
 )
+from bridge.can_bus.transport import Transport
 from bridge.network import keys
 from bridge.network.client import open_client
 from bridge.process.clock import SYSTEM_CLOCK
@@ -42,7 +43,7 @@ _FIRST_HELLO_S, _LAST_HELLO_S = 0.01, 0.2
 _ENDS = frozenset({BYE, REFUSED})
 
 
-class ZenohTransport:
+class ZenohTransport(Transport):
     """One guest's connection to a bus behind a router."""
 
     def __init__(self, network: NetworkLink, channel: str, hello: bytes, timeout_s: float) -> None:

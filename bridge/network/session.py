@@ -25,9 +25,11 @@ ONE_THREAD = (
     " tx: (handover: app))"
 )
 ROUTER_THREADS = (
-    "(app: (worker_threads: 1), net: (handover: app), acc: (handover: app),"
+    "(app: (worker_threads: 1), net: (handover: app), acc: (handover: rx),"
     " rx: (worker_threads: 2), tx: (worker_threads: 1))"
 )
+"""What accepts a connection is told of all that comes on it: where others read, one more thread is
+woken by every message."""
 WAIT_BEFORE_CLOSE = "transport/link/tx/queue/congestion_control/block/wait_before_close"
 _Kept = TypeVar("_Kept")
 

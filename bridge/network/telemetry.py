@@ -53,13 +53,13 @@ class RowBuffer:
         hand_on: called with each block.
         within_ns: a block is handed on so long after its first row, if `look` is called `LOOKS`
             times in that time.
-        watched: whether somebody waits for the rows; of those that nobody waits for a block is
-            handed on after `UNWATCHED_ROWS_WITHIN_NS`.
+        watched: whether somebody waits for the rows, asked once a block; one that nobody waits for
+            is handed on after `UNWATCHED_ROWS_WITHIN_NS`.
     """
 
     __slots__ = (
         *("_age_ns", "_block", "_count", "_due_ns", "_first_tick", "_hand_on", "_handed_on"),
-        *("_late_ns", "_look_ns", "_row", "_seen", "_size", "_unwatched_age_ns", "_watched"),
+        *("_late_ns", "_row", "_seen", "_size", "_unwatched_age_ns", "_watched"),
     )
 
     def __init__(
@@ -72,8 +72,7 @@ class RowBuffer:
         self._hand_on = hand_on
         self._watched = watched
         self._age_ns = within_ns * (LOOKS - 1) // LOOKS
-        self._look_ns = look_ns = within_ns // LOOKS
-        self._unwatched_age_ns = max(UNWATCHED_ROWS_WITHIN_NS - look_ns, self._age_ns)
+        self._unwatched_age_ns = max(UNWATCHED_ROWS_WITHIN_NS - within_ns // LOOKS, self._age_ns)
         self._seen = False  # whether it is known since when there is a row, and so:
         self._due_ns = 0  # when the block goes on if somebody watches
         self._late_ns = 0  # and when in any case
@@ -138,7 +137,7 @@ class RowBuffer:
             if now_ns >= self._late_ns or self._watched():
                 self._flush(final=False)
             else:
-                self._due_ns = min(now_ns + self._look_ns, self._late_ns)
+                self._due_ns = self._late_ns
 
     def hand_on(self) -> None:
         """Hand on what is there."""
