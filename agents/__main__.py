@@ -105,7 +105,8 @@ def _run(brief: AgentBrief, stop: Stop, link: ZenohLink, watch: LauncherWatch | 
         link.subscribe(keys.pose(name, other), f"place/{other}")
     if brief.leader_link is not None:
         link.subscribe(keys.leader_speed(name), "leader")
-    link.subscribe(keys.go(name), "go")
+    if brief.schedule.realtime or brief.rejoins:  # else the plant's first frame is the go
+        link.subscribe(keys.go(name), "go")
 
     hellos = Hellos(brief.schedule.hello_every_s)
     if not brief.rejoins:
@@ -313,6 +314,8 @@ def _realtime(connections: _Connections, stop: Stop) -> str:
     epoch_ns = loop.await_go(stop)
     if epoch_ns is None:
         return stop.reason
+    # It is looked at no more.
+    connections.link.unsubscribe(keys.go(connections.agent.brief.network.run))
     return connections.run(partial(loop.run, epoch_ns, stop), stop, loop, missing)
 
 

@@ -182,8 +182,15 @@ class Hub(WaitablePort):
         return answered
 
     def serve(self, timeout_s: float) -> None:
-        """Handle what happens on the buses; waits at most `timeout_s`, to the microsecond."""
-        if timeout_s <= 0.0 or readable([self._server], timeout_s):
+        """Handle what happens on the buses; waits at most `timeout_s`.
+
+        A wait of milliseconds ends in the last of them, one call of the kernel instead of two where
+        something comes before; a shorter one is kept to the microsecond.
+        """
+        whole_ms = int(timeout_s * 1e3)
+        if whole_ms > 0:
+            self._handle((whole_ms - 0.5) * 1e-3)  # the kernel counts up to the next whole one
+        elif timeout_s <= 0.0 or readable([self._server], timeout_s):
             self._handle(0.0)
 
     @property

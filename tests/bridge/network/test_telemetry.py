@@ -130,6 +130,24 @@ def test_rows_that_nobody_watches_travel_in_larger_blocks() -> None:
     assert 5 * len(few) < len(many)
 
 
+def test_whether_somebody_watches_is_asked_once_a_block() -> None:
+    asked: list[bool] = []
+    blocks: list[int] = []
+
+    def nobody_watches() -> bool:
+        asked.append(True)
+        return False
+
+    buffer = RowBuffer(
+        PLANT_ROW, lambda _, count, *__: blocks.append(count), ROWS_WITHIN_NS, nobody_watches
+    )
+    for tick in range(200):  # 0.8 s
+        buffer.add(tick, [0.0] * len(PLANT_SIGNALS))
+        buffer.look(tick * 4_000_000)
+    assert len(blocks) == 3
+    assert len(asked) in (len(blocks), len(blocks) + 1)
+
+
 def test_blocks_that_fill_in_time_are_not_divided() -> None:
     every_ns = 29_000_000 // BLOCK_TICKS
     assert {count for _, _, count in handed_on(every_ns, 40_000_000, 4 * BLOCK_TICKS)} == {
