@@ -131,6 +131,8 @@ def saved(path: Path) -> str:
         return path.read_text("utf-8")
     except FileNotFoundError:
         raise ScenarioError(f"{path.parent}: no study was begun there: no {path.name}") from None
+    except NotADirectoryError:
+        raise ScenarioError(f"{path.parent}: a file, not the folder of a study") from None
     except (OSError, UnicodeError) as error:
         raise InfrastructureError(f"{path}: {error}") from error
 

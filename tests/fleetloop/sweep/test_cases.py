@@ -89,6 +89,9 @@ def test_a_plan_that_was_saved_makes_the_same_cases(tmp_path) -> None:
 def test_a_folder_without_a_study_is_refused(tmp_path) -> None:
     with pytest.raises(ScenarioError, match=r"no study was begun there: no study\.toml"):
         Plan.resume(tmp_path)
+    (tmp_path / "study.toml").write_text(SAMPLED, "utf-8")
+    with pytest.raises(ScenarioError, match=r"study\.toml: a file, not the folder of a study"):
+        Plan.resume(tmp_path / "study.toml")
 
 
 def test_a_base_beside_the_study_is_found_from_anywhere(tmp_path) -> None:
